@@ -254,12 +254,12 @@ class SimulatedMount:
             (*shown, motion.moving), motion.travelled / TRAVEL_STEP)
 
 
-def _turn(device: Any, words: list[str], now: float) -> simulated.Change:
+def _turn(device: Any, words: list[str], now: float) -> simulated.Effect:
     pitch, yaw = (math.radians(_degrees(word)) for word in words)
     return partial(device.mount.motion.turn, pitch, yaw, now)
 
 
-COMMANDS: tuple[simulated.ConsoleCommand[Any, simulated.Change], ...] = (
+COMMANDS: tuple[simulated.ConsoleCommand[Any, simulated.Effect], ...] = (
     simulated.ConsoleCommand('turn PITCH YAW', 'turn it by hand, degrees, relative to horizon '
                              'and vehicle', _turn, (2,)),
 )

@@ -318,7 +318,7 @@ class SimulatedManager(simulated.SimulatedDevice):
             return self._pitchyaw(source, first, flags, now)
         if command.command == GimbalCommand.DO_GIMBAL_MANAGER_CONFIGURE:
             return self._configure(source, first)
-        change: simulated.Change = partial(self._clear_roi, now)
+        change: simulated.Effect = partial(self._clear_roi, now)
         if command.command == GimbalCommand.DO_SET_ROI_LOCATION:
             read = read_roi(command)
             if isinstance(read, MavResult):

@@ -42,24 +42,24 @@ class Switch(NamedTuple):
 
     @property
     def params(self) -> tuple[float, ...]:
-        """See :class:`Change`."""
+        """See :class:`~..payload.request.Change`."""
         return (float(self.on),)
 
     @property
     def goal(self) -> str:
-        """See :class:`Change`."""
+        """See :class:`~..payload.request.Change`."""
         return 'on' if self.on else 'off'
 
     def shown_by(self, status: Status) -> bool:
-        """See :class:`Change`."""
+        """See :class:`~..payload.request.Change`."""
         return status.enabled is self.on
 
     def evidence(self, status: Status) -> str:
-        """See :class:`Change`."""
+        """See :class:`~..payload.request.Change`."""
         return _despite_heat(status) if self.on else CONFIRMED
 
     def actual(self, status: Status) -> str:
-        """See :class:`Change`."""
+        """See :class:`~..payload.request.Change`."""
         shown = {True: 'on', False: 'off', None: 'neither on nor off'}[status.enabled]
         return _with_flags(shown, status)
 
@@ -82,12 +82,12 @@ class Configure(NamedTuple):
 
     @property
     def params(self) -> tuple[float, ...]:
-        """See :class:`Change`."""
+        """See :class:`~..payload.request.Change`."""
         return self.configuration.params()
 
     @property
     def goal(self) -> str:
-        """See :class:`Change`."""
+        """See :class:`~..payload.request.Change`."""
         return self.configuration.describe(self.names)
 
     def _missing(self, status: Status) -> list[str]:
@@ -96,11 +96,11 @@ class Configure(NamedTuple):
             step=True)
 
     def shown_by(self, status: Status) -> bool:
-        """See :class:`Change`."""
+        """See :class:`~..payload.request.Change`."""
         return not self._missing(status)
 
     def evidence(self, status: Status) -> str:
-        """See :class:`Change`."""
+        """See :class:`~..payload.request.Change`."""
         reported = status.configuration(self.configuration)
         hidden = [name for name in self.configuration.differences(reported)
                   if name in self.names]
@@ -111,6 +111,6 @@ class Configure(NamedTuple):
         return f'accepted (ILLUMINATOR_STATUS shows {reported.describe(hidden)})'
 
     def actual(self, status: Status) -> str:
-        """See :class:`Change`."""
+        """See :class:`~..payload.request.Change`."""
         reported = status.configuration(self.configuration)
         return _with_flags(reported.describe(self._missing(status)), status)

@@ -40,9 +40,9 @@ from ..mavlink.command_receiver import AnyCommand
 from ..payload.faults import Behaviour
 from ..payload.identity import Identity
 from ..payload.simulated import (
-    Change,
     CommandReply,
     ConsoleCommand,
+    Effect,
     Reply,
     SimulatedDevice,
     SimulatedType,
@@ -59,14 +59,14 @@ _number = number(-math.inf, math.inf)
 _celsius = number(-273.15, 1000.0)
 
 
-def _strobe(light: SimulatedIlluminator, words: list[str], now: float) -> Change:
+def _strobe(light: SimulatedIlluminator, words: list[str], now: float) -> Effect:
     # With a duty cycle of 0 %, a period alone would switch the light off.
     duty_cycle = (_number(words[1]) if len(words) > 1
                   else light.configuration.strobe_duty_cycle or DEFAULT_DUTY_CYCLE)
     return light.press(now, strobe_period=_number(words[0]), strobe_duty_cycle=duty_cycle)
 
 
-COMMANDS: tuple[ConsoleCommand[SimulatedIlluminator, Change], ...] = (
+COMMANDS: tuple[ConsoleCommand[SimulatedIlluminator, Effect], ...] = (
     ConsoleCommand('on', 'switch on, as by a button on the light',
                    lambda light, words, now: light.press(now, enabled=True)),
     ConsoleCommand('off', 'switch off, likewise',
@@ -218,7 +218,7 @@ class SimulatedIlluminator(SimulatedDevice):
         if self.behaviour.brightness_is_switch:
             self.enabled = configuration.brightness > 0
 
-    def press(self, now: float, *, enabled: bool | None = None, **changes: object) -> Change:
+    def press(self, now: float, *, enabled: bool | None = None, **changes: object) -> Effect:
         """
         Return the change that a button on the light makes.
 

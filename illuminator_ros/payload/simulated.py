@@ -43,16 +43,17 @@ MAX_DELAYED = 1000
 # s between reports of progress.
 PROGRESS_INTERVAL = 0.5
 
-Change = Callable[[], None]
+# Changes the state of a device.
+Effect = Callable[[], None]
 T_contra = TypeVar('T_contra', contravariant=True)
 R_co = TypeVar('R_co', covariant=True)
 
 
 class CommandReply(NamedTuple):
-    """A device's reply to a command: the result, and the change that the command makes."""
+    """A device's reply to a command: the result, and the effect of the command."""
 
     result: MavResult
-    change: Change | None = None
+    effect: Effect | None = None
 
 
 # None where the device does not support the command.
@@ -114,7 +115,7 @@ class SimulatedDevice(ABC):
     sends: ClassVar[Sequence[type[Message]]] = ()
     changes: ClassVar[frozenset[int]] = frozenset()
     faults: ClassVar[FaultTable] = FAULTS
-    commands: ClassVar[Sequence[ConsoleCommand[Any, Change]]] = ()
+    commands: ClassVar[Sequence[ConsoleCommand[Any, Effect]]] = ()
 
     def __init__(self, behaviour: Behaviour) -> None:
         self.behaviour = self.normal = behaviour
@@ -319,7 +320,7 @@ class SimulatedComponent(Generic[D]):
             self._heartbeat_due = now if behaviour.heartbeat_interval else math.inf
         self._changed()
 
-    def apply(self, change: Change, now: float) -> None:
+    def apply(self, change: Effect, now: float) -> None:
         """Make a change, by command or by hand, and send the streamed messages."""
         change()
         if self.device.behaviour.status_on_change:
@@ -424,11 +425,10 @@ class SimulatedComponent(Generic[D]):
             reply = CommandReply(self._unknown(MavResult.UNSUPPORTED))
         accepted = reply.result == MavResult.ACCEPTED
         self._acknowledge(source, message.command, reply.result, now)
-        change = reply.change
-        if change is None or not (
+        if reply.effect is None or not (
                 not behaviour.ignores_changes if accepted else behaviour.applies_rejected):
             return
-        self._after(behaviour.apply_after, functools.partial(self.apply, change), now)
+        self._after(behaviour.apply_after, functools.partial(self.apply, reply.effect), now)
 
     def _requested(self, message_id: float, now: float) -> Message | None:
         if not math.isfinite(message_id) or (

@@ -262,7 +262,7 @@ def _interval(text: str) -> float:
     return value
 
 
-def _capture(camera: SimulatedRedEdge, words: list[str], now: float) -> simulated.Change:
+def _capture(camera: SimulatedRedEdge, words: list[str], now: float) -> simulated.Effect:
     if words not in ([], ['panel']):
         raise ValueError(f'{words[0]!r} is not panel')
 
@@ -271,7 +271,7 @@ def _capture(camera: SimulatedRedEdge, words: list[str], now: float) -> simulate
     return capture
 
 
-COMMANDS: tuple[simulated.ConsoleCommand[SimulatedRedEdge, simulated.Change], ...] = (
+COMMANDS: tuple[simulated.ConsoleCommand[SimulatedRedEdge, simulated.Effect], ...] = (
     simulated.ConsoleCommand('capture [panel]', 'take an image, as by a button on the camera',
                              _capture, (0, 1)),
     simulated.ConsoleCommand(

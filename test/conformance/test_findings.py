@@ -28,7 +28,7 @@ from illuminator_ros.illuminator.simulated_properties import (
 from illuminator_ros.mavlink.messages import Address
 from illuminator_ros.payload.checks.requirement import Verdict
 from illuminator_ros.payload.identity import Identity
-from illuminator_ros.payload.simulated import Change
+from illuminator_ros.payload.simulated import Effect
 import pytest
 from support.conformance_run import Run
 
@@ -191,7 +191,7 @@ def test_a_light_that_stays_in_external_sync_fails_mode_internal() -> None:
     run = Run(only=('mode-internal', 'mode-external'))
     apply = run.light.apply
 
-    def stuck(change: Change, now: float) -> None:
+    def stuck(change: Effect, now: float) -> None:
         mode = run.lamp.configuration.mode
         apply(change, now)
         if mode is Mode.EXTERNAL_SYNC:

@@ -31,7 +31,7 @@ from illuminator_ros.illuminator.simulated_properties import (
 )
 from illuminator_ros.illuminator.thermal import ThermalProperties
 from illuminator_ros.mavlink.messages import Address, CommandAck, MavCmd, MavResult
-from illuminator_ros.payload.simulated import Change, SimulatedComponent
+from illuminator_ros.payload.simulated import Effect, SimulatedComponent
 from support.back_to_back import Pair
 from support.faulty_wire import Faults
 from support.records import Answer
@@ -73,7 +73,7 @@ class Witness:
     def _fields(self) -> Fields:
         return {'enabled': self._lamp.enabled, **asdict(self._lamp.configuration)}
 
-    def _watched_apply(self, change: Change, now: float) -> None:
+    def _watched_apply(self, change: Effect, now: float) -> None:
         self._apply(change, now)
         if (fields := self._fields()) != self._states[-1][1]:
             self._states.append((now, fields))

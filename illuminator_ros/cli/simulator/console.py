@@ -21,7 +21,7 @@ from functools import partial
 from typing import Any
 
 from .view import ComponentSnapshot
-from ...payload.simulated import Change, ConsoleCommand, SimulatedComponent, SimulatedDevice
+from ...payload.simulated import ConsoleCommand, Effect, SimulatedComponent, SimulatedDevice
 
 Component = SimulatedComponent[SimulatedDevice]
 # Executes a command with its arguments at a time, and returns the answer.
@@ -71,7 +71,7 @@ def describe_commands(devices: Iterable[type[SimulatedDevice]]) -> str:
 
 def _bound(component: Component) -> dict[str, tuple[ConsoleCommand[Any, Any], Execute]]:
     """Return the commands of a component by name, each with the function that executes it."""
-    def apply(command: ConsoleCommand[object, Change], words: list[str], now: float) -> None:
+    def apply(command: ConsoleCommand[object, Effect], words: list[str], now: float) -> None:
         component.apply(command.do(component.device, words, now), now)
 
     return {
