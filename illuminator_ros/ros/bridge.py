@@ -85,17 +85,17 @@ class Bridge:
         self.log = NodeLog(node.get_logger())
         frame_log = LogForwarder(self.log)
         kinds = [_load(name, types) for name in declare_payloads(node, payload)]
-        self.parameters = parameters = _link_parameters(node, kinds, url)
+        parameters = _link_parameters(node, kinds, url)
         values = [declare_read_only(node, kind.parameters) for kind in kinds]
         commands = CommandSender(
             parameters.address, parameters.command_timeout, parameters.command_retries)
-        self.clients = [kind.make_client(commands, value)
-                        for kind, value in zip(kinds, values, strict=True)]
-        self.component = Component(commands, self.clients)
+        clients = [kind.make_client(commands, value)
+                   for kind, value in zip(kinds, values, strict=True)]
+        self._component = Component(commands, clients)
         signing, store = parameters.signing()
         try:
             self.link = Link(
-                parameters.url, self.component, label=parameters.connection_url,
+                parameters.url, self._component, label=parameters.connection_url,
                 on_event=self._link_event, signing=signing, store=store,
                 mavlink_version=parameters.mavlink_version)
         except ValueError as error:
@@ -109,7 +109,7 @@ class Bridge:
             target=self._keep_house, name='housekeeping', daemon=True)
         self._nodes = NodeManager(node, arguments, self.log, self._wake.set)
         self._diagnostics = DiagnosticsPublisher(
-            node, self.link, self.component, url=parameters.connection_url,
+            node, self.link, self._component, url=parameters.connection_url,
             period=parameters.diagnostics_period)
         LoggerServices(node, frame_log)
         self._executor = NodeExecutor(node.context, self.log)
@@ -119,10 +119,10 @@ class Bridge:
             for kind in kinds[1:])]
         self._payloads: list[ServedPayload] = []
         for own, kind, client, value in zip(
-                self._own_nodes, kinds, self.clients, values, strict=True):
+                self._own_nodes, kinds, clients, values, strict=True):
             log = self.log if own is node else NodeLog(own.get_logger())
             self._payloads.append(kind.serve(client, Host(
-                own, self.link, log, frame_log, self._nodes, self._diagnostics, parameters, value,
+                own, self.link, log, frame_log, self._nodes, self._diagnostics, value,
                 self._wake.set)))
             if own is not node:
                 self._executor.add_node(own)
@@ -233,7 +233,7 @@ class Bridge:
             self._wake.clear()
 
     def _poll(self, now: float) -> None:
-        if (not self._signing_reported and self.component.commands.unanswering
+        if (not self._signing_reported and self._component.commands.unanswering
                 and self.link.snapshot(now).signing.unchecked):
             self._signing_reported = True
             self.log.warning(f'{SIGNING_NEEDED}: set signing_mode and signing_key_file')

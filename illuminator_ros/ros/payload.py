@@ -24,7 +24,7 @@ from rclpy.node import Node
 
 from .diagnostics_publisher import DiagnosticsPublisher
 from .node_manager import NodeManager
-from .parameters import LinkParameters, ParameterSpec, Values
+from .parameters import ParameterSpec, Values
 from .throttled_log import LogForwarder, NodeLog
 from ..mavlink.command_sender import CommandSender
 from ..mavlink.component import Payload
@@ -51,7 +51,6 @@ class Host(NamedTuple):
     frame_log: LogForwarder
     nodes: NodeManager
     diagnostics: DiagnosticsPublisher
-    link_parameters: LinkParameters
     values: Values
     check_diagnostics: Callable[[], None]
 
@@ -87,9 +86,9 @@ class RosPayload:
     :param node_name: the default name of its first node.
     :param parameters: its read-only parameters, beside those of the link.
     :param device_parameters: those that may be set at any time; for ``--help``.
-    :param make_client: returns the MAVLink side, given the command sender and the parameters.
-    :param serve: serves devices with nodes, given the client; may raise
-        :class:`~.parameters.ParameterError`.
+    :param make_client: returns the MAVLink side, given the command sender and the parameters; may
+        raise :class:`~.parameters.ParameterError`.
+    :param serve: serves devices with nodes, given the client; may raise it, too.
     :param summary: the device, for ``--help``.
     :param examples: commands, for ``--help``.
     :param link_defaults: defaults of the link's parameters where it is the first payload.

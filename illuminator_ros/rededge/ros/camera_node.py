@@ -90,8 +90,6 @@ class CameraNode(ServedPayload):
         self._host = host
         self._clock = host.node.get_clock()
         self._started = host.link.clock()
-        if host.link_parameters.address.component == MAV_COMP_ID_CAMERA:
-            raise ParameterError(f'component_id: {MAV_COMP_ID_CAMERA} is the id of the camera')
         self._geoid_is_known = GEOID_SEPARATION.name in given_parameters(host.node)
         self._mount_topic = host.node.resolve_topic_name(f'~/{Input.MOUNT.value}')
         self._interface = NodeInterface(
@@ -207,6 +205,8 @@ def _angles(values: Values) -> Vector:
 
 
 def _make_client(commands: CommandSender, values: Values) -> RedEdgeClient:
+    if commands.address.component == MAV_COMP_ID_CAMERA:
+        raise ParameterError(f'component_id: {MAV_COMP_ID_CAMERA} is the id of the camera')
     return RedEdgeClient(commands, Settings(
         FeederSettings(
             PositionSource(values['position_source']), values['geoid_separation'],
