@@ -23,7 +23,7 @@ from __future__ import annotations
 from collections.abc import Callable
 import ipaddress
 import re
-from typing import NamedTuple, NoReturn
+from typing import Literal, NamedTuple, NoReturn
 
 MAVROS_UDP_BIND_PORT = 14555
 MAVROS_UDP_REMOTE_PORT = 14550
@@ -54,18 +54,22 @@ class HostPort(NamedTuple):
 ANY = HostPort('', 0)
 
 
+# When the remote gets messages as a broadcast address: never, until a peer is heard, or always.
+Broadcast = Literal['', 'until_peer', 'always']
+
+
 class UdpUrl(NamedTuple):
     """
     A UDP socket.
 
     :param bind: the local address; port 0 means any free one.
     :param remote: the only address it sends to; None means the peers that it hears.
-    :param broadcast: the remote is a broadcast address: '' no, 'until_peer' or 'always'.
+    :param broadcast: when the remote is used as a broadcast address; '' if it is not one.
     """
 
     bind: HostPort
     remote: HostPort | None = None
-    broadcast: str = ''
+    broadcast: Broadcast = ''
 
 
 class TcpUrl(NamedTuple):
@@ -218,7 +222,7 @@ class _Parser:
                       f'udp://{bind + at}')
         return UdpUrl(bound, self.remote(remote, default_port=MAVROS_UDP_REMOTE_PORT))
 
-    def udp_broadcast(self, rest: str, kind: str) -> Url:
+    def udp_broadcast(self, rest: str, kind: Broadcast) -> Url:
         bind, at, remote = rest.partition('@')
         if not at:
             self.fail(f'{rest!r} lacks the "@" before the broadcast address')

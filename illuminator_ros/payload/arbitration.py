@@ -64,6 +64,9 @@ class Arbiter(Generic[K]):
     """
     Decides which source holds a device: at each time at most one. No I/O; times are s.
 
+    :meth:`claim`, :meth:`release` and :meth:`poll` return the change of the holder, None if it
+    has not changed.
+
     A source holds the device from its claim until it releases it, is silent for the lease, or
     loses it to another source as the policy says.
 

@@ -19,6 +19,7 @@ from __future__ import annotations
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 from illuminator_ros.mavlink.url import (
+    Broadcast,
     EXAMPLES,
     HostPort,
     MemoryUrl,
@@ -37,7 +38,9 @@ def listen(host: str, port: int) -> UdpUrl:
     return UdpUrl(HostPort(host, port))
 
 
-def send(host: str, port: int, bind: tuple[str, int] = ('', 0), broadcast: str = '') -> UdpUrl:
+def send(
+    host: str, port: int, bind: tuple[str, int] = ('', 0), broadcast: Broadcast = '',
+) -> UdpUrl:
     return UdpUrl(HostPort(*bind), HostPort(host, port), broadcast)
 
 

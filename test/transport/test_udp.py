@@ -30,7 +30,7 @@ from illuminator_ros.mavlink.transport.udp import (
     PEER_EXPIRY,
     UdpChannel,
 )
-from illuminator_ros.mavlink.url import HostPort, UdpUrl
+from illuminator_ros.mavlink.url import Broadcast, HostPort, UdpUrl
 import pytest
 from support.frames import heartbeat_frame
 from support.live_link import BRIDGE, LiveLink, Run
@@ -97,7 +97,7 @@ def test_host_that_is_not_the_remote_is_not_heard_but_any_loopback_address_is_th
 
 @pytest.mark.parametrize(('kind', 'receiver'), [('until_peer', 1), ('always', 0)])
 def test_broadcast_ends_with_the_first_peer_unless_it_is_always_wanted(
-        channel: Open, kind: str, receiver: int) -> None:
+        channel: Open, kind: Broadcast, receiver: int) -> None:
     with bound_socket('0.0.0.0') as all_hosts, bound_socket() as peer:
         ours = channel(UdpUrl(
             HostPort('', 0), HostPort('127.255.255.255', all_hosts.getsockname()[1]), kind))
