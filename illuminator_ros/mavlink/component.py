@@ -123,22 +123,26 @@ class HeartbeatTimer:
     It must be sent before anything else: routers forward nothing to a component that they have
     not heard.
 
+    :param outgoing: takes the heartbeats, each with the address.
     :ivar due: when the next one is sent, s; infinity before the first and after :meth:`stop`.
     """
 
-    def __init__(self, address: Address, mav_type: int) -> None:
-        self.address = address
-        self.mav_type = mav_type
+    def __init__(
+        self, address: Address, mav_type: int, outgoing: deque[tuple[Address, Message]],
+    ) -> None:
         self.due = math.inf
+        self._address = address
+        self._mav_type = mav_type
+        self._outgoing = outgoing
 
-    def poll(self, now: float, outgoing: deque[tuple[Address, Message]]) -> None:
+    def poll(self, now: float) -> None:
         """Send a heartbeat if one is due."""
         if now >= self.due:
-            self.send(now, outgoing)
+            self.send(now)
 
-    def send(self, now: float, outgoing: deque[tuple[Address, Message]]) -> None:
+    def send(self, now: float) -> None:
         """Send a heartbeat now; the next is due an interval later."""
-        outgoing.append((self.address, heartbeat(self.mav_type)))
+        self._outgoing.append((self._address, heartbeat(self._mav_type)))
         self.due = now + HEARTBEAT_INTERVAL
 
     def stop(self) -> None:
@@ -171,7 +175,7 @@ class Component(Endpoint):
         self._receivers = {cls: tuple(one for one in payloads if cls in one.messages)
                            for cls in self.messages}
         self._received = CommandReceiver(self.address)
-        self._heartbeat = HeartbeatTimer(self.address, mav_type)
+        self._heartbeat = HeartbeatTimer(self.address, mav_type, self.outgoing)
         self._conflict_at = -math.inf
 
     def address_conflict(self, now: float) -> bool:
@@ -180,7 +184,7 @@ class Component(Endpoint):
 
     def link_opened(self, now: float) -> None:
         """See :meth:`Endpoint.link_opened`."""
-        self._heartbeat.send(now, self.outgoing)
+        self._heartbeat.send(now)
         for payload in self._payloads:
             payload.link_opened(now)
 
@@ -223,7 +227,7 @@ class Component(Endpoint):
 
     def poll(self, now: float) -> None:
         """See :meth:`Endpoint.poll`."""
-        self._heartbeat.poll(now, self.outgoing)
+        self._heartbeat.poll(now)
         if now >= self.commands.next_deadline():
             self.commands.poll(now)
         for payload in self._payloads:

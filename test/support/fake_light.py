@@ -64,7 +64,7 @@ class FakeLight(Endpoint):
     ) -> None:
         super().__init__()
         self.source = source
-        self.heartbeat = HeartbeatTimer(source, heartbeat_type or 0)
+        self.heartbeat = HeartbeatTimer(source, heartbeat_type or 0, self.outgoing)
         self.beats = heartbeat_type is not None
         self.results: dict[int, Any] = dict(results or {})
         self.applies = True
@@ -169,7 +169,7 @@ class FakeLight(Endpoint):
         if self.silent:
             return
         if self.beats:
-            self.heartbeat.poll(now, self.outgoing)
+            self.heartbeat.poll(now)
         if self.stream and now >= self._status_due:
             self._status_due = now + self.stream
             self.send(self.status(now))

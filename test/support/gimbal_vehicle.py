@@ -41,7 +41,7 @@ class Autopilot(Endpoint):
 
     def __init__(self) -> None:
         super().__init__()
-        self._heartbeat = HeartbeatTimer(AUTOPILOT, MAV_TYPE_QUADROTOR)
+        self._heartbeat = HeartbeatTimer(AUTOPILOT, MAV_TYPE_QUADROTOR, self.outgoing)
         self._due = 0.0
 
     def link_opened(self, now: float) -> None:
@@ -51,7 +51,7 @@ class Autopilot(Endpoint):
         return
 
     def poll(self, now: float) -> None:
-        self._heartbeat.poll(now, self.outgoing)
+        self._heartbeat.poll(now)
         if now >= self._due:
             self._due = now + 0.1
             latitude, longitude, altitude = HERE

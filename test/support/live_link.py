@@ -57,14 +57,14 @@ class Talker(Endpoint):
 
     def __init__(self) -> None:
         super().__init__()
-        self.heartbeat = HeartbeatTimer(BRIDGE, 18)
+        self.heartbeat = HeartbeatTimer(BRIDGE, 18, self.outgoing)
         self.heard: Log[tuple[Address, Any]] = Log()
         self.receivers: Log[threading.Thread] = Log()
         self.announcements: Log[float] = Log()
         self.turns = 0
 
     def link_opened(self, now: float) -> None:
-        self.heartbeat.send(now, self.outgoing)
+        self.heartbeat.send(now)
         self.announcements.append(now)
 
     def link_closed(self, now: float, reason: str) -> None:
@@ -75,7 +75,7 @@ class Talker(Endpoint):
         self.heard.append((source, message))
 
     def poll(self, now: float) -> None:
-        self.heartbeat.poll(now, self.outgoing)
+        self.heartbeat.poll(now)
 
     def next_deadline(self) -> float:
         self.turns += 1

@@ -104,6 +104,8 @@ class SharedAddress(Endpoint):
 
     def __init__(self, *lights: FakeLight, offset: float = 0.0) -> None:
         super().__init__()
+        # The first light sends the heartbeats.
+        self.outgoing = lights[0].outgoing
         self.lights = lights
         for number, light in enumerate(lights):
             light.outgoing = self.outgoing

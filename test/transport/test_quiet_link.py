@@ -124,7 +124,7 @@ def test_line_that_takes_nothing_makes_no_work_and_drops_are_counted(
 
     def fill(now: float) -> None:
         for _ in range(3000):
-            link.endpoint.heartbeat.send(now, link.endpoint.outgoing)
+            link.endpoint.heartbeat.send(now)
 
     link.ask(fill)
     assert rests(link)

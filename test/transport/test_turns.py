@@ -216,7 +216,7 @@ def test_frames_of_a_channel_that_a_caller_has_lost_are_not_read(
         raise OSError('no such device')
 
     def send(now: float) -> None:
-        talker.heartbeat.send(now, talker.outgoing)
+        talker.heartbeat.send(now)
 
     monkeypatch.setattr(link.udp, 'send', fail)
     link.meanwhile.append(lambda: link.run_turn(send))

@@ -350,13 +350,13 @@ class Session(Endpoint):
         self._began: float | None = None
         self._last_heard = -math.inf
         self._latest: dict[int, Transaction] = {}
-        self._heartbeat = HeartbeatTimer(address, messages.MavType.GCS)
+        self._heartbeat = HeartbeatTimer(address, messages.MavType.GCS, self.outgoing)
 
     # The endpoint
 
     def link_opened(self, now: float) -> None:
         """See :meth:`Endpoint.link_opened`."""
-        self._heartbeat.send(now, self.outgoing)
+        self._heartbeat.send(now)
 
     def link_closed(self, now: float, reason: str) -> None:
         """See :meth:`Endpoint.link_closed`."""
@@ -408,7 +408,7 @@ class Session(Endpoint):
     def poll(self, now: float) -> None:
         """See :meth:`Endpoint.poll`."""
         self._at(now)
-        self._heartbeat.poll(now, self.outgoing)
+        self._heartbeat.poll(now)
         self.runner.advance(now)
 
     def next_deadline(self) -> float:
