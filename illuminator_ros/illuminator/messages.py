@@ -12,13 +12,15 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""The message of illuminators."""
+"""The message of illuminators, and their usual component id."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 
 from ..mavlink.messages import define, Float, Message, UInt8, UInt32  # noqa: I101
+
+MAV_COMP_ID_ILLUMINATOR = 243
 
 
 @define(440, 'ILLUMINATOR_STATUS', extensions=3)

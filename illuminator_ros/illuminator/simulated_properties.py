@@ -20,6 +20,7 @@ from dataclasses import dataclass
 import functools
 from typing import NamedTuple
 
+from .messages import MAV_COMP_ID_ILLUMINATOR
 from .model import ErrorFlag, Mode, StrobeRange
 from .thermal import ThermalProperties
 from .. import __version__
@@ -107,7 +108,7 @@ class IlluminatorProperties:
     :param behaviour: how it behaves at first, and without faults.
     """
 
-    address: messages.Address = messages.Address(1, messages.MAV_COMP_ID_ILLUMINATOR)
+    address: messages.Address = messages.Address(1, MAV_COMP_ID_ILLUMINATOR)
     identity: Identity = Identity(
         'illuminator_ros', 'simulator', __version__, '1.0.0', 'SIM-1-243')
     strobe_range: StrobeRange = StrobeRange(0.05, 10.0)

@@ -88,4 +88,4 @@ def test_numbers_are_those_of_pymavlink(enum: Any, prefix: str) -> None:
     assert missing <= {'CANCELLED', 'COMMAND_UNSUPPORTED_MAV_FRAME', 'NOT_IN_CONTROL'}
     for entry in enum:
         assert getattr(common, f'{prefix}_{entry.name}', entry) == entry
-    assert mav.MAV_COMP_ID_ILLUMINATOR == common.MAV_COMP_ID_ILLUMINATOR
+    assert light.MAV_COMP_ID_ILLUMINATOR == common.MAV_COMP_ID_ILLUMINATOR
