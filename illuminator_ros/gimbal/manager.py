@@ -67,7 +67,7 @@ from .messages import (
 from .vehicle_state import VehicleState
 from ..mavlink import messages as mav
 from ..mavlink.command_receiver import AnyCommand
-from ..mavlink.command_sender import Command, CommandSender
+from ..mavlink.command_sender import Command, CommandResult, CommandSender
 from ..mavlink.component import Payload
 from ..mavlink.messages import Address, command_name, MavResult
 from ..payload.listeners import Listeners
@@ -90,8 +90,10 @@ HOLD_INTERVAL = 0.9
 FOLLOW_INTERVAL = 0.05
 # s between statuses that are sent because control has changed.
 CHANGE_INTERVAL = 0.1
-# s between requests for GIMBAL_DEVICE_INFORMATION until it comes.
-INFORMATION_INTERVAL = 5.0
+# Requests for GIMBAL_DEVICE_INFORMATION without the message after which the manager announces the
+# gimbal without it; s between these requests, and between later ones.
+INFORMATION_REQUESTS = 3
+INFORMATION_DELAY, INFORMATION_INTERVAL = 0.5, 5.0
 # s for which the manager does not send AUTOPILOT_STATE_FOR_GIMBAL_DEVICE after an autopilot has
 # sent it, and the shortest time between two that the manager sends.
 AUTOPILOT_SILENCE = 2.0
@@ -201,6 +203,7 @@ class GimbalManager(Payload):
         self.model = (GimbalModel() if self.tracker.has_mavlink
                       else GimbalModel.from_ranges(settings.ranges))
         self._information: GimbalDeviceInformation | None = None
+        self._information_requests = 0
         self._status: GimbalDeviceAttitudeStatus | None = None
         self._attitude: MountAttitude | None = None
         self._status_at = self._measured_at = -math.inf
@@ -602,7 +605,12 @@ class GimbalManager(Payload):
         self._commands.send(message)
         return MavResult.ACCEPTED
 
-    def _own_information(self, now: float) -> GimbalManagerInformation:
+    def _own_information(self, now: float) -> GimbalManagerInformation | None:
+        """Return GIMBAL_MANAGER_INFORMATION, None while the device's abilities are awaited."""
+        if (self.tracker.has_mavlink and self._information is None
+                and self._information_requests < INFORMATION_REQUESTS):
+            # Clients request the message once: they would never know the device's abilities.
+            return None
         # The manager itself computes the attitude towards a place.
         capabilities = self.model.capabilities | Capabilities.CAN_POINT_LOCATION_GLOBAL
         return GimbalManagerInformation(
@@ -620,11 +628,18 @@ class GimbalManager(Payload):
             gimbal_device_id=self.tracker.device_id, cap_flags2=0)
 
     def _request_information(self, now: float) -> None:
-        self._information_due = now + INFORMATION_INTERVAL
+        self._information_due = math.inf
         if self.tracker.device is not None:
             self._commands.start(Command(
                 self.tracker.device, mav.MavCmd.REQUEST_MESSAGE, (GimbalDeviceInformation.id,)),
-                now)
+                now, self._information_answered)
+
+    def _information_answered(self, result: CommandResult, now: float) -> None:
+        if self._information is None and self.tracker.state is not ManagerState.NO_DEVICE:
+            self._information_requests += 1
+            self._information_due = now + (
+                INFORMATION_DELAY if self._information_requests < INFORMATION_REQUESTS
+                else INFORMATION_INTERVAL)
 
     def _state_changed(self, change: StateChanged, now: float) -> None:
         active = change.after is ManagerState.ACTIVE
@@ -646,6 +661,7 @@ class GimbalManager(Payload):
                 self._information_due = now
         elif change.after is ManagerState.NO_DEVICE and self.tracker.has_mavlink:
             self._information, self._information_due = None, math.inf
+            self._information_requests = 0
             self.model = GimbalModel()
         self.events.emit(change)
 

@@ -75,13 +75,15 @@ class ManagerRig:
     :ivar now: s.
     :ivar sent: everything that it has sent, with the time.
     :ivar device_information: the answer of the device; None for no device.
+    :ivar lost: how many of its next answers are lost, and how many of its next informations.
     :ivar heading: of the vehicle, as the device reports it.
     """
 
     def __init__(
         self, control: ControlSettings | None = None, *, device_id: int = 0,
         device: GimbalDeviceInformation | None = None, address: mav.Address = OURS,
-        active: bool = True, draws: Sequence[float] = (0.25,), **settings: Any,
+        active: bool = True, draws: Sequence[float] = (0.25,),
+        lost: tuple[float, float] = (0, 0), **settings: Any,
     ) -> None:
         self.now = 1000.0
         self.sent: list[tuple[float, Any]] = []
@@ -89,6 +91,7 @@ class ManagerRig:
         self.device_information = device or information()
         self.device_is_there = not 0 < device_id < 7
         self.heading = NAN
+        self.lost = lost
         self.draw = itertools.chain(draws, itertools.repeat(draws[-1])).__next__
         self.manager, self.component = self.make(CommandSender(address), ManagerSettings(
             control or ControlSettings(), device_id=device_id, **settings))
@@ -147,9 +150,19 @@ class ManagerRig:
             self.sent.append((self.now, message))
             if (isinstance(message, mav.CommandLong) and self.device_is_there
                     and (message.target_system, message.target_component) == DEVICE):
-                self.component.receive(
-                    DEVICE, mav.CommandAck(message.command, 0, 0, 0, *source), self.now)
-                self.component.receive(DEVICE, self.device_information, self.now)
+                self._answer(message, source)
+
+    def _answer(self, message: mav.CommandLong, source: mav.Address) -> None:
+        answers, informations = self.lost
+        if answers:
+            self.lost = answers - 1, informations
+            return
+        self.component.receive(
+            DEVICE, mav.CommandAck(message.command, 0, 0, 0, *source), self.now)
+        if informations:
+            self.lost = 0, informations - 1
+        else:
+            self.component.receive(DEVICE, self.device_information, self.now)
 
     # Players
 
