@@ -167,6 +167,21 @@ class _Setpoint:
         """Whether the gimbal keeps turning: towards a place, or at a rate."""
         return self.message is None or self.zero_at < math.inf
 
+    @property
+    def is_zero(self) -> bool:
+        """Whether it has ended a rate or a place."""
+        return self.attitude is None and not self.moves
+
+    def suspend(self) -> None:
+        """Do not send it again, since a request follows it."""
+        self.repeats.clear()
+        self.zero_repeats.clear()
+
+    def resume(self, now: float) -> None:
+        """Send a zero again if the device still turns, since the request has failed."""
+        if self.is_zero:
+            self.zero_repeats = [now + delay for delay in REPEATS]
+
 
 class Gimbal:
     """
@@ -290,7 +305,7 @@ class Gimbal:
         else:
             self._last_control = control
             if not self.in_control:
-                self._stop(now)
+                self._setpoint = None
         self._emit(events.ControlChanged(
             self.key, before, control, self.in_control,
             was_lost=(before is not None and before.primary == us and control is not None
@@ -539,10 +554,9 @@ class Gimbal:
         if reason or manager is None:
             done(request.Result(False, reason), now)
             return
-        self._stop(now)
         manager.flag_requests.submit(_request(
             manager.flag_target, SetFlags(flags, flag, self.key.device_id, goal), now,
-            self._explained(goal, done)), now)
+            self._explained(goal, self._suspend(None, now, done))), now)
 
     def _capabilities(self) -> Capabilities | None:
         manager = self._active
@@ -567,33 +581,65 @@ class Gimbal:
         :param latitude: deg, and longitude.
         :param altitude: m above mean sea level.
         """
-        if self._command(Command(
-                self._manager, GimbalCommand.DO_SET_ROI_LOCATION, (float(self.key.device_id),),
-                position=Position(MAV_FRAME_GLOBAL, latitude, longitude, altitude)),
-                f'point at {latitude:.7g}, {longitude:.7g}, {altitude:.4g} m', now, done):
-            self._setpoint = _Setpoint(self._manager)
+        self._command(Command(
+            self._manager, GimbalCommand.DO_SET_ROI_LOCATION, (float(self.key.device_id),),
+            position=Position(MAV_FRAME_GLOBAL, latitude, longitude, altitude)),
+            f'point at {latitude:.7g}, {longitude:.7g}, {altitude:.4g} m',
+            _Setpoint(self._manager), now, done)
 
     def clear_roi(self, now: float, done: request.Done) -> None:
         """Stop pointing at a place."""
         self._command(Command(
             self._manager, GimbalCommand.DO_SET_ROI_NONE, (float(self.key.device_id),)),
-            'point at no place', now, done)
+            'point at no place', None, now, done)
 
-    def _command(self, command: Command, goal: str, now: float, done: request.Done) -> bool:
-        """Send a command, if the gimbal can be commanded; return whether it can."""
-        explained = self._explained(goal, done)
+    def _command(
+        self, command: Command, goal: str, place: _Setpoint | None, now: float,
+        done: request.Done,
+    ) -> None:
+        """
+        Send a command, if the gimbal can be commanded.
+
+        :param place: see :meth:`_suspend`.
+        """
+        self._begin(now)
+        if reason := self.unavailable(now):
+            done(request.Result(False, reason), now)
+            return
+        explained = self._explained(goal, self._suspend(place, now, done))
 
         def ended(result: CommandResult, now: float) -> None:
             explained(request.Result(
                 result.accepted, str(result), refused=result.refused), now)
 
-        self._begin(now)
-        if reason := self.unavailable(now):
-            done(request.Result(False, reason), now)
-            return False
-        self._stop(now)
         self._commands.start(command, now, ended, deadline=now + REQUEST_LIMIT)
-        return True
+
+    def _suspend(
+        self, place: _Setpoint | None, now: float, done: request.Done,
+    ) -> request.Done:
+        """
+        End a rate with a zero, and send no setpoint again, since a request follows.
+
+        :param place: the setpoint in place of the present one, if the request makes one.
+        :return: a callback that ends the present setpoint, unless the request fails.
+        """
+        if self._setpoint is not None and self._setpoint.zero_at < math.inf:
+            self._send_rates(STILL, now)
+        before = self._setpoint
+        if before is not None:
+            before.suspend()
+        during = self._setpoint = place or before
+
+        def ended(result: request.Result, now: float) -> None:
+            if self._setpoint is during:
+                # Without an answer the gimbal may follow the place.
+                if place is None or result.refused:
+                    self._setpoint = None if result.success else before
+                if self._setpoint is not None:
+                    self._setpoint.resume(now)
+            done(result, now)
+
+        return ended
 
     # Setpoints
 
@@ -693,13 +739,6 @@ class Gimbal:
         else:
             # It has stopped, or does not report its rates.
             setpoint.zero_repeats.clear()
-
-    def _stop(self, now: float) -> None:
-        """End a rate with a zero, if it can be sent, and send no setpoint again."""
-        if self._setpoint is not None and self._setpoint.zero_at < math.inf and self.in_control:
-            # A request that is refused, or that clears a place, does not end the rate.
-            self._send_rates(STILL, now)
-        self._setpoint = None
 
     # Time
 

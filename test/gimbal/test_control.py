@@ -21,7 +21,7 @@ import math
 
 from illuminator_ros.gimbal.commands import Control
 from illuminator_ros.gimbal.events import AutomaticTakeFailed, ControlChanged, GimbalKey
-from illuminator_ros.gimbal.gimbal import Gimbal
+from illuminator_ros.gimbal.gimbal import Gimbal, REPEATS
 from illuminator_ros.gimbal.messages import (
     Capabilities,
     GimbalCommand,
@@ -29,8 +29,9 @@ from illuminator_ros.gimbal.messages import (
     GimbalManagerStatus,
 )
 from illuminator_ros.mavlink import messages as mav
-from illuminator_ros.payload.mount_attitude import MountFlags
+from illuminator_ros.payload.mount_attitude import MountFlags, YawFrame
 from illuminator_ros.payload.request import Done
+from illuminator_ros.payload.rotation import Quaternion
 import pytest
 from support.gimbals import ALL, AUTOPILOT, DEVICE, FakeManager, in_control, OTHER, OURS, Rig
 
@@ -373,6 +374,58 @@ def test_request_during_a_rate_ends_it_with_a_zero(ask: Ask, result: mav.MavResu
     assert asked(rig, ask)[0] is (result is mav.MavResult.ACCEPTED)
 
     assert [one.angular_velocity_y for one in rig.messages(GimbalManagerSetAttitude)] == [-0.2, 0]
+
+
+@pytest.mark.parametrize(('result', 'zeros'), [
+    (mav.MavResult.ACCEPTED, 1), (mav.MavResult.DENIED, 1 + len(REPEATS))])
+@pytest.mark.parametrize('ask', [*(ask for ask, *_ in FLAG_REQUESTS), Gimbal.clear_roi, set_roi])
+def test_zero_before_a_request_is_sent_again_only_if_the_request_fails(
+        ask: Ask, result: mav.MavResult, zeros: int) -> None:
+    rig = in_control()
+    rig.managers[0].results = dict.fromkeys(GimbalCommand, result)
+    # The zero is lost, or the device turns to its neutral position.
+    rig.managers[0].rates = (0.0, -0.2, 0.0)
+    rig.gimbal.set_rates((0.0, 0.2, 0.0), rig.now)
+    rig.run(0.1)
+
+    asked(rig, ask)
+    rig.run(3.0)
+
+    assert [one.angular_velocity_y for one in rig.messages(GimbalManagerSetAttitude)] == [
+        -0.2, *[0] * zeros]
+
+
+@pytest.mark.parametrize('answers', [True, False])
+@pytest.mark.parametrize('ask', [*(ask for ask, *_ in FLAG_REQUESTS), Gimbal.clear_roi, set_roi])
+def test_place_after_a_failed_request_ends_with_the_control_of_the_node(
+        ask: Ask, answers: bool) -> None:
+    rig = in_control()
+    assert asked(rig, set_roi)[0]
+    rig.managers[0].results = dict.fromkeys(GimbalCommand, mav.MavResult.DENIED)
+    rig.managers[0].answers = answers
+    assert not asked(rig, ask)[0]
+    rig.managers[0].results, rig.managers[0].answers = {}, True
+
+    rig.gimbal.release_control(rig.now, rig.done)
+    rig.run(1.0)
+
+    assert [one.angular_velocity_z for one in rig.messages(GimbalManagerSetAttitude)] == [0]
+
+
+@pytest.mark.parametrize('before', [None, (0.0, 0.5, 0.0)])
+def test_attitude_before_a_refused_request_is_still_the_one_that_angles_change(
+        before: tuple[float, float, float] | None) -> None:
+    rig = in_control()
+    if before:
+        rig.gimbal.set_angles(before, YawFrame.VEHICLE, rig.now)
+    rig.managers[0].results = dict.fromkeys(GimbalCommand, mav.MavResult.DENIED)
+    assert not asked(rig, set_roi)[0]
+
+    rig.gimbal.set_angles((math.nan, math.nan, 0.3), YawFrame.VEHICLE, rig.now)
+    rig.run(0.1)
+
+    pitch, yaw = Quaternion(*rig.managers[0].received[-1].q).euler()[1:]
+    assert (pitch, yaw) == pytest.approx((-0.5 if before else 0.0, -0.3))
 
 
 @pytest.mark.parametrize(('primary', 'reason'), [
