@@ -64,8 +64,9 @@ SILENCE_LIMIT = 3.0
 REQUEST_LIMIT = 5.0
 # s after which an attitude is sent again, since the message is not acknowledged.
 REPEATS = (0.2, 0.4, 0.8)
-# rad/s above which a device turns.
-TURNING = 0.01
+# rad/s above which a device turns, and the least s between two attitudes that show it: one may be
+# a copy of the other.
+TURNING, ATTITUDE_SPACING = 0.01, 0.1
 # s since the last GIMBAL_MANAGER_STATUS after which it is requested (ArduPilot does not stream it,
 # PX4 does every 2 s), and after which control is unknown.
 STATUS_REQUEST_DELAY, STATUS_LIMIT = 3.0, 6.0
@@ -161,6 +162,8 @@ class _Setpoint:
     zero_at: float = math.inf
     # When a zero is sent again if the device still turns.
     zero_repeats: list[float] = field(default_factory=list)
+    # An attitude of a device without rates, and its time, since such a repetition is due.
+    seen: tuple[MountAttitude, float] | None = None
 
     @property
     def moves(self) -> bool:
@@ -733,11 +736,21 @@ class Gimbal:
                 or not setpoint.zero_repeats or now < setpoint.zero_repeats[0]):
             return
         rates = status.angular_velocity_x, status.angular_velocity_y, status.angular_velocity_z
-        if any(abs(rate) > TURNING for rate in rates):
+        turns = any(abs(rate) > TURNING for rate in rates)
+        if not turns and not all(map(math.isfinite, rates)) and self._attitude is not None:
+            # Two of its attitudes show whether it turns.
+            if setpoint.seen is None or setpoint.seen[0].frame is not self._attitude.frame:
+                setpoint.seen = self._attitude, now
+            before, at = setpoint.seen
+            if now < at + ATTITUDE_SPACING:
+                return
+            turns = before.rotation.angle_to(self._attitude.rotation) > TURNING * (now - at)
+        if turns:
             del setpoint.zero_repeats[0]
+            setpoint.seen = None
             self._send(setpoint.message)
         else:
-            # It has stopped, or does not report its rates.
+            # It has stopped, or does not report whether it turns.
             setpoint.zero_repeats.clear()
 
     # Time

@@ -159,6 +159,29 @@ def test_zero_is_sent_again_only_while_the_device_reports_that_it_turns(
     assert [one.angular_velocity_z for _, one in setpoints(rig)] == [approx(-0.2)] + [0.0] * zeros
 
 
+@pytest.mark.parametrize('names_frame', [True, False])
+@pytest.mark.parametrize('lost', [0, 1, 3, 10])
+def test_zero_that_is_lost_is_sent_again_to_a_device_that_reports_no_rates(
+        lost: int, names_frame: bool) -> None:
+    rig = in_control()
+    manager = rig.managers[0]
+    if not names_frame:
+        manager.flags = 0
+    rig.gimbal.set_rates((0.0, 0.0, 0.2), rig.now)
+    yaw = 0.0
+    for _ in range(500):
+        zeros = [one for _, one in setpoints(rig) if one.angular_velocity_z == 0.0]
+        if len(zeros) <= lost:
+            yaw -= 0.2 * 0.02
+            manager.q = Quaternion.from_euler(0.0, 0.0, yaw)
+        # Each status comes twice.
+        for _ in range(2):
+            rig.receive(manager.device, manager.attitude())
+        rig.run(0.02)
+
+    assert len(zeros) == min(lost, len(REPEATS)) + 1
+
+
 def test_zero_that_is_lost_is_sent_again_when_the_device_is_heard_again() -> None:
     rig = in_control()
     manager = rig.managers[0]
