@@ -162,6 +162,9 @@ class Camera:
         self._indices: deque[int] = deque(maxlen=MAX_INDICES)
         # The ends of the times in which late answers to captures may come, s.
         self._late: deque[float] = deque(maxlen=MAX_INDICES)
+        # The index of the latest image that a request has triggered, and the time until which its
+        # CAMERA_FEEDBACK may still come, s.
+        self._triggered = 0, -math.inf
         self._images = 0
 
     @property
@@ -189,7 +192,7 @@ class Camera:
             self._link_failure = ''
             self._ping_due = now
 
-    def link_closed(self, reason: str) -> None:
+    def link_closed(self, now: float, reason: str) -> None:
         """See :meth:`Payload.link_closed`."""
         self._link_open = False
         self._ping_due = math.inf
@@ -199,6 +202,8 @@ class Camera:
         requests, self._ping_requests = self._ping_requests, []
         for request in requests:
             request.done(False, self._link_failure)
+        if self._capture is not None and self._capture.index is None:
+            self._late.append(now + LATE_ANSWER)
         self._end_capture(False, f'{self._link_failure}; the image may have been taken')
 
     # Liveness
@@ -293,6 +298,8 @@ class Camera:
         """Take CAMERA_FEEDBACK, which reports that an image was taken."""
         self._images += 1
         self._take_index(message.img_idx, now)
+        if message.img_idx == self._triggered[0]:
+            self._triggered = 0, -math.inf
         self._emit(ImageTaken(message))
         capture = self._capture
         if (capture is not None and capture.index == message.img_idx
@@ -308,6 +315,10 @@ class Camera:
         if index in self._indices:
             return
         self._indices.append(index)
+        triggered, until = self._triggered
+        if index == triggered and now < until:
+            # The camera was lost meanwhile.
+            return
         while self._late and now >= self._late[0]:
             self._late.popleft()
         if self._late:
@@ -317,6 +328,7 @@ class Camera:
                 self._capture = replace(self._capture, late_until=late_until)
         elif self._capture is not None and self._capture.index is None:
             self._capture = replace(self._capture, index=index)
+            self._triggered = index, self._capture.due + LATE_ANSWER
 
     def _end_capture(self, success: bool, text: str) -> None:
         capture, self._capture = self._capture, None

@@ -90,7 +90,7 @@ class RedEdgeClient(Payload):
 
     def link_closed(self, now: float, reason: str) -> None:
         """See :meth:`Payload.link_closed`."""
-        self.camera.link_closed(reason)
+        self.camera.link_closed(now, reason)
         self.feeder.link_closed()
 
     def receive(self, source: Address, message: Message, now: float) -> None:

@@ -269,6 +269,44 @@ def test_a_late_answer_does_not_confirm_the_next_capture() -> None:
     assert len(rig.results) == 3
 
 
+@pytest.mark.parametrize('triggered', [[], [status(1)]], ids=['no status', 'status'])
+@pytest.mark.parametrize('end', ['link', 'heartbeat', 'both'])
+def test_an_answer_from_before_a_loss_does_not_confirm_the_next_capture(
+        end: str, triggered: list[Message]) -> None:
+    rig = Rig()
+    rig.capture()
+    rig.hear(*triggered)
+    if end != 'link':
+        rig.run(5.1)
+    if end != 'heartbeat':
+        rig.component.link_closed(rig.now, 'unplugged')
+        rig.component.link_opened(rig.now)
+    rig.hear(BEAT)
+    rig.capture()
+    rig.hear(feedback(1))
+    assert [success for success, _ in rig.results] == [False]
+    rig.hear(status(2), feedback(2))
+    assert rig.results[1:] == [(True, 'image 2 taken, confirmed after 0 ms')]
+
+
+@pytest.mark.parametrize(('heard', 'seconds'), [
+    ([status(1), feedback(1)], 4.0), ([status(1)], 21.0)], ids=['confirmed', 'not confirmed'])
+def test_the_same_number_after_a_restart_of_the_camera_confirms_a_capture(
+        heard: list[Message], seconds: float) -> None:
+    rig = Rig()
+    rig.capture()
+    rig.hear(*heard)
+    rig.run(5.1, beats=True)
+    rig.run(seconds)
+    rig.hear(BEAT)
+    rig.results.clear()
+
+    rig.capture()
+    rig.hear(status(1), feedback(1))
+
+    assert rig.results == [(True, 'image 1 taken, confirmed after 0 ms')]
+
+
 def test_a_request_without_an_answer_makes_later_captures_fail_for_15_s_only() -> None:
     rig = Rig()
     rig.capture()
