@@ -139,8 +139,11 @@ class GimbalClient(Payload):
         """
         Return the gimbal that has sent a message of a device.
 
-        Implementations older than the field gimbal_device_id send 0 for each device.
+        Implementations older than the field gimbal_device_id send 0 for each device. Some devices
+        send their own component id instead of 0.
         """
+        if number == source.component and number not in NON_MAVLINK_IDS:
+            number = 0
         found = self._gimbals.get(GimbalKey(source, number))
         if found is None and not number:
             own = [one for key, one in self._gimbals.items() if key.address == source]

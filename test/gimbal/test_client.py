@@ -79,6 +79,12 @@ def test_attitude_of_an_older_device_without_an_id_is_that_of_the_only_gimbal() 
     assert rig.all_of(events.AttitudeReceived)[0].key == GimbalKey(AUTOPILOT, 1)
 
 
+def test_attitude_of_a_device_that_sends_its_component_id_as_its_id_is_its_own() -> None:
+    rig = Rig(FakeManager(attitude_number=DEVICE.component)).run(3.0)
+
+    assert rig.all_of(events.AttitudeReceived)[0].key == GimbalKey(DEVICE)
+
+
 def test_manager_that_announces_no_device_yet_is_asked_again_when_it_reports_one() -> None:
     manager = FakeManager(device_id=0, device_alive=False)
     rig = Rig(manager).run(20.0)
