@@ -496,7 +496,9 @@ class GimbalManager(Payload):
 
     def _heading(self, now: float) -> float | None:
         """Return the vehicle's heading as the device reports it, else as the vehicle does."""
-        if (self._attitude is not None and self._attitude.heading is not None
+        # The heading in the status of a device without MAVLink is an older one of the vehicle.
+        if (self.tracker.has_mavlink and self._attitude is not None
+                and self._attitude.heading is not None
                 and self._device_status(now) is not None):
             return self._attitude.heading
         return self.vehicle.heading(now)

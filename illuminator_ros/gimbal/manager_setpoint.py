@@ -400,7 +400,7 @@ def clip(
     if attitude is None:
         return None, ()
     target = roll, pitch, yaw = setpoint.target
-    if ahead is not None and offsets == STILL == turning:
+    if ahead is not None and offsets == STILL == turning and not before:
         # Most setpoints are within the ranges, and the rest takes longer.
         (roll_low, roll_high), (pitch_low, pitch_high), (yaw_low, yaw_high) = ranges
         if (roll_low <= roll <= roll_high and pitch_low <= pitch <= pitch_high
@@ -436,20 +436,25 @@ def _on_axes(
     if ahead is None:
         yaw_range = Range()
     return ((_nearest(roll, roll_range, stops.get('roll')), pitch,
-             _nearest(yaw - (ahead or 0.0), yaw_range, stops.get('yaw'))),
+             _nearest(yaw - (ahead or 0.0), yaw_range, stops.get('yaw'), is_noisy=bool(ahead))),
             (roll_range, pitch_range, yaw_range))
 
 
-def _nearest(angle: float, range_: Range, stop: float | None) -> float:
+def _nearest(
+    angle: float, range_: Range, stop: float | None, *, is_noisy: bool = False,
+) -> float:
     """
     Return the angle, or the same direction a turn away, that is nearest to a range.
 
     :param stop: the end of the range where the axis is, None if it is at neither.
+    :param is_noisy: whether the angle contains the measured heading of the vehicle.
     """
     def distance(one: float) -> float:
         limit = range_.clip(one)
-        # Noise must not turn an axis from one end to the other.
-        return abs(one - limit) + (_HYSTERESIS if limit not in (one, stop) else 0.0)
+        # Noise must not turn an axis from one end to the other, which may be less than the noise
+        # apart.
+        is_free = limit == one and (stop is None or not is_noisy)
+        return abs(one - limit) + (0.0 if is_free or limit == stop else _HYSTERESIS)
 
     angle = math.remainder(angle, math.tau)
     return min((angle, angle + math.tau, angle - math.tau), key=distance)

@@ -597,20 +597,26 @@ def test_gm_8_a_new_setpoint_clearing_or_the_end_of_control_ends_the_region_of_i
     assert euler(last(rig)) == before
 
 
-def test_gm_8_a_noisy_heading_keeps_the_gimbal_at_one_stop_where_the_place_is_behind() -> None:
+@pytest.mark.parametrize(('limit', 'headings', 'expected'), [
+    (86.0, (5.0, -1.0, 1.0, -4.0, 4.0, -6.0), [86.0] * 5 + [-86.0]),
+    (179.0, (0.5, -2.0, 0.5, -8.0, 2.0, -10.0), [179.0] * 4 + [178.0, -170.0]),
+    (179.0, (0.5, -8.0, -10.0), [179.0] * 2 + [-170.0])], ids=['half', 'full', 'far'])
+def test_gm_8_a_noisy_heading_keeps_the_gimbal_at_one_stop_where_the_place_is_behind(
+        limit: float, headings: tuple[float, ...], expected: list[float]) -> None:
     rig = in_control(device=information(
-        FULL & ~Capabilities.SUPPORTS_YAW_IN_EARTH_FRAME, yaw_min=-1.5, yaw_max=1.5))
+        FULL & ~Capabilities.SUPPORTS_YAW_IN_EARTH_FRAME, yaw_min=math.radians(-limit),
+        yaw_max=math.radians(limit)))
     at: list[float] = []
 
-    for degrees in (5.0, -1.0, 1.0, -4.0, 4.0, -6.0):
+    for degrees in headings:
         rig.give(AUTOPILOT, position(47.0, 8.0, 500.0),
                  vehicle_yaw(math.pi + math.radians(degrees)))
         if not at:
             rig.give(PILOT, region(47.01, 8.0, 500.0))
         rig.run(0.1, each=rig.heartbeats(PILOT))
-        at.append(euler(last(rig))[2])
+        at.append(math.degrees(euler(last(rig))[2]))
 
-    assert at == [1.5] * 5 + [-1.5]
+    assert at == pytest.approx(expected, abs=0.01)
 
 
 def test_gm_8_the_gimbal_holds_when_the_position_is_lost_and_says_so() -> None:
@@ -687,6 +693,32 @@ def yaws(rig: ManagerRig) -> list[float]:
     """Return the yaws that a device without MAVLink got."""
     return [one.setpoint.attitude.euler()[2]
             for one in of(gimbal_manager.SetpointSent, rig.events) if one.setpoint.attitude]
+
+
+def test_gm_22_a_yaw_from_north_follows_each_heading_of_the_vehicle() -> None:
+    rig = in_control(device_id=1, ranges=(Range(), Range(), Range()))
+    rig.give(AUTOPILOT, vehicle_yaw(0.0))
+    rig.give(PILOT, pitch_yaw(0.0, 0.5, flags=MountFlags.YAW_IN_EARTH_FRAME))
+
+    for step in range(1, 20):
+        rig.give(AUTOPILOT, vehicle_yaw(0.02 * step))
+        rig.run(0.06, each=rig.heartbeats(PILOT))
+        assert yaws(rig)[-1] == pytest.approx(0.5 - 0.02 * step)
+
+
+def test_gm_22_a_rate_against_a_stop_stays_there_while_the_vehicle_turns() -> None:
+    limit = math.radians(179.0)
+    rig = in_control(device_id=1, ranges=(Range(), Range(), Range(-limit, limit)))
+    rig.give(AUTOPILOT, vehicle_yaw(0.0))
+    rig.give(PILOT, pitch_yaw(0.0, -3.0, flags=MountFlags.YAW_IN_EARTH_FRAME))
+    rig.give(PILOT, pitch_yaw(pitch_rate=0.0, yaw_rate=-0.3, flags=MountFlags.YAW_IN_EARTH_FRAME))
+
+    for step in range(1, 60):
+        rig.give(AUTOPILOT, vehicle_yaw(0.01 * step))
+        rig.run(0.06, each=rig.heartbeats(PILOT))
+
+    assert max(yaws(rig)[1:]) < -2.9
+    assert yaws(rig)[-1] == pytest.approx(-limit)
 
 
 @pytest.mark.parametrize('interval', [0.02, 0.1, 3.0])
