@@ -59,3 +59,10 @@ class LightSources(Sources):
             self._desired[source] = DesiredState(
                 old.enabled if enabled is None else enabled,
                 old.brightness if brightness is None else brightness)
+
+    def forget_on(self, *, brightness_is_switch: bool) -> None:
+        """Forget each ON, and each brightness if that would be an ON; an OFF is kept."""
+        self._desired = {
+            source: DesiredState(False if desired.enabled is False else None,
+                                 None if brightness_is_switch else desired.brightness)
+            for source, desired in self._desired.items()}

@@ -265,7 +265,7 @@ class Light:
         is_by_other = before is False and not (
             report.shared_address or was_hot or self._switching)
         if self._enabled and (self._requested_at == -math.inf or is_by_other):
-            self._requested_at = now
+            self._note_request(now)
         if not self._switching:
             if self._automatic and self._enabled is self._automatic.on:
                 self._automatic = None
@@ -309,6 +309,17 @@ class Light:
     def _is_silent(self, now: float) -> bool:
         limit = self._settings.off_after_silence
         return bool(limit) and now >= self._requested_at + limit
+
+    def _note_request(self, now: float) -> None:
+        self._forget_silenced(now)
+        self._requested_at = now
+
+    def _forget_silenced(self, now: float) -> None:
+        """Forget what would switch the light on, if it was requested before a silence."""
+        if self._is_silent(now):
+            if self._automatic and self._automatic.on:
+                self._automatic = None
+            self._sources.forget_on(brightness_is_switch=self._brightness_is_switch)
 
     def _switch_automatically(self, switch: _AutomaticSwitch) -> None:
         self._automatic = switch
@@ -454,7 +465,7 @@ class Light:
     ) -> str:
         """Take a request; return why a source may not command the light, '' if it may."""
         self.was_commanded = True
-        self._requested_at = now
+        self._note_request(now)
         self._changed(self, now)
         if not self._sources.are_ranked:
             return ''
@@ -474,7 +485,7 @@ class Light:
         if change.after is None:
             self._switching.cancel(
                 f'{change.before} no longer holds it', now,
-                lambda request: request.phase is Phase.WAITING and not request.overtakes)
+                lambda request: request.phase is Phase.WAITING and _is_on(request))
             if self._settings.off_on_release:
                 self._switch_automatically(_AutomaticSwitch(
                     False, f'on_release: {change.before} no longer holds it', now))
@@ -496,6 +507,7 @@ class Light:
 
     def _send_desired(self, now: float) -> None:
         """Send the values that the new holder of the light has requested before."""
+        self._forget_silenced(now)
         holder, desired = self._sources.holder, self._sources.desired
 
         def done(result: Result, now: float) -> None:
@@ -511,8 +523,7 @@ class Light:
         if desired.brightness is not None and not (
                 desired.enabled is False and self._brightness_is_switch):
             self._configuration.set_brightness(desired.brightness, now)
-        # A light that was switched off after silence must not be switched on again.
-        if desired.enabled and not self._is_silent(now):
+        if desired.enabled:
             self._automatic = None
             self._switch(True, now, done, way)
 
@@ -661,8 +672,9 @@ class Light:
         self._change_holder(self._sources.poll(now), now)
         if now >= self._silence_due:
             limit = self._settings.off_after_silence
-            self._switch_automatically(_AutomaticSwitch(
-                False, f'off_after_silence: no request for {format_seconds(limit)}', now))
+            reason = f'off_after_silence: no request for {format_seconds(limit)}'
+            self._switching.cancel(reason, now, _is_on)
+            self._switch_automatically(_AutomaticSwitch(False, reason, now))
         if self._automatic and now >= self._automatic_due:
             self._send_automatic(self._automatic, now)
         self._switching.poll(now)
@@ -683,8 +695,8 @@ class Light:
     def _silence_due(self) -> float:
         """Return the time at which the light is switched off after silence, s."""
         # A light that sends no status may be on if it was switched on, and so may one of several
-        # lights at the address.
-        may_be_on = self._enabled or self._last_switch[0] and (
+        # lights at the address. A try of an ON that has not ended may still take effect.
+        may_be_on = self._enabled or self._switching.has(_is_on) or self._last_switch[0] and (
             self._enabled is None or self._is_shared)
         if (not self._settings.off_after_silence or not may_be_on or not self.connected
                 or self._automatic and not self._automatic.on):
@@ -719,8 +731,8 @@ class Light:
             else:
                 switch.due = due
 
-        if switch.on and self._is_silent(now):
-            self._automatic = None
+        self._forget_silenced(now)
+        if self._automatic is not switch:
             return
         switch.due = math.inf
         self._switch(switch.on, now, done, switch.reason)
@@ -742,6 +754,10 @@ class Light:
         if self._sources.are_ranked:
             due = min(due, self._sources.next_deadline())
         return due
+
+
+def _is_on(request: Request[Status]) -> bool:
+    return not request.overtakes
 
 
 @dataclass(eq=False)

@@ -527,6 +527,10 @@ class RequestQueue(Generic[S]):
         """Return how many requests are under way or wait."""
         return len(self._requests)
 
+    def has(self, which: Callable[[Request[S]], bool]) -> bool:
+        """Return whether one of some requests is under way or waits."""
+        return any(map(which, self._requests))
+
     def submit(self, request: Request[S], now: float) -> None:
         """
         Send a request, or let it wait: behind the others, or until its earliest start.

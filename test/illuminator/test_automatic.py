@@ -103,6 +103,38 @@ def test_off_after_silence_is_repeated_until_the_light_shows_it() -> None:
     assert any(one.failure for one in pair.recorder.others if isinstance(one, AutomaticSwitch))
 
 
+@pytest.mark.parametrize('results', [
+    [None], [MavResult.TEMPORARILY_REJECTED], [MavResult.IN_PROGRESS, MavResult.ACCEPTED]],
+    ids=['lost', 'rejected', 'in progress'])
+def test_an_on_under_way_ends_at_the_silence_with_an_off(results: list[MavResult | None]) -> None:
+    light = FakeLight()
+    pair = Pair(light, settings=Settings(off_after_silence=0.3)).settle()
+    light.results[ON_OFF] = results
+    answer = pair.ask_enable(True)
+    silent_at = pair.now + 0.3
+    pair.run(5.0)
+
+    assert answer.result.message == 'off_after_silence: no request for 300 ms'
+    sent = [command.param1 for command in pair.commands(ON_OFF, since=silent_at)]
+    assert set(sent) == {0.0}
+
+
+def test_an_on_that_waits_is_not_sent_after_silence() -> None:
+    light = FakeLight(stream=0.0)
+    pair = Pair(light, settings=Settings(off_after_silence=1.0)).settle()
+    pair.configure(brightness=50.0)
+    pair.close()
+    light.answers.clear()
+    pair.run(5.0)
+    pair.open()
+    pair.run_until(lambda: pair.light.connected)
+    answer = pair.ask_enable(True)
+    pair.run(5.0)
+
+    assert answer.result.message == 'off_after_silence: no request for 1.00 s'
+    assert not any(command.param1 for command in pair.commands(ON_OFF))
+
+
 def test_a_light_that_was_lost_meanwhile_goes_off_when_it_is_heard_again() -> None:
     light = FakeLight()
     pair = silenced(light)
@@ -228,13 +260,13 @@ def test_an_off_by_another_sender_is_not_undone_after_a_loss(before_loss: bool) 
     assert light.fields['enable'] == 0
 
 
-@pytest.mark.parametrize('is_lost', [False, True])
-def test_an_off_by_another_sender_is_not_undone_after_silence(is_lost: bool) -> None:
+@pytest.mark.parametrize('case', ['waiting', 'waiting, and another request', 'lost'])
+def test_an_off_by_another_sender_is_not_undone_after_silence(case: str) -> None:
     light = FakeLight()
     pair = Pair(light, settings=Settings(reassert=True, off_after_silence=SILENCE)).settle()
     assert pair.enable(True).success
     pair.run(SILENCE - 1.5)
-    if is_lost:
+    if case == 'lost':
         pair.close()
         light.fields['enable'] = 0
         pair.run(SILENCE)
@@ -242,6 +274,9 @@ def test_an_off_by_another_sender_is_not_undone_after_silence(is_lost: bool) -> 
     else:
         switched_off_twice(pair, light)
     silent_at = START + 4.0 + SILENCE
+    if case == 'waiting, and another request':
+        pair.run(silent_at - pair.now)
+        pair.light.set_brightness(20.0, pair.now)
     pair.run(SILENCE)
 
     assert light.fields['enable'] == 0

@@ -206,18 +206,33 @@ def test_an_off_for_all_lights_replaces_a_remembered_on_of_a_lost_light() -> Non
     assert shared.sent(ON_OFF, released_at) == [0.0]
 
 
-def test_an_on_of_the_next_source_is_not_sent_after_silence() -> None:
+@pytest.mark.parametrize(('is_switch', 'act', 'sent'), [
+    (False, lambda shared: shared.enable('operator', True), []),
+    (False, lambda shared: shared.enable('operator', False), [0.0]),
+    (True, lambda shared: shared.dim('operator', 20.0), []),
+], ids=['on', 'off', 'brightness that is the switch'])
+@pytest.mark.parametrize('requests', [True, False])
+def test_of_the_requests_before_a_silence_only_an_off_has_an_effect_after_it(
+    is_switch: bool, act: Callable[[Shared], object], sent: list[float], requests: bool,
+) -> None:
     shared = Shared(timeout=60.0)
-    shared.enable('operator', True)
-    shared.pair.run(1.0)
-    shared.enable('safety', True)
+    shared.light.brightness_is_switch = is_switch
+    shared.pair.settle()
+    for on in (True, False, True):
+        shared.enable('safety', on)
+        shared.pair.run(2.0)
+    act(shared)
     shared.pair.run(SILENCE + 1.0)
     assert shared.light.fields['enable'] == 0
+    if requests:
+        # Its own requests are kept, and do not revive those of others.
+        shared.enable('autonomy', True)
     released_at = shared.pair.now
     shared.release('safety')
     shared.pair.run(1.0)
 
-    assert shared.sent(ON_OFF, released_at) == []
+    assert shared.holder == 'operator'
+    assert (shared.sent(ON_OFF, released_at), shared.light.fields['enable']) == (sent, 0)
 
 
 @pytest.mark.parametrize('beats', [True, False])
