@@ -228,10 +228,11 @@ class Component(Endpoint):
     def poll(self, now: float) -> None:
         """See :meth:`Endpoint.poll`."""
         self._heartbeat.poll(now)
-        if now >= self.commands.next_deadline():
-            self.commands.poll(now)
+        # A payload may end a command that is due to be sent again.
         for payload in self._payloads:
             payload.poll(now)
+        if now >= self.commands.next_deadline():
+            self.commands.poll(now)
 
     def next_deadline(self) -> float:
         """See :meth:`Endpoint.next_deadline`."""

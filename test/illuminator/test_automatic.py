@@ -106,15 +106,18 @@ def test_off_after_silence_is_repeated_until_the_light_shows_it() -> None:
 @pytest.mark.parametrize('results', [
     [None], [MavResult.TEMPORARILY_REJECTED], [MavResult.IN_PROGRESS, MavResult.ACCEPTED]],
     ids=['lost', 'rejected', 'in progress'])
-def test_an_on_under_way_ends_at_the_silence_with_an_off(results: list[MavResult | None]) -> None:
+# A lost ON is due to be sent again after 0.5 s.
+@pytest.mark.parametrize('silence', [0.3, 0.5])
+def test_an_on_under_way_ends_at_the_silence_with_an_off(
+        results: list[MavResult | None], silence: float) -> None:
     light = FakeLight()
-    pair = Pair(light, settings=Settings(off_after_silence=0.3)).settle()
-    light.results[ON_OFF] = results
+    pair = Pair(light, settings=Settings(off_after_silence=silence)).settle()
+    light.results[ON_OFF] = [*results]
     answer = pair.ask_enable(True)
-    silent_at = pair.now + 0.3
+    silent_at = pair.now + silence
     pair.run(5.0)
 
-    assert answer.result.message == 'off_after_silence: no request for 300 ms'
+    assert answer.result.message == f'off_after_silence: no request for {silence * 1000:.0f} ms'
     sent = [command.param1 for command in pair.commands(ON_OFF, since=silent_at)]
     assert set(sent) == {0.0}
 

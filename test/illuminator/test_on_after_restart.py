@@ -363,7 +363,7 @@ def test_an_on_is_not_resent_to_a_light_that_was_lost() -> None:
     pair.run(5.0)
 
     assert light.shone == []
-    assert answer.result.message.startswith('no acknowledgement (3 tries')
+    assert answer.result.message.startswith('no acknowledgement (2 tries')
 
 
 def test_a_set_is_not_resent_to_a_light_that_was_lost() -> None:
