@@ -418,7 +418,8 @@ class ConfigurationManager:
             if self._pending:
                 self._pending.due, self._pending.has_ended = min(self._pending.due, now), False
         elif self._pending and self._pending.reason is not _PendingReason.OVERRIDE:
-            wanted = replace(self.confirmed, **self._pending.values)
+            wanted = self._limits.clipped(
+                replace(self.confirmed, **self._pending.values), self._strobe_range)
             if not unexpected_differences(wanted, reported, status.error_flags, step=True):
                 # The light has kept the values, or another sender has restored them.
                 self._pending = None

@@ -114,6 +114,21 @@ def test_a_light_beyond_the_limits_is_reported_and_brought_back_once() -> None:
         EXCEEDED, (), EXCEEDED]
 
 
+def test_a_light_that_restarts_within_the_limits_is_not_sent_what_it_had_beyond_them() -> None:
+    light, pair = limited(brightness=80.0, strobe_period=0.1, strobe_duty_cycle=10.0)
+    within = dict(light.fields)
+    light.fields |= {'brightness': 80.0, 'strobe_period': 0.1}
+    pair.run(10.0)
+    restarted_at = pair.now
+    light.restart(pair.now, **within)
+    pair.run(10.0)
+
+    assert pair.light.restarts == 1
+    assert pair.commands(CONFIGURE, since=restarted_at) == []
+    assert pair.snapshot.configuration
+    assert pair.snapshot.configuration.brightness == 60.0
+
+
 def test_a_limit_above_what_the_light_can_do_is_reported_and_the_light_does_not_strobe() -> None:
     _, pair = limited(strobe_period=0.1, max_strobe_period=0.2, strobe_duty_cycle=10.0)
 
