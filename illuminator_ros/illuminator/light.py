@@ -167,6 +167,9 @@ class Light:
         # switched the light on, s.
         self._requested_at = -math.inf
         self._automatic: _AutomaticSwitch | None = None
+        # Whether it is switched on again if another sender switches it off: a request has switched
+        # it on, and it was neither lost nor restarted since.
+        self._undoes_off = False
         self._undoing = RepeatLimit(
             configuration_manager.REPEATS, configuration_manager.REPEAT_INTERVAL)
         self._sources = LightSources(settings.sources)
@@ -234,7 +237,7 @@ class Light:
         if self._is_shared is not report.shared_address:
             self._is_shared = report.shared_address
             self._emit(events.AddressShared(self.address, self._is_shared))
-        self._take_report(report, now, was_lost=was_lost, restarted=restarted)
+        self._take_report(report, now, restarted=restarted)
         self._restart_check_until = -math.inf
         if is_awaited:
             self._publish(status, now)
@@ -248,7 +251,7 @@ class Light:
         self._emit(events.StatusReceived(self.address, status, now, self.temperature))
 
     def _take_report(
-        self, report: StatusReport[Status], now: float, *, was_lost: bool, restarted: bool,
+        self, report: StatusReport[Status], now: float, *, restarted: bool,
     ) -> None:
         before, self._enabled = self._enabled, report.status.enabled
         if self._enabled is False:
@@ -270,7 +273,7 @@ class Light:
             if self._automatic and self._enabled is self._automatic.on:
                 self._automatic = None
             if not restarted:
-                self._follow_switch(before, report, now, was_lost=was_lost)
+                self._follow_switch(before, report, now)
         self._switching.take(report, now)
         self._configuration.take(
             report, now, can_follow=self._tracker.conflict.can_follow,
@@ -281,7 +284,7 @@ class Light:
             self._check_refreshes(now)
 
     def _follow_switch(
-        self, before: bool | None, report: StatusReport[Status], now: float, *, was_lost: bool,
+        self, before: bool | None, report: StatusReport[Status], now: float,
     ) -> None:
         """Report that the light was switched without a request under way."""
         status = report.status
@@ -295,8 +298,7 @@ class Light:
                   and now <= self._configuration.sent_at + configuration_manager.IMPLIED_TIME)
         origin = events.Origin.REQUEST if is_own else events.Origin.OTHER_SENDER
         self._emit(events.LightSwitched(self.address, status.enabled, origin))
-        # A light is switched on again only where a request has switched it on.
-        if not self._settings.reassert or is_own or before and (was_lost or not on):
+        if not self._settings.reassert or is_own or before and not self._undoes_off:
             return
         due, change = self._undoing.take(now), 'off' if before else 'on'
         if due is None:
@@ -317,9 +319,14 @@ class Light:
     def _forget_silenced(self, now: float) -> None:
         """Forget what would switch the light on, if it was requested before a silence."""
         if self._is_silent(now):
-            if self._automatic and self._automatic.on:
-                self._automatic = None
+            self._keep_off()
             self._sources.forget_on(brightness_is_switch=self._brightness_is_switch)
+
+    def _keep_off(self) -> None:
+        """Undo no OFF by another sender until a request has switched the light on."""
+        self._undoes_off = False
+        if self._automatic and self._automatic.on:
+            self._automatic = None
 
     def _switch_automatically(self, switch: _AutomaticSwitch) -> None:
         self._automatic = switch
@@ -341,8 +348,7 @@ class Light:
             self._tracker.lost()
             self._emit(events.LightLost(self.address, reason))
             message = self.unreachable(now)
-            if self._automatic and self._automatic.on:
-                self._automatic = None
+            self._keep_off()
             # End ON and CONFIGURE: another try may reach the light after a restart. An OFF may
             # reach it at any time.
             self._commands.end_all(
@@ -366,8 +372,7 @@ class Light:
     def _restarted(self, now: float) -> None:
         was_on, is_on = self._enabled, self.status.enabled if self.status else None
         self.restarts += 1
-        if self._automatic and self._automatic.on:
-            self._automatic = None
+        self._keep_off()
         self._emit(events.LightRestarted(self.address, was_on, is_on))
         self._set_up(now)
         self._configuration.restarted(now)
@@ -435,7 +440,7 @@ class Light:
 
         While a higher source holds the light, the request is not sent but remembered.
 
-        An OFF overtakes: requests for ON that are not accepted yet are cancelled.
+        An OFF overtakes: requests for ON that are not confirmed are cancelled.
 
         :param detail: how it was requested, for :class:`LightSwitched`.
         :param is_stream: whether a later one of a stream replaces it while it waits.
@@ -542,6 +547,7 @@ class Light:
             nonlocal was_on
             was_on = self._enabled
             self._last_switch = on, now
+            self._undoes_off &= on
             self._late_until = now + configuration_manager.LATE_TIME
             return change
 
@@ -549,7 +555,7 @@ class Light:
             result: Result, sent: Change[Status] | None, status: Status | None, now: float,
         ) -> None:
             if result.success:
-                self._enabled = on
+                self._enabled = self._undoes_off = on
                 self._late_until = -math.inf
             done(result, now)
             if result.success and was_on is not on and detail is not None:

@@ -248,16 +248,31 @@ def switched_off_twice(pair: Pair, light: FakeLight) -> None:
     assert light.fields['enable'] == 0
 
 
-@pytest.mark.parametrize('before_loss', [True, False])
-def test_an_off_by_another_sender_is_not_undone_after_a_loss(before_loss: bool) -> None:
+@pytest.mark.parametrize('switched_off', ['before', 'while lost', 'after'])
+def test_an_off_by_another_sender_is_not_undone_after_a_loss(switched_off: str) -> None:
     light, pair = reasserting()
     assert pair.enable(True).success
-    if before_loss:
+    if switched_off == 'before':
         switched_off_twice(pair, light)
     pair.close()
-    light.fields['enable'] = 0
+    if switched_off != 'after':
+        light.fields['enable'] = 0
     pair.run(10.0)
     pair.open()
+    pair.run(5.0)
+    light.fields['enable'] = 0
+    pair.run(5.0)
+
+    assert light.fields['enable'] == 0
+
+
+def test_an_off_by_another_sender_is_not_undone_after_a_restart() -> None:
+    light, pair = reasserting()
+    assert pair.enable(True).success
+    light.restart(pair.now, enable=1)
+    pair.run(5.0)
+    assert pair.light.restarts == 1
+    light.fields['enable'] = 0
     pair.run(5.0)
 
     assert light.fields['enable'] == 0
