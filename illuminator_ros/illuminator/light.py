@@ -266,7 +266,7 @@ class Light:
         # Several lights at one address seem to be one light that switches repeatedly, and a light
         # that has cooled down switches itself on.
         is_by_other = before is False and not (
-            report.shared_address or was_hot or self._switching)
+            report.shared_address or was_hot or self._switching or self._is_own(True, now))
         if self._enabled and (self._requested_at == -math.inf or is_by_other):
             self._note_request(now)
         if not self._switching:
@@ -292,10 +292,7 @@ class Light:
                 or report.shared_address or status.error_flags & DIMMING_FLAGS
                 or status.mode is Mode.EXTERNAL_SYNC):
             return
-        on = self._last_switch[0]
-        is_own = (on == status.enabled and now <= self._late_until
-                  or self._off_brightness == 0.0
-                  and now <= self._configuration.sent_at + configuration_manager.IMPLIED_TIME)
+        is_own = self._is_own(status.enabled, now)
         origin = events.Origin.REQUEST if is_own else events.Origin.OTHER_SENDER
         self._emit(events.LightSwitched(self.address, status.enabled, origin))
         if not self._settings.reassert or is_own or before and not self._undoes_off:
@@ -307,6 +304,12 @@ class Light:
             self._switch_automatically(_AutomaticSwitch(
                 before, f'external_changes: another sender switched it {change}', due,
                 self._undoing))
+
+    def _is_own(self, on: bool, now: float) -> bool:
+        """Return whether a switch may be the late or implied effect of a command of ours."""
+        return (self._last_switch[0] is on and now <= self._late_until
+                or self._off_brightness == 0.0
+                and now <= self._configuration.sent_at + configuration_manager.IMPLIED_TIME)
 
     def _is_silent(self, now: float) -> bool:
         limit = self._settings.off_after_silence
@@ -556,6 +559,7 @@ class Light:
         ) -> None:
             if result.success:
                 self._enabled = self._undoes_off = on
+            if result.success or result.refused:
                 self._late_until = -math.inf
             done(result, now)
             if result.success and was_on is not on and detail is not None:

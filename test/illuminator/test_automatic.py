@@ -163,6 +163,19 @@ def test_a_light_that_overheats_and_cools_down_goes_off_after_silence() -> None:
     assert light.fields['enable'] == 0
 
 
+def test_an_on_that_takes_effect_after_it_has_failed_does_not_count_as_another_request() -> None:
+    light = FakeLight()
+    pair = silenced(light)
+    light.results[ON_OFF] = None
+    assert not pair.enable(True).success
+    light.results.clear()
+    pair.run(1.0)
+    light.fields['enable'] = 1
+    pair.run(SILENCE - 2.0)
+
+    assert light.fields['enable'] == 0
+
+
 @pytest.mark.parametrize('before', ['a failed request', 'throttling'])
 def test_a_light_that_another_sender_switches_on_stays_on_until_silence(before: str) -> None:
     light = FakeLight()
