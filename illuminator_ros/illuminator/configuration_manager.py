@@ -115,6 +115,8 @@ class ConfigurationManager:
     :param emit: takes the events.
     :param limits: apply to each command that is sent.
     :param reassert: whether changes by other senders are undone.
+    :param is_switching_off: returns whether an OFF is under way. No pending values are sent then,
+        since a brightness may be an ON.
     :ivar confirmed: the configuration that the light last accepted from us or, if another sender
         has changed it since, last reported; None before either.
     :ivar discrepancy: why the light does not have a configuration that it should have, '' if it
@@ -125,6 +127,7 @@ class ConfigurationManager:
     def __init__(
         self, target: Target, emit: Callable[[events.AnyLightEvent], None], *,
         limits: SafetyLimits, restore: bool = True, reassert: bool = False,
+        is_switching_off: Callable[[], bool] = lambda: False,
     ) -> None:
         self.confirmed: Configuration | None = None
         self.discrepancy = ''
@@ -132,6 +135,7 @@ class ConfigurationManager:
         self._address = target.address
         self._emit = emit
         self._restore = restore
+        self._is_switching_off = is_switching_off
         self._limits = limits
         self._is_limited = limits != SafetyLimits()
         self.limit_exceeded = events.LimitExceeded(target.address, (), '')
@@ -247,7 +251,8 @@ class ConfigurationManager:
 
     def replace(self, now: float) -> None:
         """End all requests, and drop the pending values: an OFF replaces them."""
-        self._pending = self._setpoint = None
+        self.drop_pending()
+        self._setpoint = None
         self._queue.replace(now)
 
     def end_requests(self, message: str, now: float) -> None:
@@ -255,6 +260,13 @@ class ConfigurationManager:
         self._setpoint = None
         self._queue.cancel(message, now)
         self.retry_pending(now)
+
+    def drop_pending(self) -> None:
+        """Drop the pending values: an OFF replaces them, and they would be an ON."""
+        if self._pending and self._pending.reason is _PendingReason.LIMIT:
+            # The light may be switched on beyond the limit.
+            self._limiting = RepeatLimit(1, REPEAT_INTERVAL)
+        self._pending = None
 
     def _drop_pending(self, names: Container[str]) -> None:
         """Remove fields from the pending values."""
@@ -529,11 +541,17 @@ class ConfigurationManager:
         if self._queue.current is not None or not connected:
             return
         # Pending values go first, since a stream of setpoints may never end.
-        if self._pending and now >= self._pending.due:
+        if self._pending and now >= self._pending_due:
             self._send_pending(self._pending, now)
         if self._setpoint is not None and self._queue.current is None:
             value, self._setpoint = self._setpoint, None
             self._send_setpoint(value, now)
+
+    @property
+    def _pending_due(self) -> float:
+        if self._pending is None or self._is_switching_off():
+            return math.inf
+        return self._pending.due
 
     @property
     def _accepted_setpoint(self) -> Request[Status] | None:
@@ -601,4 +619,4 @@ class ConfigurationManager:
             return -math.inf
         if is_changing or not connected:
             return self._queue.next_deadline()
-        return self._pending.due if self._pending else math.inf
+        return self._pending_due

@@ -137,10 +137,11 @@ class Light:
             address, commands, self._command_ended, kind='light', status_id=STATUS_ID,
             status_name='ILLUMINATOR_STATUS')
         self._identity_query = IdentityQuery(self._target)
+        self._switching: RequestQueue[Status] = RequestQueue(self._target)
         self._configuration = ConfigurationManager(
             self._target, emit, limits=settings.limits,
-            restore=settings.restore_configuration, reassert=settings.reassert)
-        self._switching: RequestQueue[Status] = RequestQueue(self._target)
+            restore=settings.restore_configuration, reassert=settings.reassert,
+            is_switching_off=lambda: self._switching.has(_is_off))
         self._tracker = StatusTracker()
         self._is_shared = False
         self._measures_temperature = False
@@ -559,6 +560,8 @@ class Light:
         ) -> None:
             if result.success:
                 self._enabled = self._undoes_off = on
+                if not on and self._brightness_is_switch:
+                    self._configuration.drop_pending()
             if result.success or result.refused:
                 self._late_until = -math.inf
             done(result, now)
@@ -768,6 +771,10 @@ class Light:
 
 def _is_on(request: Request[Status]) -> bool:
     return not request.overtakes
+
+
+def _is_off(request: Request[Status]) -> bool:
+    return request.overtakes
 
 
 @dataclass(eq=False)

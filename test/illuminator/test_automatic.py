@@ -20,6 +20,7 @@ from typing import Any
 
 from illuminator_ros.illuminator.events import AutomaticSwitch, ChangedByOther
 from illuminator_ros.illuminator.light import Settings
+from illuminator_ros.illuminator.model import SafetyLimits
 from illuminator_ros.mavlink.messages import MavCmd, MavResult
 from illuminator_ros.payload.command_sources import SourceSettings
 import pytest
@@ -423,3 +424,43 @@ def test_a_set_beside_an_off_succeeds_once_a_light_has_shown_a_brightness_while_
 
     assert pair.enable(False).success
     assert pair.wait_for(answer).success
+
+
+def limited_off(case: str) -> tuple[FakeLight, Pair, float]:
+    """
+    Send a slow light, for which brightness is the switch, an OFF before a status needs an answer.
+
+    :return: the light, its client, and the time of the OFF.
+    """
+    light = FakeLight(brightness=50.0)
+    pair = learned(light, Settings(limits=SafetyLimits(max_brightness=60.0)))
+    light.apply_after = 0.5
+    if case == 'restarted':
+        light.restart(pair.now, enable=1, brightness=40.0)
+        light.delay_status(0.01)
+    else:
+        light.fields['brightness'] = 90.0
+    off = pair.ask_enable(False)
+    pair.light.request_status(pair.now)
+    off_at = pair.now
+    assert pair.wait_for(off).success
+    return light, pair, off_at
+
+
+@pytest.mark.parametrize('case', ['beyond a limit', 'restarted'])
+def test_no_configuration_is_sent_while_or_after_an_off_where_brightness_is_the_switch(
+        case: str) -> None:
+    light, pair, off_at = limited_off(case)
+    pair.run(10.0)
+
+    assert pair.commands(CONFIGURE, since=off_at) == []
+    assert light.fields['enable'] == 0
+
+
+def test_a_light_that_is_switched_on_beyond_a_limit_after_an_off_is_brought_back_within_it(
+) -> None:
+    light, pair, _ = limited_off('beyond a limit')
+    light.fields |= {'enable': 1, 'brightness': 90.0}
+    pair.run(5.0)
+
+    assert light.fields['brightness'] == 60.0
