@@ -200,11 +200,28 @@ def test_a_yaml_file_is_read_or_refused_with_the_reason(
     found = components.load(str(path), TYPES)
     assert (found.url, found.listed['light']) == (
         'udpin://127.0.0.1:1', [components.Listed(Address(1, 9), '', {'ambient': 3.0})])
-    path.write_text('a: [')
-    with pytest.raises(components.SettingError, match='not YAML'):
-        components.load(str(path), TYPES)
     with pytest.raises(components.SettingError, match='No such file'):
         components.load(str(tmp_path / 'nowhere'), TYPES)
     monkeypatch.setitem(sys.modules, 'yaml', None)
     with pytest.raises(components.SettingError, match='need PyYAML: pip install pyyaml'):
         components.load(str(path), TYPES)
+
+
+@pytest.mark.parametrize(('content', 'reason'), [
+    ('a: [', 'not YAML: '),
+    ('vendor: 2026-02-30', 'not YAML: day is out of range'),
+    ('seed: !!int few', 'not YAML: invalid literal'),
+    (f'seed: {"9" * 5000}', 'not YAML: Exceeds the limit'),
+    ('vendor: caf\xe9', "not YAML: 'utf-8' codec"),
+    (f'ambient: {"[" * 2000}', 'it is nested too deeply'),
+    ('ambient: &own [*own]', 'it is nested too deeply'),
+    (f'vendor: {"x" * components.MAX_FILE}', 'it has more than 1048576 characters')])
+def test_a_file_that_cannot_be_parsed_is_named_with_the_reason(
+        tmp_path: Path, content: str, reason: str) -> None:
+    path = tmp_path / 'lights.yaml'
+    path.write_text(content, encoding='latin-1')
+
+    with pytest.raises(components.SettingError) as error:
+        components.load(str(path), TYPES)
+
+    assert str(error.value).startswith(f'{path}: {reason}')

@@ -20,7 +20,7 @@ import argparse
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 import contextlib
 from dataclasses import dataclass, field
-from pathlib import Path
+import errno
 from typing import Any
 
 from ..options import address
@@ -29,6 +29,8 @@ from ...payload.simulated import Description, SimulatedDevice, SimulatedType
 from ...payload.simulated_settings import Setting, Values
 
 MAX_COMPONENTS = 200
+# Characters of a file; MAX_COMPONENTS with all their settings need a tenth of it.
+MAX_FILE = 1 << 20
 
 Type = SimulatedType[SimulatedDevice]
 Types = Sequence[Type]
@@ -77,18 +79,31 @@ def load(path: str, types: Types) -> Scenario:
     :raises SettingError: if it cannot be read, or a setting in it is wrong.
     """
     try:
+        return scenario(_content(path), path, types)
+    except RecursionError:
+        # A YAML list can contain itself.
+        raise SettingError(f'{path}: it is nested too deeply') from None
+
+
+def _content(path: str) -> object:
+    try:
         import yaml
     except ModuleNotFoundError as error:
         raise SettingError(
             f'{path}: YAML files need PyYAML: pip install pyyaml, or apt install python3-yaml'
         ) from error
     try:
-        content = yaml.safe_load(Path(path).read_text(encoding='utf-8'))
+        with open(path, encoding='utf-8') as file:
+            text = file.read(MAX_FILE + 1)
+        if len(text) > MAX_FILE:
+            raise OSError(errno.EFBIG, f'it has more than {MAX_FILE} characters')
+        content: object = yaml.safe_load(text)
     except OSError as error:
         raise SettingError(f'{path}: {error.strerror}') from error
-    except (yaml.YAMLError, UnicodeDecodeError) as error:
+    except (yaml.YAMLError, ValueError) as error:
+        # For example, PyYAML raises a plain ValueError for 2026-02-30.
         raise SettingError(f'{path}: not YAML: {" ".join(str(error).split())}') from error
-    return scenario(content, path, types)
+    return content
 
 
 def scenario(content: object, path: str, types: Types) -> Scenario:
