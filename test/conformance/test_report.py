@@ -14,6 +14,7 @@
 
 """The reports of a run: table, JSON, JUnit."""
 
+import dataclasses
 import json
 from xml.etree import ElementTree
 
@@ -71,6 +72,13 @@ def test_the_junit_report_has_counts_reasons_and_sections(report: Report) -> Non
     assert 'switched on by a command for 1/200' in failure.attrib['message']
     assert 'guide/routing.html' in str(failure.text)
     assert 'COMMAND_LONG to 1/200' in str(case.findtext('system-out'))
+
+
+def test_the_junit_report_contains_no_character_that_xml_excludes(report: Report) -> None:
+    url = 'a\0b\x1bc\udcffd\uffffe'
+    suite = ElementTree.fromstring(reports.as_junit(dataclasses.replace(report, url=url)))
+
+    assert suite.findall('properties/property')[0].get('value') == 'a?b?c?d?e'
 
 
 def test_the_table_has_reason_section_and_messages_of_a_failed_requirement(run: Run) -> None:
