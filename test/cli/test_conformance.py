@@ -199,8 +199,14 @@ def test_without_a_light_or_a_link_the_reason_is_reported_with_its_status(
     (['udpin://:1', '--payload', 'nope'], "invalid choice: 'nope'"),
     (['udpin://:1', '--target', '1'], "'1' is "),
     (['udpin://:1', '--junit', '/nowhere/at/all.xml'], 'there is no such directory'),
+    (['udpin://:1', '--json', '/tmp'], '/tmp: it is a directory'),
+    (['udpin://:1', '--json', ''], 'it is a directory'),
+    (['udpin://:1', '--json', 'x' * 300 + '/report.json'], 'there is no such directory'),
     (['udpin://:1', '--signing-mode', 'sign'], 'key'),
     (['udpin://:1', '--mavlink-version', '1'], 'MAVLink 1 cannot carry ILLUMINATOR_STATUS'),
+    # The name of a device in another encoding than UTF-8.
+    (['serial:///nowhere/\udce4:1', '--wait', '0.1'],
+     'cannot open /nowhere/\\udce4: No such file or directory'),
 ])
 def test_a_wrong_argument_is_named_in_one_line_with_status_2(
         arguments: list[str], reason: str) -> None:

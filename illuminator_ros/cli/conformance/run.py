@@ -130,10 +130,23 @@ def parse(
     options = parser.parse_args(args)
     if options.url is None and not options.list:
         parser.error('the connection URL is missing')
-    for path in filter(None, (options.junit, options.json)):
-        if not Path(path).absolute().parent.is_dir():
-            parser.error(f'{path}: there is no such directory')
+    for path in (options.junit, options.json):
+        # The checks take a minute, so refuse before them.
+        if path is not None and (refusal := _report_refusal(os.path.abspath(path))):
+            parser.error(f'{path}: {refusal}')
     return options, checks
+
+
+def _report_refusal(path: str) -> str:
+    """Return why a report cannot be written to a path, '' if no reason is visible."""
+    directory = os.path.dirname(path)
+    # Not methods of Path, which raise an error if a directory above must not be searched.
+    if not os.path.isdir(directory):
+        return 'there is no such directory'
+    if os.path.isdir(path):
+        return 'it is a directory'
+    return '' if os.access(path if os.path.exists(path) else directory, os.W_OK) else (
+        'no permission to write it')
 
 
 def run(
@@ -335,7 +348,8 @@ def _complain(text: str) -> None:
     # Do not use sys.stderr, whose writes a signal may interrupt, and do not wait for its reader.
     with contextlib.suppress(OSError):
         if select.select([], [2], [], 0.0)[1]:
-            os.write(2, f'conformance: {text}\n'.encode())
+            # An argument that is not UTF-8 contains surrogates.
+            os.write(2, f'conformance: {text}\n'.encode(errors='backslashreplace'))
 
 
 # A failure is reported once, and the run goes on, to restore the device.
