@@ -113,7 +113,12 @@ def wrong_arguments(name: str) -> str:
 def log_directory_refusal() -> str:
     """Return why log files cannot be written to their directory, '' if they can."""
     home = os.environ.get('ROS_HOME') or '~/.ros'
-    directory = os.path.expanduser(os.environ.get('ROS_LOG_DIR') or os.path.join(home, 'log'))
+    directory = os.environ.get('ROS_LOG_DIR') or os.path.join(home, 'log')
+    # rcl does not look for the home directory elsewhere; a system service has no HOME.
+    if directory.startswith('~') and not os.environ.get('HOME'):
+        return (f'log files cannot be written to {directory}: HOME is not set; set HOME or '
+                'ROS_LOG_DIR')
+    directory = os.path.expanduser(directory)
     try:
         os.makedirs(directory, exist_ok=True)
         if os.access(directory, os.W_OK | os.X_OK):

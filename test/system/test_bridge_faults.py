@@ -111,11 +111,17 @@ def test_second_bridge_of_the_same_name_is_logged_once_when_it_comes_and_when_it
 
 
 @pytest.mark.parametrize('module', [BRIDGE, 'illuminator_ros.monitor'])
-def test_directory_for_log_files_that_cannot_be_written_is_named(module: str) -> None:
-    program = python(module, env={'ROS_LOG_DIR': '/proc/none'})
+@pytest.mark.parametrize(('env', 'reason'), [
+    ({'ROS_LOG_DIR': '/proc/none'}, 'to /proc/none: '),
+    ({'HOME': '', 'ROS_HOME': '', 'ROS_LOG_DIR': ''}, 'to ~/.ros/log: HOME is not set')])
+def test_directory_for_log_files_that_cannot_be_written_is_named(
+    module: str, env: dict[str, str], reason: str,
+) -> None:
+    program = python(module, env=env)
 
     assert program.wait() == 2
-    assert 'log files cannot be written to /proc/none: ' in program.log
+    assert f'log files cannot be written {reason}' in program.log
+    assert program.log.count('\n') == 1
 
 
 @pytest.mark.parametrize('descriptors', [8, 14, 18, 20])
