@@ -20,9 +20,10 @@ import pty
 import signal
 import subprocess
 import sys
+import tempfile
 import termios
 
-from illuminator_ros.cli.monitor.terminal import Keyboard, unbuffered
+from illuminator_ros.cli.monitor.terminal import Keyboard, quiet_errors, unbuffered
 import pytest
 from support.fork_server import prepare_child
 from support.processes import environment, ROOT
@@ -152,3 +153,18 @@ def test_process_continued_before_it_restores_the_terminal_goes_on() -> None:
             assert runs_to_its_end(process)
         finally:
             process.kill()
+
+
+@pytest.mark.parametrize(('directory', 'shown'), [(None, 'error\n'), ('/nowhere', '')])
+def test_errors_on_the_screen_are_written_afterwards_or_lost_without_a_temporary_directory(
+    capfd: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch, directory: str | None,
+    shown: str,
+) -> None:
+    # Fixtures need a directory when the test has ended.
+    with monkeypatch.context() as patch:
+        patch.setattr(tempfile, 'tempdir', directory)
+        with quiet_errors():
+            os.write(2, b'error\n')
+            assert capfd.readouterr().err == ''
+
+    assert capfd.readouterr().err == shown

@@ -27,6 +27,7 @@ import sys
 import tempfile
 import termios
 import threading
+from typing import IO
 
 from ..entry_point import discard_output
 
@@ -118,7 +119,7 @@ def quiet_errors() -> Iterator[None]:
     """Keep errors of the middleware off the screen, and write them afterwards."""
     sys.stderr.flush()
     kept = os.dup(2)
-    with tempfile.TemporaryFile() as file:
+    with _errors_file() as file:
         os.dup2(file.fileno(), 2)
         try:
             yield
@@ -129,6 +130,14 @@ def quiet_errors() -> Iterator[None]:
             file.seek(0)
             while chunk := file.read(1 << 16):
                 os.write(2, chunk)
+
+
+def _errors_file() -> IO[bytes]:
+    try:
+        return tempfile.TemporaryFile()
+    except OSError:
+        # No directory can be written, as on a full disk: the errors are lost.
+        return open(os.devnull, 'r+b')
 
 
 class Keyboard:
