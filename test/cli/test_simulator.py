@@ -40,6 +40,14 @@ def test_a_simulator_on_a_terminal_takes_commands_and_draws_with_escapes(url: st
     assert '\x1b7' in screen.raw
 
 
+def test_a_simulator_on_a_terminal_without_escape_sequences_prints_plain_text(url: str) -> None:
+    with Terminal('illuminator_ros.simulator', url, env={'TERM': 'dumb'}) as screen:
+        screen.wait_for('1/243 off')
+        screen.type('on\nquit\n')
+        assert screen.wait() == 0
+    assert '\x1b' not in screen.raw
+
+
 def test_a_simulator_on_a_pipe_takes_commands_and_prints_plain_text(url: str) -> None:
     ended = run('illuminator_ros.simulator', url,
                 typed='on\nbrightness 40\nfault nope\nstatus\nquit\n')

@@ -22,6 +22,7 @@ from collections.abc import Iterable, Mapping
 import contextlib
 import functools
 import logging
+import os
 import queue
 import signal
 import sys
@@ -45,6 +46,8 @@ from ...payload.simulated import Description, SimulatedComponents, SimulatedDevi
 VIEW_INTERVAL = 0.2
 # Lines that wait for a terminal that is stopped with ctrl-s; later ones are dropped.
 MAX_TEXTS = 1000
+# Values of TERM for terminals that show escape sequences as text.
+DUMB_TERMINALS = ('dumb', 'unknown')
 
 
 class _Simulation:
@@ -64,7 +67,8 @@ class _Simulation:
         self._texts: queue.Queue[tuple[str, str | None] | None] = queue.Queue(MAX_TEXTS)
         self._ended = threading.Event()
         self._snapshots: list[ComponentSnapshot] = []
-        live = sys.stdout is not None and sys.stdout.isatty() and not options.plain
+        live = (sys.stdout is not None and sys.stdout.isatty() and not options.plain
+                and os.environ.get('TERM') not in DUMB_TERMINALS)
         self._view: PlainView | LiveView = (LiveView if live else PlainView)(sys.stdout)
         self._endpoint: SimulatedComponents[SimulatedDevice] = SimulatedComponents(described, 0.0)
         self._endpoint.new_peers.subscribe(self._found)
