@@ -75,6 +75,19 @@ def test_without_the_light_heartbeat_fails_and_names_the_components_that_were_he
     assert not run.runner.passed
 
 
+@pytest.mark.parametrize(('others', 'reason'), [
+    ([Address(1, n) for n in range(200, 256)], 'each component id from 200 of system 1 is in use'),
+    ([Address(n, 1) for n in range(1, 241)], 'each system id up to 240 is in use')])
+def test_a_check_that_needs_an_unused_address_is_skipped_on_a_link_without_one(
+        others: Sequence[Address], reason: str) -> None:
+    run = Run(only=('other-target',))
+    run.session.heard.update(others)
+    run.finish()
+
+    assert run.result('other-target').detail == reason
+    assert run.failed == set()
+
+
 def test_a_flood_from_the_light_takes_a_bounded_memory() -> None:
     session = CHECKS.session(TESTER)
     status = IlluminatorStatus(1, 0, 3, 0, 1, 10.0, 0.0, 0.0, 20.0, 0.05, 10.0)

@@ -29,7 +29,6 @@ from . import attitude
 from .attitude import earth_yaw, ignores, moves, reaches
 from .tester import (
     describe,
-    free_address,
     GIMBAL,
     GimbalTester,
     NAN,
@@ -169,13 +168,13 @@ async def north_needs_heading(tester: DeviceTester) -> None:
 
 async def _point_from_others(tester: DeviceTester, pose: Pose) -> None:
     """Send setpoints from our own address and from another component of the device's system."""
-    for source in (tester.session.address, free_address(tester.session)):
+    for source in (tester.session.address, tester.session.free_component()):
         await tester.point(pose, sender=source)
 
 
 async def _announce_other(tester: DeviceTester, pose: Pose) -> None:
     """Announce a second manager, and send setpoints from it."""
-    other = free_address(tester.session)
+    other = tester.session.free_component()
     tester.announce(other)
     await tester.pause(2 * ANNOUNCE_INTERVAL)
     tester.announce(other)
@@ -198,9 +197,9 @@ async def _send_to_manager(tester: DeviceTester, pose: Pose) -> None:
 
 async def _point_others(tester: DeviceTester, pose: Pose) -> None:
     """Send setpoints to addresses that do not exist."""
-    device, heard = tester.session.device, {one.system for one in tester.session.heard}
-    system = next(n for n in range(240, 0, -1) if n not in heard)
-    for target in (free_address(tester.session, 200), Address(system, device.component)):
+    session = tester.session
+    for target in (session.free_component(200),
+                   Address(session.free_system(), session.device.component)):
         await tester.point(pose, target=target)
 
 

@@ -33,7 +33,6 @@ from .tester import (
     control_of,
     control_text,
     describe,
-    free_address,
     GIMBAL,
     GimbalTester,
     NAN,
@@ -102,7 +101,7 @@ class ManagerTester(GimbalTester):
     @property
     def other(self) -> Address:
         """Return the address of the second player."""
-        return free_address(self.session)
+        return self.session.free_component()
 
     @property
     def device_id(self) -> int:
@@ -394,7 +393,7 @@ async def flags_shown(tester: ManagerTester) -> None:
 async def other_target(tester: ManagerTester) -> None:
     """Send a setpoint and a command to a component that does not exist."""
     before, session = await tester.begin(), tester.session
-    other, pose = free_address(session, 200), await tester.target(-2 * STEP, STEP)
+    other, pose = session.free_component(200), await tester.target(-2 * STEP, STEP)
     session.send(gimbal.GimbalManagerSetAttitude(
         *other, int(LEVEL | VEHICLE_FRAME), tester.device_id, quaternion_of(pose), *UNSET_VECTOR))
     one = await session.send_to_other(

@@ -343,10 +343,3 @@ def radians(rates: tuple[float, float, float]) -> tuple[float, float, float]:
     """Return rates in rad/s."""
     one, two, three = map(math.radians, rates)
     return one, two, three
-
-
-def free_address(session: Session, first: int = 192) -> Address:
-    """Return an address of the device's system from which nothing was heard."""
-    taken = session.heard | {session.address}
-    return next(one for component in range(first, 256)
-                if (one := Address(session.device.system, component)) not in taken)

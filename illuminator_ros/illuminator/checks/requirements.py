@@ -60,12 +60,9 @@ async def other_target(tester: LightTester) -> None:
     """Send ON to addresses without a component, in the same and in another system."""
     await tester.ensure_dim()
     session = tester.session
-    taken = session.heard | {session.address, session.device}
-    system, component = session.device
-    systems = {one.system for one in taken}
     others = (
-        next(messages.Address(system, n) for n in range(200, 256) if (system, n) not in taken),
-        next(messages.Address(n, component or 200) for n in range(240, 0, -1) if n not in systems))
+        session.free_component(200),
+        messages.Address(session.free_system(), session.device.component or 200))
     failures = []
     for other in others:
         one = await session.send_to_other(other, ON_OFF, 1)

@@ -440,6 +440,31 @@ class Session(Endpoint):
         assert self.found is not None
         return self.found
 
+    def free_component(self, first: int = 192) -> Address:
+        """
+        Return an address of the device's system from which nothing was heard.
+
+        :param first: the lowest component id.
+        :raises Skipped: if all are in use.
+        """
+        system, taken = self.device.system, self.heard | {self.address, self.device}
+        for component in range(first, 256):
+            if (system, component) not in taken:
+                return Address(system, component)
+        raise Skipped(f'each component id from {first} of system {system} is in use')
+
+    def free_system(self) -> int:
+        """
+        Return a system id from which nothing was heard.
+
+        :raises Skipped: if all are in use.
+        """
+        taken = {one.system for one in self.heard | {self.address, self.device}}
+        for system in range(240, 0, -1):
+            if system not in taken:
+                return system
+        raise Skipped('each system id up to 240 is in use')
+
     @property
     def identity(self) -> str:
         """Return the names that the device has sent, '' if there are none."""
