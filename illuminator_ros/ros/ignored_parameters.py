@@ -109,12 +109,20 @@ def ignored_sections(
 
 
 def _files(arguments: Sequence[str]) -> Iterator[tuple[str, tuple[str, ...], Set[str]]]:
-    """Return path, name in parts and parameters of each section of the parameter files."""
+    """
+    Return path, name in parts and parameters of each section of the parameter files.
+
+    :raises ParameterError: if a file cannot be read.
+    """
     for option, path in zip(arguments, arguments[1:], strict=False):
         if option == '--params-file':
-            # As rcl reads it: several documents, and no types but its own.
-            for content in yaml.load_all(
-                    Path(path).read_text(encoding='utf-8'), yaml.BaseLoader):
+            # As rcl reads it: UTF-8 or UTF-16, several documents, and no types but its own.
+            try:
+                contents = list(yaml.load_all(Path(path).read_bytes(), yaml.BaseLoader))
+            except (OSError, ValueError, yaml.YAMLError) as error:
+                reason = ' '.join(str(error).split())
+                raise ParameterError(f'file {path}: {reason}') from error
+            for content in contents:
                 yield from ((path, *section) for section in _sections(content))
 
 

@@ -71,6 +71,14 @@ def test_invalid_parameter_is_refused_with_its_name_value_and_range(
     assert re.search(reason, refusal(ros.context, **given))
 
 
+def test_parameter_file_that_cannot_be_read_is_named(tmp_path: Path) -> None:
+    file = tmp_path / 'boat.yaml'
+    file.write_bytes(b'illuminator: caf\xe9')
+
+    with pytest.raises(ParameterError, match=f'^file {re.escape(str(file))}: '):
+        ignored_sections(['--params-file', str(file)], ['/illuminator'], bool)
+
+
 @pytest.mark.parametrize(('section', 'is_ignored'), [
     ('illuminator', False), ('/illuminator', False), ('/**', False), ('/*', False),
     ('/**/illuminator', False), ('illuminator_1_244', False), ('belly', False),
@@ -79,7 +87,9 @@ def test_section_of_a_parameter_file_that_matches_no_node_is_warned_about(
     tmp_path: Path, section: str, is_ignored: bool,
 ) -> None:
     file = tmp_path / 'boat.yaml'
-    file.write_text(yaml.safe_dump({section: {'ros__parameters': {'brightness': 40.0}}}))
+    # rcl reads UTF-16, too.
+    file.write_text(yaml.safe_dump({section: {'ros__parameters': {'brightness': 40.0}}}),
+                    encoding='utf-16')
 
     warnings = ignored_sections(
         ['--ros-args', '--params-file', str(file)], ['/illuminator'],

@@ -14,6 +14,7 @@
 
 """The programs on the command line: help, version, wrong arguments, missing packages."""
 
+import os
 from pathlib import Path
 import re
 import shlex
@@ -86,6 +87,9 @@ def test_help_names_every_parameter_option_and_form_of_url() -> None:
          'can be read by others (mode 0644); make it private: chmod 600 KEYS/open'),
         ('--params-file /nonexistent.yaml', "params file: '--params-file /nonexistent.yaml'"),
         ('--params-file KEYS/broken.yaml', 'KEYS/broken.yaml'),
+        # A pipe, as in --params-file <(...), is empty when it is read again.
+        ('--params-file KEYS/pipe', 'parameter file KEYS/pipe: it is not a regular file'),
+        ('--params-file KEYS', 'parameter file KEYS: it is not a regular file'),
         ('-p brightness', "Couldn't parse parameter override rule: '-p brightness'"),
         ("-r __node:=spot -p 'names:=[\"1/244=spot\"]'",
          "parameter names: '1/244=spot' is the name of the first node"),
@@ -130,6 +134,7 @@ def test_wrong_argument_is_one_line_with_status_2(
     (tmp_path / 'open').write_text('a long passphrase')
     (tmp_path / 'open').chmod(0o644)
     (tmp_path / 'broken.yaml').write_text('illuminator: [')
+    os.mkfifo(tmp_path / 'pipe')
     outcome = run(f'illuminator_ros.{name}', *shlex.split(
         arguments.replace('KEYS', str(tmp_path))), env={'ROS_DOMAIN_ID': str(domain)})
 
