@@ -36,9 +36,10 @@ class Rig:
     """A manager on a link, and senders with keys."""
 
     def __init__(self, mode: SigningMode) -> None:
-        self.manager = GimbalManager(CommandSender(OURS), ManagerSettings())
+        commands = CommandSender(OURS)
+        self.manager = GimbalManager(commands, ManagerSettings())
         self.link = SimulatedLink(
-            Component(self.manager._commands, [self.manager]), lambda data, peer: None,
+            Component(commands, [self.manager]), lambda data, peer: None,
             signing=Signing(mode, KEY))
         self.good = Codec(Signing(mode, KEY))
         for _ in range(8):
