@@ -139,12 +139,19 @@ def test_an_on_that_waits_is_not_sent_after_silence() -> None:
     assert not any(command.param1 for command in pair.commands(ON_OFF))
 
 
-def test_a_light_that_was_lost_meanwhile_goes_off_when_it_is_heard_again() -> None:
+@pytest.mark.parametrize('before', [0.0, SILENCE + 0.5])
+def test_a_light_that_is_lost_before_or_during_its_off_goes_off_when_it_is_heard_again(
+        before: float) -> None:
     light = FakeLight()
     pair = silenced(light)
     pair.enable(True)
+    light.results[ON_OFF] = MavResult.FAILED
+    pair.run(before)
     pair.close()
+    reported = len(pair.recorder.others)
     pair.run(SILENCE + 1.0)
+    assert len(pair.recorder.others) == reported
+    light.results.clear()
     pair.open()
     pair.run(2.0)
 

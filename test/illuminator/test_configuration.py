@@ -130,6 +130,16 @@ def test_the_answer_to_a_set_says_how_the_light_shows_it(
     assert sent(faked)[0][0] == (2 if 'mode' in changes else 1)
 
 
+def test_a_value_out_of_the_range_of_a_restarted_light_does_not_have_other_changes_denied(
+    fake: FakeLight, faked: Pair,
+) -> None:
+    assert faked.configure(strobe_period=5.0, strobe_duty_cycle=20.0).success
+    fake.restart(faked.now, max_strobe_period=2.0)
+    faked.run(5.0)
+    assert faked.configure(brightness=40.0).success
+    assert sent(faked)[-1][:3] == (1, 40, 0)
+
+
 def test_before_the_first_status_only_a_complete_set_is_sent() -> None:
     pair = Pair(mute()).settle()
     assert pair.snapshot.configuration is None

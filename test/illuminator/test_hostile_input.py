@@ -180,17 +180,3 @@ def test_a_strobe_period_that_is_zero_but_for_rounding_is_zero(bridge: AttackedB
     send_status(bridge, strobe_period=1e-45)
     assert light.snapshot(0.0).configuration.strobe_period == 0.0
     bridge.check_service()
-
-
-def test_a_forged_strobe_period_under_external_sync_does_not_have_changes_denied(
-    bridge: AttackedBridge,
-) -> None:
-    # Under external sync the bridge does not take a light's output for its configuration.
-    light = bridge.controller.lights[GENUINE]
-    bridge.link.ask(lambda now: light.configure(
-        {'mode': 'external_sync'}, now, lambda result, now: None))
-    bridge.link.run(1.0)
-    for mode in (1, 2):
-        send_status(bridge, mode=mode, strobe_period=440.0)
-    assert light.snapshot(0.0).configuration.strobe_period == 440.0
-    bridge.check_service()

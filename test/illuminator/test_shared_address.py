@@ -97,6 +97,8 @@ def test_a_status_is_published_before_it_shows_that_an_address_is_shared_and_an_
 
     pair.controller.events.subscribe(note)
     pair.settle(6.0)
+    # A node that is made later takes the events of the snapshot.
+    assert AddressShared(pair.light.address, True) in pair.snapshot.events()
     pair.configure(brightness=70.0)
     pair.enable(True)
     pair.run(6.0)

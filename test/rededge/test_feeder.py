@@ -163,7 +163,8 @@ def test_fused_position_needs_a_velocity_since_none_can_be_left_unknown_re_18() 
     assert rig.fix() == []
     assert rig.state(Input.FIX) == (
         InputState.REFUSED, 'position_source fused needs ~/velocity, which is missing')
-    assert (Input.VELOCITY,) in rig.feeder.snapshot(rig.now).needed
+    assert [(Input.VELOCITY,) in one.feeder.snapshot(one.now).needed
+            for one in (rig, Rig())] == [True, False]
 
 
 @pytest.mark.parametrize('settings', [{}, FUSED])
@@ -180,6 +181,7 @@ def test_a_fix_that_cannot_be_trusted_is_refused_with_the_reason_re_16_re_18_re_
     assert rig.fix(position, age) == []
     assert rig.state(Input.FIX) == (InputState.REFUSED, reason)
     assert rig.events[-1] == InputChanged(Input.FIX, InputState.REFUSED, reason)
+    assert rig.feeder.snapshot(rig.now).inputs[Input.FIX].refused == 1
 
 
 def since_boot(rig: Rig) -> None:
