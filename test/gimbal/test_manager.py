@@ -494,6 +494,16 @@ def test_gm_9_the_offsets_of_a_player_do_not_shift_its_setpoints_in_primary_cont
     assert euler(rig.points(GUEST, 0.2, 0.1)[0]) == (0.0, 0.2, 0.1)
 
 
+def test_gm_9_a_change_of_the_secondary_player_does_not_end_the_rate_of_the_primary_one() -> None:
+    rig = in_control()
+    rig.give(PILOT, pitch_yaw(pitch_rate=0.0, yaw_rate=0.1))
+
+    for secondary in (GUEST, (-3, -3)):
+        assert rig.result(PILOT, configure(-1, -1, *secondary)) is mav.MavResult.ACCEPTED
+        rig.run(1.0, each=rig.heartbeats(PILOT))
+        assert last(rig).angular_velocity_z == pytest.approx(0.1)
+
+
 @pytest.mark.parametrize('message', [
     pitch_yaw(pitch_rate=0.1), pitch_yaw(flags=F.RETRACT), pitch_yaw()])
 def test_gm_9_the_secondary_player_sets_neither_rates_nor_flags(message: Any) -> None:

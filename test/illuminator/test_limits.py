@@ -100,7 +100,7 @@ def test_a_stream_beyond_a_limit_is_clipped_and_reported() -> None:
         'brightness 90 % is above max_brightness 60 %'}
 
 
-def test_a_light_beyond_the_limits_is_reported_and_brought_back_once() -> None:
+def test_a_light_beyond_the_limits_is_reported_and_brought_back_once_until_it_is_lost() -> None:
     light, pair = limited(brightness=80.0, strobe_period=0.1, strobe_duty_cycle=10.0)
     assert [(one.param2, one.param3) for one in pair.commands(CONFIGURE)] == [(60.0, 0.34)]
     assert not pair.snapshot.limit_exceeded.excess
@@ -112,6 +112,14 @@ def test_a_light_beyond_the_limits_is_reported_and_brought_back_once() -> None:
     assert pair.snapshot.limit_exceeded.excess == EXCEEDED
     assert [one.excess for one in pair.recorder.others if isinstance(one, LimitExceeded)] == [
         EXCEEDED, (), EXCEEDED]
+
+    pair.close()
+    pair.open()
+    for _ in range(2):
+        pair.run(10.0)
+        light.fields |= {'brightness': 80.0, 'strobe_period': 0.1}
+
+    assert len(pair.commands(CONFIGURE)) == 2
 
 
 def test_a_light_that_restarts_within_the_limits_is_not_sent_what_it_had_beyond_them() -> None:
