@@ -1,0 +1,31 @@
+# Copyright 2026 The illuminator_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Entries in the containers of an object, which show whether its memory is bounded."""
+
+from collections import deque
+import gc
+from types import FunctionType, ModuleType
+
+
+def entries(root: object, *others: object) -> int:
+    """Return the number of entries in all containers that an object holds, without others."""
+    seen, todo, count = set(map(id, others)), [root], 0
+    while todo:
+        one = todo.pop()
+        if id(one) not in seen and not isinstance(one, type | ModuleType | FunctionType):
+            seen.add(id(one))
+            count += len(one) if isinstance(one, dict | list | set | deque) else 0
+            todo += gc.get_referents(one)
+    return count
