@@ -83,11 +83,12 @@ class Connector:
 
     def __init__(
         self, url: Url, report: Callable[[Channel | str | None], None], *,
-        backoff: Backoff | None = None,
+        backoff: Backoff | None = None, clock: Callable[[], float] = time.monotonic,
     ) -> None:
         self._url = url
         self._report = report
         self.backoff = backoff or Backoff()
+        self._clock = clock
         self._stopping = threading.Event()
         # s that the last try took.
         self._spent = 0.0
@@ -120,7 +121,7 @@ class Connector:
         if self._stopping.wait(self.backoff.pause(self._spent)):
             return True
         self.backoff.failed()
-        begun = time.monotonic()
+        begun = self._clock()
         try:
             channel = open_channel(self._url)
         except OSError as error:
@@ -131,7 +132,7 @@ class Connector:
         else:
             self._hand_over(channel)
             return True
-        self._spent = time.monotonic() - begun
+        self._spent = self._clock() - begun
         return False
 
     def _hand_over(self, channel: Channel) -> None:

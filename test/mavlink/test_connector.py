@@ -16,17 +16,18 @@
 
 from __future__ import annotations
 
+import itertools
+import socket
 import threading
-from types import SimpleNamespace
 
 from hypothesis import given
 from hypothesis import strategies as st
-from illuminator_ros.mavlink import connector
 from illuminator_ros.mavlink.connector import Backoff, Connector
-from illuminator_ros.mavlink.transport import Channel
 from illuminator_ros.mavlink.transport.tcp import CONNECT_TIMEOUT
-from illuminator_ros.mavlink.url import MemoryUrl, Url
+from illuminator_ros.mavlink.url import parse_url
 import pytest
+from support.ports import free_port
+from support.waiting import PATIENCE
 
 
 def pauses(count: int, jitter: float = 1.0, spent: float = 0.0) -> list[float]:
@@ -74,8 +75,8 @@ def test_pause_is_none_after_success_and_short_after_an_answer() -> None:
     assert found == [0.05, 0.0]
 
 
-def test_connector_counts_the_time_of_a_try_in_its_pause(monkeypatch: pytest.MonkeyPatch) -> None:
-    now, spent, ended = [0.0], list[float](), threading.Event()
+def test_connector_counts_the_time_of_a_try_in_its_pause() -> None:
+    spent, ended = list[float](), threading.Event()
 
     class Recorded(Backoff):
 
@@ -86,13 +87,10 @@ def test_connector_counts_the_time_of_a_try_in_its_pause(monkeypatch: pytest.Mon
                 ended.set()
             return 0.0
 
-    def fail_slowly(url: Url) -> Channel:
-        now[0] += 0.7
-        raise OSError('refused')
-
-    monkeypatch.setattr(connector, 'open_channel', fail_slowly)
-    monkeypatch.setattr(connector, 'time', SimpleNamespace(monotonic=lambda: now[0]))
-    one = Connector(MemoryUrl('x'), lambda outcome: None, backoff=Recorded())
+    # No program listens there.
+    one = Connector(
+        parse_url(f'tcp://127.0.0.1:{free_port(socket.SOCK_STREAM)}'), lambda outcome: None,
+        backoff=Recorded(), clock=itertools.count(0.0, 0.7).__next__)
     one.start()
-    assert ended.wait(20.0)
+    assert ended.wait(PATIENCE)
     assert spent == pytest.approx([0.0, 0.7, 0.7])

@@ -308,26 +308,19 @@ def test_client_beyond_the_bound_replaces_only_a_silent_one(
     assert replaced is None or server.say(newest)
 
 
-class _FailingListener:
-
-    def __init__(self, real: socket.socket, reason: int) -> None:
-        self._reason = reason
-        self.close = real.close
-
-    def accept(self) -> Any:
-        raise OSError(self._reason, 'as the test says')
-
-
 @pytest.mark.parametrize(('reason', 'is_loss'), [
     (errno.ECONNABORTED, False), (errno.EAGAIN, False), (errno.EPROTO, False),
     # The listener would stay readable, and the link's thread would spin.
     (errno.EMFILE, True), (errno.ENFILE, True)])
 def test_failed_accept_is_a_loss_only_where_no_descriptor_is_left(
-        server: Server, reason: int, is_loss: bool) -> None:
-    channel: Any = server.ours.channel
-    channel._listener = _FailingListener(channel._listener, reason)
+        server: Server, monkeypatch: pytest.MonkeyPatch, reason: int, is_loss: bool) -> None:
+    def accept(listener: socket.socket) -> Any:
+        raise OSError(reason, 'as the test says')
+
+    monkeypatch.setattr(socket.socket, 'accept', accept)
+    (key,) = server.ours.selector.get_map().values()
     with pytest.raises(ChannelLost) if is_loss else contextlib.nullcontext():
-        assert list(channel.receive(channel._listener)) == []
+        assert list(server.ours.channel.receive(key.fileobj)) == []
 
 
 # Serial lines

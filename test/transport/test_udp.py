@@ -16,7 +16,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 import contextlib
 import errno
 import socket
@@ -24,17 +24,12 @@ from typing import Any
 
 from illuminator_ros.mavlink.frame import Decoder
 from illuminator_ros.mavlink.transport import ChannelLost, udp
-from illuminator_ros.mavlink.transport.udp import (
-    MAX_DATAGRAM,
-    MAX_PEERS,
-    PEER_EXPIRY,
-    UdpChannel,
-)
+from illuminator_ros.mavlink.transport.udp import MAX_DATAGRAM, MAX_PEERS, PEER_EXPIRY
 from illuminator_ros.mavlink.url import Broadcast, HostPort, UdpUrl
 import pytest
 from support.frames import heartbeat_frame
 from support.live_link import BRIDGE, LiveLink, Run
-from support.open_channel import bound_socket, has_nothing, Open, OpenChannel
+from support.open_channel import bound_socket, has_nothing, Open
 from support.ports import free_port
 
 ANY_PORT = UdpUrl(HostPort('127.0.0.1', 0))
@@ -122,43 +117,40 @@ def test_frames_share_datagrams_that_ethernet_does_not_fragment(
         assert has_nothing(remote)
 
 
-class FailingSocket:
-    """Returns one datagram, and then fails for one reason; it wraps a genuine socket."""
+@pytest.fixture
+def fail(monkeypatch: pytest.MonkeyPatch) -> Callable[[int], None]:
+    """Return a function that makes sockets return one datagram and then fail for a reason."""
+    def fail(reason: int) -> None:
+        left = [(b'last', ('127.0.0.1', 14550))]
 
-    def __init__(self, real: socket.socket, reason: int) -> None:
-        self._real, self._left = real, [(b'last', ('127.0.0.1', 14550))]
-        self._error = OSError(reason, 'as the test says')
-        self.fileno, self.close = real.fileno, real.close
+        def recvfrom(one: socket.socket, size: int) -> tuple[bytes, Any]:
+            return left.pop() if left else sendto()
 
-    def recvfrom(self, size: int) -> tuple[bytes, Any]:
-        if not self._left:
-            raise self._error
-        return self._left.pop()
+        def sendto(*arguments: object) -> Any:
+            raise OSError(reason, 'as the test says')
 
-    def sendto(self, data: bytes, peer: Any) -> int:
-        raise self._error
+        monkeypatch.setattr(socket.socket, 'recvfrom', recvfrom)
+        monkeypatch.setattr(socket.socket, 'sendto', sendto)
 
-
-def failing(ours: OpenChannel, reason: int) -> UdpChannel:
-    """Return the channel, whose socket now fails."""
-    assert isinstance(ours.channel, UdpChannel)
-    ours.channel._socket = FailingSocket(ours.channel._socket, reason)  # type: ignore[assignment]
-    return ours.channel
+    return fail
 
 
 @pytest.mark.parametrize(('reason', 'is_loss'), [
     (errno.ENOBUFS, False), (errno.ENOMEM, False), (errno.EAGAIN, False),
     (errno.ECONNREFUSED, False), (errno.ENETUNREACH, True)])
 def test_remote_that_cannot_be_sent_to_costs_a_frame_or_without_a_way_the_channel(
-        channel: Open, reason: int, is_loss: bool) -> None:
-    ours = failing(channel('udpout://127.0.0.1:9'), reason)
+        channel: Open, fail: Callable[[int], None], reason: int, is_loss: bool) -> None:
+    ours = channel('udpout://127.0.0.1:9').channel
+    fail(reason)
     with pytest.raises(ChannelLost) if is_loss else contextlib.nullcontext():
         ours.send([b'frame'], ours.peers(0.0))
     assert ours.dropped == (not is_loss)
 
 
-def test_datagram_before_the_loss_of_the_channel_is_read(channel: Open) -> None:
-    coming = failing(channel(ANY_PORT), errno.ENETDOWN).receive(None)
+def test_datagram_before_the_loss_of_the_channel_is_read(
+        channel: Open, fail: Callable[[int], None]) -> None:
+    coming = iter(channel(ANY_PORT).channel.receive(None))
+    fail(errno.ENETDOWN)
     assert next(coming) == (('127.0.0.1', 14550), b'last')
     with pytest.raises(ChannelLost):
         next(coming)
