@@ -31,7 +31,6 @@ from illuminator_ros.gimbal.simulated_manager import ManagerProperties, Simulate
 from illuminator_ros.mavlink.command_sender import CommandSender
 from illuminator_ros.mavlink.component import Component, Endpoint
 from illuminator_ros.mavlink.messages import Address, MavResult
-from illuminator_ros.payload.arbitration import Policy
 from illuminator_ros.payload.mount_attitude import to_mavlink, YawFrame
 from illuminator_ros.payload.request import Result
 from illuminator_ros.payload.rotation import Quaternion, Vector
@@ -142,18 +141,6 @@ def test_mavsdk_lists_controls_and_releases_and_a_second_one_is_denied() -> None
         assert result(gimbal.release_control, GIMBAL) == 'SUCCESS'
         eventually(lambda: gimbal.get_control_status(GIMBAL).compid_primary_control == 0)
         assert result(second.take_control, GIMBAL, primary) == 'SUCCESS'
-
-
-@pytest.mark.timeout(180)
-def test_a_second_mavsdk_wins_under_takeover() -> None:
-    manager, _, vehicle = managed_vehicle(ControlSettings(Policy.TAKEOVER, lease=LEASE), 0.0)
-    with served(vehicle) as port, player(FIRST, port) as first, player(SECOND, port) as second:
-        for gimbal in (first, second):
-            assert result(gimbal.take_control, GIMBAL, plugin.ControlMode.PRIMARY) == 'SUCCESS'
-
-        assert manager.control.holder(Role.PRIMARY) == SECOND
-        assert result(first.set_angles, GIMBAL, 0.0, -20.0, 0.0, plugin.GimbalMode.YAW_FOLLOW,
-                      plugin.SendMode.ONCE) == DENIED
 
 
 class Client(EndpointLink[Component]):

@@ -14,17 +14,22 @@
 
 """The monitor in a ROS graph: the lights that it finds, their values, and its requests."""
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
+import contextlib
+from typing import Any
 
 from illuminator_ros.cli.monitor import key_bindings
-from illuminator_ros.cli.monitor.model import Outcome, State
+from illuminator_ros.cli.monitor.model import Light, Outcome, State
 from illuminator_ros.cli.monitor.ros_graph import lights_among, TOPICS, type_name
+from illuminator_ros.cli.monitor.run import Monitor
 from illuminator_ros.illuminator.ros.event_publisher import PUBLICATIONS
 import pytest
+from rclpy.node import Node
 from std_msgs.msg import Bool, Float32, UInt32
 from support.light import ServedLight
-from support.monitors import Watching, watching
 from support.ros import Ros, STATE
+from support.slow import CLOCK
+from support.waiting import eventually, PATIENCE
 
 VALUES = {'temperature': 61.5, 'mode': 'external_sync', 'connected': True, 'enabled': True,
           'brightness': 30.0, 'strobe_period': 0.5, 'strobe_duty_cycle': 20.0}
@@ -32,10 +37,60 @@ SIGNATURE = {f'/bow/{topic}': type_name(TOPICS[topic])
              for topic in ('connected', 'enabled', 'brightness', 'error_flags')}
 
 
+class Watching:
+    """A monitor in the domain of a ROS client, by the slow clock."""
+
+    def __init__(self, ros: Ros) -> None:
+        self._node = Node('monitor', context=ros.context, enable_rosout=False,
+                          start_parameter_services=False)
+        self._monitor = Monitor(self._node, CLOCK)
+
+    def close(self) -> None:
+        """End the monitor."""
+        self._monitor.end()
+        self._node.destroy_node()
+
+    @property
+    def names(self) -> list[str]:
+        """Return the names of the lights."""
+        return [light.name for light in self._monitor.lights()]
+
+    def light(self, name: str = '/illuminator') -> Light:
+        """Return the known state of a light."""
+        [light] = [light for light in self._monitor.lights() if light.name == name]
+        return light
+
+    def wait(self, condition: Callable[[Light], Any], name: str = '/illuminator',
+             timeout: float = PATIENCE) -> Light:
+        """Wait until a light is known and the condition holds; return it."""
+        eventually(lambda: name in self.names, within=timeout)
+        eventually(lambda: condition(self.light(name)), within=timeout)
+        return self.light(name)
+
+    def wait_names(self, *names: str) -> None:
+        """Wait until the monitor has exactly these lights."""
+        eventually(lambda: self.names == sorted(names))
+
+    def ask(self, ask: key_bindings.Ask, name: str = '/illuminator') -> None:
+        """Send a request to a light."""
+        self._monitor.graph.submit(name, ask)
+
+    def outcome(self, text: str, outcome: Outcome, name: str = '/illuminator') -> str:
+        """Wait until a request has this outcome, and return the answer."""
+        light = self.wait(lambda light: light.action and light.action.text == text
+                          and light.action.outcome is outcome, name)
+        assert light.action is not None
+        return light.action.answer
+
+    def clear_gone(self) -> None:
+        """Forget the lights that are gone."""
+        self._monitor.graph.clear_gone()
+
+
 @pytest.fixture(scope='module')
 def monitor(ros: Ros, shared_bridge: object) -> Iterator[Watching]:
     """Watch the module's domain."""
-    with watching(ros) as made:
+    with contextlib.closing(Watching(ros)) as made:
         yield made
 
 
@@ -89,7 +144,7 @@ class FakeBridge:
 
 
 def test_light_that_leaves_is_marked_can_be_cleared_and_can_return(own_ros: Ros) -> None:
-    with watching(own_ros) as monitor:
+    with contextlib.closing(Watching(own_ros)) as monitor:
         first = FakeBridge(own_ros, '/one')
         FakeBridge(own_ros, '/two')
         monitor.wait_names('/one', '/two')
