@@ -233,18 +233,18 @@ def test_a_light_that_no_request_has_switched_on_is_not_switched_on_again() -> N
     assert pair.commands(ON_OFF) == []
 
 
-@pytest.mark.parametrize(('fields', 'kind'), [
-    ({'brightness': 90.0}, CONFIGURE), ({'enable': 1}, ON_OFF)])
+@pytest.mark.parametrize(('fields', 'kind', 'change'), [
+    ({'brightness': 90.0}, CONFIGURE, 'brightness 90 %'), ({'enable': 1}, ON_OFF, 'on')])
 def test_a_sender_that_insists_is_left_alone_after_three_times_in_a_row(
-        fields: dict[str, float], kind: MavCmd) -> None:
+        fields: dict[str, float], kind: MavCmd, change: str) -> None:
     light, pair = reasserting()
     insist(light, pair, 20.0, **fields)
     times = [at for at, command in pair.commands_at(kind) if not command.confirmation]
 
     assert len(times) == 3
     assert min(after - before for before, after in zip(times, times[1:], strict=False)) >= 2.0
-    assert [one.undone for one in pair.recorder.others
-            if isinstance(one, ChangedByOther) and not one.undone] == [False]
+    assert [one.change for one in pair.recorder.others
+            if isinstance(one, ChangedByOther) and not one.undone] == [change]
     assert light.fields == light.fields | fields
 
     pair.run(60.0)
