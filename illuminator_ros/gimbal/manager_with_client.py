@@ -96,9 +96,7 @@ class ManagerWithClient(Payload):
         self, source: mav.Address, command: AnyCommand, now: float,
     ) -> mav.MavResult | None:
         """See :meth:`Payload.execute`."""
-        result = self._execute(source, command, now)
-        self._serve_client(now)
-        return result
+        return self._manage(lambda: self.manager.execute(source, command, now), now)
 
     def take_attitude(self, status: GimbalDeviceAttitudeStatus, now: float) -> None:
         """See :meth:`GimbalManager.take_attitude`."""
@@ -141,7 +139,7 @@ class ManagerWithClient(Payload):
             if mav.target_of(message) != self._commands.address:
                 self._commands.send(message)
             elif isinstance(message, AnyCommand):
-                ack = self._received.take(source, message, now, self._execute)
+                ack = self._received.take(source, message, now, self.execute)
                 if ack is not None:
                     self._own.acknowledge(source, ack, now)
             else:
@@ -149,8 +147,3 @@ class ManagerWithClient(Payload):
 
     def _receive(self, source: mav.Address, message: mav.Message, now: float) -> None:
         self._manage(lambda: self.manager.receive(source, message, now), now)
-
-    def _execute(
-        self, source: mav.Address, command: AnyCommand, now: float,
-    ) -> mav.MavResult | None:
-        return self._manage(lambda: self.manager.execute(source, command, now), now)
