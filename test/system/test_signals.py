@@ -56,16 +56,17 @@ run_program('program', hang)
 # A program whose writing thread gets the processor late.
 BUSY = """
 import sys
+import threading
 import time
 from illuminator_ros.cli.entry_point import run_program
-from illuminator_ros.cli.output_queue import OutputQueue
 
-write = OutputQueue._run
+run = threading.Thread.run
 
 
-def write_late(queue):
-    time.sleep(0.2)
-    write(queue)
+def run_late(thread):
+    if thread.name == 'output':
+        time.sleep(0.2)
+    run(thread)
 
 
 def fail(termination):
@@ -73,7 +74,7 @@ def fail(termination):
     return 2
 
 
-OutputQueue._run = write_late
+threading.Thread.run = run_late
 sys.exit(run_program('program', fail, queued=[2]))
 """
 
