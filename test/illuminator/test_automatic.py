@@ -338,6 +338,21 @@ def test_an_off_of_a_light_that_no_source_holds_is_not_undone_where_release_is_o
     assert not any(command.param1 for command in pair.commands(ON_OFF, since=reopened_at))
 
 
+def test_an_off_of_which_the_undoing_failed_is_not_undone_after_a_restart() -> None:
+    light, pair = reasserting()
+    assert pair.enable(True).success
+    light.results[ON_OFF] = MavResult.FAILED
+    light.fields['enable'] = 0
+    pair.run_until(lambda: pair.commands(ON_OFF)[1:])
+    # The answer arrives, and the next try is due later.
+    pair.run(0.5)
+    light.restart(pair.now)
+    light.results.clear()
+    pair.run(10.0)
+
+    assert light.fields['enable'] == 0
+
+
 # Lights for which brightness is the switch
 
 @pytest.mark.parametrize('by_request', [True, False])
