@@ -467,15 +467,11 @@ class ConfigurationManager:
         self, status: Status, confirmed: Configuration, reported: Configuration,
         switched_at: float, now: float,
     ) -> None:
-        # Compare under external sync too: another sender may have changed values that the signal
-        # hides.
-        names = unexpected_differences(
-            confirmed, reported, status.error_flags, step=False, external=False)
+        names = unexpected_differences(confirmed, reported, status.error_flags, step=False)
         if not names:
             return
         far = unexpected_differences(
-            self._reference or confirmed, reported, status.error_flags, step=True,
-            external=False)
+            self._reference or confirmed, reported, status.error_flags, step=True)
         cause = events.ChangeCause.ROUNDING
         if far:
             own = all(self._is_own(name, reported, switched_at, now) for name in far)

@@ -375,7 +375,6 @@ NOTHING = Configuration(Mode.UNKNOWN, 0.0, 0.0, 0.0)
 
 def unexpected_differences(
     confirmed: Configuration, reported: Configuration, flags: int, *, step: bool,
-    external: bool = True,
 ) -> list[str]:
     """
     Return the fields in which a light differs from its confirmed configuration without reason.
@@ -383,7 +382,6 @@ def unexpected_differences(
     There are two good reasons: it dims itself because it is hot, and under external sync its
     output follows another signal.
 
-    :param external: whether external sync counts as a reason.
     :param step: whether the light's own rounding is ignored.
     """
     names = confirmed.differences(reported, step=step)
@@ -392,6 +390,6 @@ def unexpected_differences(
         names = [name for name in names if name != 'mode']
     if flags & DIMMING_FLAGS and reported.brightness < confirmed.brightness:
         names = [name for name in names if name != 'brightness']
-    if external and confirmed.mode is reported.mode is Mode.EXTERNAL_SYNC:
-        names = []
+    if reported.mode is Mode.EXTERNAL_SYNC:
+        names = [name for name in names if name == 'mode']
     return names

@@ -222,13 +222,19 @@ def test_float32_rounding_is_not_a_change(faked: Pair, value: float) -> None:
     assert confirmed(faked).brightness == value
 
 
-def test_external_sync_is_followed_with_its_output(fake: FakeLight, strobe: Pair) -> None:
-    fake.fields['mode'] = 2
+def test_under_external_sync_only_the_mode_is_followed(fake: FakeLight, strobe: Pair) -> None:
+    before = confirmed(strobe)
+    fake.fields |= {'mode': 2, 'brightness': 10.0, 'strobe_period': 0.0}
     strobe.run(2.0)
-    for brightness in (10.0, 90.0, 20.0):
-        fake.fields['brightness'] = brightness
-        strobe.run(2.0)
-        assert strobe.recorder.changes[-1] == (ChangeCause.LIGHT, {'brightness': brightness})
+    fake.fields |= {'brightness': 90.0, 'strobe_duty_cycle': 0.0}
+    strobe.run(2.0)
+    assert strobe.recorder.changes[1:] == [(ChangeCause.LIGHT, {'mode': Mode.EXTERNAL_SYNC})]
+    assert confirmed(strobe) == replace(before, mode=Mode.EXTERNAL_SYNC)
+
+    fake.fields['mode'] = 1
+    strobe.run(2.0)
+    assert confirmed(strobe) == replace(
+        before, brightness=90.0, strobe_period=0.0, strobe_duty_cycle=0.0)
 
 
 @pytest.mark.parametrize(('change', 'cause'), [

@@ -143,9 +143,11 @@ def test_a_difference_counts_beyond_the_steps_of_a_light_or_beyond_float32(
     (BASE, UNKNOWN, 0, [], []),
     (UNKNOWN, BASE, 0, [], ['mode']),
     (SYNCED, model.Configuration(model.Mode.EXTERNAL_SYNC, 3.0, 0.2, 77.0), 0, [], []),
+    (replace(BASE, brightness=80.0), SYNCED, 0, ['mode'], ['mode']),
     (SYNCED, BASE, 0, ['mode'], ['mode']),
 ], ids=['dimmer', 'throttled', 'shut down', 'thermistor', 'throttled but brighter',
-        'mode not reported', 'mode reported later', 'external sync', 'external sync ended'])
+        'mode not reported', 'mode reported later', 'external sync', 'external sync began',
+        'external sync ended'])
 def test_heat_external_sync_and_an_unknown_mode_explain_differences(
     confirmed: model.Configuration, reported: model.Configuration, flags: int, by_steps: list[str],
     exactly: list[str],

@@ -55,9 +55,9 @@ def test_parameters_of_the_light_are_described_and_not_listed_before_its_first_s
 def test_parameters_of_the_light_have_its_values_and_the_described_types(
     light: ServedLight, parameters: Parameters,
 ) -> None:
-    light.report(mode=2, brightness=70.0, strobe_period=1.5, strobe_duty_cycle=30.0)
+    light.report(mode=1, brightness=70.0, strobe_period=1.5, strobe_duty_cycle=30.0)
 
-    parameters.wait(mode='external_sync', brightness=70.0, strobe_period=1.5,
+    parameters.wait(mode='internal_control', brightness=70.0, strobe_period=1.5,
                     strobe_duty_cycle=30.0)
     assert parameters.types(*DEVICE) == [STRING, DOUBLE, DOUBLE, DOUBLE]
 
