@@ -378,8 +378,8 @@ def turned(
     roll, pitch, yaw = (
         range_.clip(angle + rate * elapsed + offset) if rate or offset else angle
         for angle, range_, rate, offset in zip(
-            *_on_axes(setpoint.target, ranges, ahead, before), setpoint.turning, offsets,
-            strict=True))
+            *_on_axes(setpoint.target, setpoint.frame, ranges, ahead, before), setpoint.turning,
+            offsets, strict=True))
     angles = roll, pitch, yaw + (ahead or 0.0)
     return setpoint._replace(attitude=_from_angles(angles), since=now, angles=angles)
 
@@ -409,7 +409,8 @@ def clip(
     clipped = []
     angles = []
     for axis, angle, range_, offset, rate in zip(
-            AXES, *_on_axes(target, ranges, ahead, before), offsets, turning, strict=True):
+            AXES, *_on_axes(target, setpoint.frame, ranges, ahead, before), offsets, turning,
+            strict=True):
         # A rate against a stop is beyond it, a difference by float32 rounding is not.
         asked = angle + offset + (math.copysign(2 * _TOLERANCE, rate) if rate else 0.0)
         limit = range_.clip(asked)
@@ -424,7 +425,8 @@ def clip(
 
 
 def _on_axes(
-    angles: Vector, ranges: Ranges, ahead: float | None, before: Sequence[Clipped],
+    angles: Vector, frame: YawFrame, ranges: Ranges, ahead: float | None,
+    before: Sequence[Clipped],
 ) -> tuple[Vector, Ranges]:
     """Return the angles as the axes count them, and the ranges, infinite without stops."""
     stops = {one.axis: one.limit for one in before}
@@ -436,7 +438,8 @@ def _on_axes(
     if ahead is None:
         yaw_range = Range()
     return ((_nearest(roll, roll_range, stops.get('roll')), pitch,
-             _nearest(yaw - (ahead or 0.0), yaw_range, stops.get('yaw'), is_noisy=bool(ahead))),
+             _nearest(yaw - (ahead or 0.0), yaw_range, stops.get('yaw'),
+                      is_noisy=frame is YawFrame.EARTH)),
             (roll_range, pitch_range, yaw_range))
 
 

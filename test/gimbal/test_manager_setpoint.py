@@ -155,6 +155,18 @@ def test_a_clipped_yaw_stays_at_its_end_until_the_other_is_nearer_by_10_degrees(
     assert clipped.limit == expected
 
 
+@pytest.mark.parametrize('heading', [-0.01, 0.0, 0.01])
+def test_a_yaw_from_north_near_the_other_end_stays_at_its_stop_at_each_heading(
+        heading: float) -> None:
+    end = math.radians(179.0)
+    behind = made_of((0.0, 0.0, heading + math.radians(181.5)))._replace(frame=YawFrame.EARTH)
+    before = Clipped('yaw', end, end)
+
+    _, [clipped] = clip(behind, (Range(), Range(), Range(-end, end)), heading, before=[before])
+
+    assert clipped.limit == end
+
+
 @example(Range(-3.14159, 3.14159), 1.0, 0.5, 0.0)
 @given(st.tuples(st.floats(-3, 0), st.floats(0, 3)).map(lambda ends: Range(*ends)),
        st.floats(0, 1), st.floats(-1, -1e-3) | st.floats(1e-3, 1), ANGLES)
