@@ -15,6 +15,7 @@
 """The pages of simulator and conformance, compared with these programs; needs no ROS."""
 
 from collections.abc import Sequence
+import json
 from pathlib import Path
 import re
 import shlex
@@ -32,7 +33,8 @@ from illuminator_ros.illuminator.checks.requirements import REQUIREMENTS
 from illuminator_ros.illuminator.simulated import COMMANDS as LIGHT_COMMANDS
 from illuminator_ros.illuminator.simulated import SIMULATED
 from illuminator_ros.illuminator.simulated_properties import FAULTS, PROFILES
-from illuminator_ros.payload.checks.requirement import Requirement
+from illuminator_ros.payload.checks.report import as_json, Report
+from illuminator_ros.payload.checks.requirement import Requirement, Result, Verdict
 from illuminator_ros.payload.faults import FaultTable
 from illuminator_ros.payload.simulated import SimulatedType
 from illuminator_ros.rededge.checks import REQUIREMENTS as CAMERA_REQUIREMENTS
@@ -63,6 +65,20 @@ def test_the_requirements_are_listed_in_order_with_their_sections_and_counted(
     for specification in {one.specification for one in requirements}:
         assert f'\n[{specification.title}]: {specification.url}\n' in CONFORMANCE
     assert f'{len(requirements)} requirements' in CONFORMANCE
+
+
+def test_the_keys_of_a_json_report_are_listed_in_order_for_each_kind_of_device() -> None:
+    report_keys, result_keys = (
+        [key for row in table(CONFORMANCE, heading) for key in re.findall('`(.+?)`', row[0])]
+        for heading in ('key of the JSON report', 'key of a result'))
+    devices = [one.load('checks').device for one in PAYLOADS.values() if one.checks]
+
+    for device_key in devices:
+        content = json.loads(as_json(Report(
+            'name', device_key, '', '', (Result(REQUIREMENTS[0], Verdict.PASS),), '', 0.0, True)))
+        others = {*devices} - {device_key}
+        assert list(content) == [key for key in report_keys if key not in others]
+        assert list(content['results'][0]) == result_keys
 
 
 COMMANDS = [
