@@ -318,17 +318,17 @@ class SimulatedManager(simulated.SimulatedDevice):
             return self._pitchyaw(source, first, flags, now)
         if command.command == GimbalCommand.DO_GIMBAL_MANAGER_CONFIGURE:
             return self._configure(source, first)
-        change: simulated.Effect = partial(self._clear_roi, now)
+        effect: simulated.Effect = partial(self._clear_roi, now)
         if command.command == GimbalCommand.DO_SET_ROI_LOCATION:
             read = read_roi(command)
             if isinstance(read, MavResult):
                 return simulated.CommandReply(read)
             place, is_relative = read
             above = self.properties.position.altitude if is_relative else 0.0
-            change = partial(
+            effect = partial(
                 self._set_roi, place._replace(altitude=place.altitude + above), now)
         allowed = not self.behaviour.enforces_roi or source == self.primary
-        return simulated.CommandReply(MavResult.ACCEPTED if allowed else MavResult.DENIED, change)
+        return simulated.CommandReply(MavResult.ACCEPTED if allowed else MavResult.DENIED, effect)
 
     def _pitchyaw(
         self, source: Address, values: Sequence[float], flags: float, now: float,

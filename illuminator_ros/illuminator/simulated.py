@@ -220,7 +220,7 @@ class SimulatedIlluminator(SimulatedDevice):
 
     def press(self, now: float, *, enabled: bool | None = None, **changes: object) -> Effect:
         """
-        Return the change that a button on the light makes.
+        Return the effect of a button on the light.
 
         :raises InvalidValue: if the light cannot be set so.
         """
@@ -230,12 +230,12 @@ class SimulatedIlluminator(SimulatedDevice):
             name: model.checked(name, value, strobe_range) for name, value in changes.items()}
         configuration = replace(self.configuration, **checked)
 
-        def change() -> None:
+        def effect() -> None:
             if changes:
                 self._configure(configuration)
             if enabled is not None:
                 self._switch(enabled)
-        return change
+        return effect
 
     def heat_to(self, temperature: float, now: float) -> None:
         """Set the temperature, degC."""

@@ -320,9 +320,9 @@ class SimulatedComponent(Generic[D]):
             self._heartbeat_due = now if behaviour.heartbeat_interval else math.inf
         self._changed()
 
-    def apply(self, change: Effect, now: float) -> None:
-        """Make a change, by command or by hand, and send the streamed messages."""
-        change()
+    def apply(self, effect: Effect, now: float) -> None:
+        """Apply an effect, of a command or by hand, and send the streamed messages."""
+        effect()
         if self.device.behaviour.status_on_change:
             for message_id, stream in self._streams.items():
                 if stream.interval:

@@ -191,9 +191,9 @@ def test_a_light_that_stays_in_external_sync_fails_mode_internal() -> None:
     run = Run(only=('mode-internal', 'mode-external'))
     apply = run.light.apply
 
-    def stuck(change: Effect, now: float) -> None:
+    def stuck(effect: Effect, now: float) -> None:
         mode = run.lamp.configuration.mode
-        apply(change, now)
+        apply(effect, now)
         if mode is Mode.EXTERNAL_SYNC:
             run.lamp.configuration = replace(run.lamp.configuration, mode=mode)
     run.light.apply = stuck  # type: ignore[method-assign]

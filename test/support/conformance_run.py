@@ -82,12 +82,12 @@ class Run(ChecksRun):
         self.session.interrupt(self.link.now)
 
     def watch(self) -> list[Configuration]:
-        """Return a list that gets the configuration after each change that leaves it on."""
+        """Return a list that gets the configuration after each effect that leaves it on."""
         seen: list[Configuration] = []
         apply = self.light.apply
 
-        def noted(change: Any, now: float) -> None:
-            apply(change, now)
+        def noted(effect: Any, now: float) -> None:
+            apply(effect, now)
             if self.lamp.enabled:
                 seen.append(self.lamp.configuration)
         self.light.apply = noted  # type: ignore[method-assign]

@@ -73,8 +73,8 @@ class Witness:
     def _fields(self) -> Fields:
         return {'enabled': self._lamp.enabled, **asdict(self._lamp.configuration)}
 
-    def _watched_apply(self, change: Effect, now: float) -> None:
-        self._apply(change, now)
+    def _watched_apply(self, effect: Effect, now: float) -> None:
+        self._apply(effect, now)
         if (fields := self._fields()) != self._states[-1][1]:
             self._states.append((now, fields))
 
