@@ -212,6 +212,10 @@ class CommandResult(NamedTuple):
             last += f' at {self.progress} %'
         return f'{self.status.value}{last}'
 
+    def describe_failure(self) -> str:
+        """Return why it was not accepted, for people."""
+        return f'{"refused: " if self.refused else ""}{self.describe()}'
+
     def timing(self, elapsed: float | None = None) -> str:
         """Return the number of tries and the time taken, or another time (s)."""
         time = format_seconds(self.elapsed if elapsed is None else elapsed)

@@ -107,7 +107,7 @@ class IdentityQuery:
         if result.accepted:
             self._message_until = now + MESSAGE_TIMEOUT
         else:
-            self._finish(f'{"refused: " if result.refused else ""}{result.describe()}', now)
+            self._finish(result.describe_failure(), now)
 
     def poll(self, now: float) -> None:
         """Ask again for a message that does not come, or give up."""

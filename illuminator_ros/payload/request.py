@@ -457,10 +457,8 @@ class Request(Generic[S]):
             self._end(f'{self._sent.goal} not confirmed: the acknowledgement may belong to an '
                       'earlier command', now)
         else:
-            self._end(
-                f'{"refused: " if answer.refused else ""}{answer.describe()}', now,
-                refused=answer.refused,
-                permanent=answer.refused and answer.result in PERMANENT_RESULTS)
+            self._end(answer.describe_failure(), now, refused=answer.refused,
+                      permanent=answer.refused and answer.result in PERMANENT_RESULTS)
 
     def _unconfirmed(self, now: float) -> None:
         name, kind = self._target.status_name, self._target.kind
@@ -528,7 +526,7 @@ class RequestQueue(Generic[S]):
         return len(self._requests)
 
     def has(self, which: Callable[[Request[S]], bool]) -> bool:
-        """Return whether one of some requests is under way or waits."""
+        """Return whether a condition holds for a request that is under way or waits."""
         return any(map(which, self._requests))
 
     def submit(self, request: Request[S], now: float) -> None:
