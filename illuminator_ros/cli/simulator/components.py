@@ -29,8 +29,8 @@ from ...payload.simulated import Description, SimulatedDevice, SimulatedType
 from ...payload.simulated_settings import Setting, Values
 
 MAX_COMPONENTS = 200
-# Characters of a file; MAX_COMPONENTS with all their settings need a tenth of it.
-MAX_FILE = 1 << 20
+# MAX_COMPONENTS with all their settings need a tenth of it.
+MAX_FILE_CHARACTERS = 1 << 20
 
 Type = SimulatedType[SimulatedDevice]
 Types = Sequence[Type]
@@ -94,9 +94,9 @@ def _content(path: str) -> object:
         ) from error
     try:
         with open(path, encoding='utf-8') as file:
-            text = file.read(MAX_FILE + 1)
-        if len(text) > MAX_FILE:
-            raise OSError(errno.EFBIG, f'it has more than {MAX_FILE} characters')
+            text = file.read(MAX_FILE_CHARACTERS + 1)
+        if len(text) > MAX_FILE_CHARACTERS:
+            raise OSError(errno.EFBIG, f'it has more than {MAX_FILE_CHARACTERS} characters')
         content: object = yaml.safe_load(text)
     except OSError as error:
         raise SettingError(f'{path}: {error.strerror}') from error
