@@ -99,11 +99,11 @@ def test_gm_27_information_is_sent_on_request_with_what_the_device_reports(
     assert len(rig.messages(GimbalManagerInformation)) == 1
 
 
-# How many answers of the device, and how many of its informations, are lost; the results 3 s and
-# 10 s after the device is heard first, and whether the information has its capabilities then.
+# How many answers of the device, and how many GIMBAL_DEVICE_INFORMATION, are lost; the result 3 s
+# after the device is heard first, and whether the manager ever announces its capabilities.
 LOSSES = {
     'no message is lost': ((0, 0), mav.MavResult.ACCEPTED, True),
-    'two informations are lost': ((0, 2), mav.MavResult.ACCEPTED, True),
+    'the information is lost twice': ((0, 2), mav.MavResult.ACCEPTED, True),
     'no answer comes for some time': ((9, 0), mav.MavResult.TEMPORARILY_REJECTED, True),
     'no information ever comes': ((0, math.inf), mav.MavResult.ACCEPTED, False),
     'no answer ever comes': ((math.inf, 0), mav.MavResult.TEMPORARILY_REJECTED, False),
@@ -111,7 +111,7 @@ LOSSES = {
 
 
 @pytest.mark.parametrize(('lost', 'first', 'known'), LOSSES.values(), ids=LOSSES)
-def test_gm_10_information_waits_for_that_of_the_device_but_not_for_ever(
+def test_gm_10_information_waits_for_that_of_the_device_or_three_requests_for_it(
         lost: tuple[float, float], first: mav.MavResult, known: bool) -> None:
     rig = ManagerRig(active=False, lost=lost)
     capabilities = Capabilities.CAN_POINT_LOCATION_GLOBAL | (FULL if known else 0)

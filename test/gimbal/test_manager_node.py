@@ -232,7 +232,7 @@ def test_gm_18_another_manager_is_named_with_an_error(own_ros: Ros) -> None:
 
 
 class Players:
-    """Players with one UDP socket."""
+    """Sends messages of players, each time from another UDP port."""
 
     def __init__(self, port: int) -> None:
         self._address = '127.0.0.1', port

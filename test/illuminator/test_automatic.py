@@ -338,7 +338,7 @@ def test_an_off_of_a_light_that_no_source_holds_is_not_undone_where_release_is_o
     assert not any(command.param1 for command in pair.commands(ON_OFF, since=reopened_at))
 
 
-def test_an_off_of_which_the_undoing_failed_is_not_undone_after_a_restart() -> None:
+def test_an_off_whose_undoing_failed_is_not_undone_after_a_restart() -> None:
     light, pair = reasserting()
     assert pair.enable(True).success
     light.results[ON_OFF] = MavResult.FAILED
@@ -470,7 +470,7 @@ def limited_off(case: str) -> tuple[FakeLight, Pair, float]:
 
 
 @pytest.mark.parametrize('case', ['beyond a limit', 'restarted'])
-def test_no_configuration_is_sent_while_or_after_an_off_where_brightness_is_the_switch(
+def test_no_configuration_is_sent_during_or_after_an_off_where_brightness_is_the_switch(
         case: str) -> None:
     light, pair, off_at = limited_off(case)
     pair.run(10.0)

@@ -212,7 +212,7 @@ def test_an_off_for_all_lights_replaces_a_remembered_on_of_a_lost_light() -> Non
     (True, lambda shared: shared.dim('operator', 20.0), []),
 ], ids=['on', 'off', 'brightness that is the switch'])
 @pytest.mark.parametrize('requests', [True, False])
-def test_of_the_requests_before_a_silence_only_an_off_has_an_effect_after_it(
+def test_only_an_off_of_the_requests_before_a_silence_has_an_effect_after_it(
     is_switch: bool, act: Callable[[Shared], object], sent: list[float], requests: bool,
 ) -> None:
     shared = Shared(timeout=60.0)
@@ -225,7 +225,7 @@ def test_of_the_requests_before_a_silence_only_an_off_has_an_effect_after_it(
     shared.pair.run(SILENCE + 1.0)
     assert shared.light.fields['enable'] == 0
     if requests:
-        # Its own requests are kept, and do not revive those of others.
+        # A request after the silence does not restore those before it.
         shared.enable('autonomy', True)
     released_at = shared.pair.now
     shared.release('safety')

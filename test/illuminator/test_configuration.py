@@ -130,7 +130,7 @@ def test_the_answer_to_a_set_says_how_the_light_shows_it(
     assert sent(faked)[0][0] == (2 if 'mode' in changes else 1)
 
 
-def test_a_value_out_of_the_range_of_a_restarted_light_does_not_have_other_changes_denied(
+def test_a_value_beyond_the_range_of_a_restarted_light_prevents_no_other_change(
     fake: FakeLight, faked: Pair,
 ) -> None:
     assert faked.configure(strobe_period=5.0, strobe_duty_cycle=20.0).success

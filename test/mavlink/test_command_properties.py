@@ -36,7 +36,7 @@ class CommandSenderMachine(RuleBasedStateMachine):
     @initialize(timeout=st.sampled_from([0.1, 0.5, 2.0]), retries=st.integers(0, 4))
     def begin(self, timeout: float, retries: int) -> None:
         self.rig = Rig(timeout=timeout, retries=retries)
-        self.limits: list[tuple[Run, float]] = []
+        self.deadlines: list[tuple[Run, float]] = []
 
     @rule(component=COMPONENTS, command=COMMANDS, limit=st.just(float('inf')) | st.floats(0, 5),
           count=st.integers(1, 3), overtake=st.booleans())
@@ -44,7 +44,7 @@ class CommandSenderMachine(RuleBasedStateMachine):
               overtake: bool) -> None:
         for _ in range(count):
             run = self.rig.start(command, component, limit=limit, overtake=overtake)
-            self.limits.append((run, self.rig.now + limit))
+            self.deadlines.append((run, self.rig.now + limit))
 
     @rule(source=COMPONENTS, command=COMMANDS, result=RESULTS, progress=st.integers(0, 255),
           addressee=st.sampled_from([Address(1, 194), Address(0, 0), Address(9, 9)]))
@@ -75,9 +75,9 @@ class CommandSenderMachine(RuleBasedStateMachine):
             assert not run.outcomes or run.outcome.tries == len(run.frames)
 
     @invariant()
-    def frames_are_sent_before_the_limit_only(self) -> None:
-        for run, limit in self.limits:
-            assert all(time < limit for time, _ in run.frames)
+    def frames_are_sent_before_the_deadline_only(self) -> None:
+        for run, deadline in self.deadlines:
+            assert all(time < deadline for time, _ in run.frames)
 
     @invariant()
     def commands_that_wait_are_bounded(self) -> None:
@@ -88,7 +88,7 @@ class CommandSenderMachine(RuleBasedStateMachine):
         self.rig.run(LONG * len(self.rig.runs) + LONG)
         assert all(len(run.outcomes) == 1 for run in self.rig.runs)
         assert self.rig.idle
-        self.frames_are_sent_before_the_limit_only()
+        self.frames_are_sent_before_the_deadline_only()
 
 
 TestCommandSenderMachine = CommandSenderMachine.TestCase

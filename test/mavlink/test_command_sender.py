@@ -90,7 +90,7 @@ STATUS = CommandStatus
     ([[INT_ONLY]] * 20, {}, 'no acknowledgement, last answer MAV_RESULT_COMMAND_INT_ONLY '
      '(5 tries, 2.02 s)', [0.0, 0.02, 0.52, 1.02, 1.52]),
     ([[IN_PROGRESS, INT_ONLY]], {}, 'MAV_RESULT_COMMAND_INT_ONLY (1 try, 40 ms)', [0.0]),
-    # The limit ends a command in any state.
+    # The deadline ends a command in any state.
     ([], {'limit': 0.9}, 'no acknowledgement (2 tries, 900 ms)', [0.0, 0.5]),
     ([], {'limit': 0.0}, 'not finished in time (0 tries, 0 ms)', []),
     ([[IN_PROGRESS] * 250], {'limit': 1.5}, 'not finished in time, last answer '
@@ -126,7 +126,7 @@ def test_second_refusal_of_the_command_long_does_not_end_the_command_int() -> No
     assert [type(message) for message in rig.messages] == [CommandLong, CommandLong, CommandInt]
 
 
-def test_refusal_of_the_command_long_after_the_limit_ends_the_command() -> None:
+def test_refusal_of_the_command_long_after_the_deadline_ends_the_command() -> None:
     rig = Rig()
     run = rig.start(limit=0.3)
     rig.now += 0.4
@@ -244,7 +244,7 @@ def test_command_behind_one_without_answer_is_sent_and_its_time_begins_then() ->
 
 
 @pytest.mark.parametrize('ended_by', ['acknowledgement', 'late poll', 'poll'])
-def test_command_whose_limit_passes_while_it_waits_is_never_sent(ended_by: str) -> None:
+def test_command_whose_deadline_passes_while_it_waits_is_never_sent(ended_by: str) -> None:
     rig = Rig()
     first, second = rig.start(), rig.start(limit=0.4)
     begun = rig.now

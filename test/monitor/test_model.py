@@ -21,7 +21,7 @@ BOW = '/bow'
 
 
 def lights_with(**values: object) -> model.DiscoveredLights:
-    """Return one light, which has published these values at time 100."""
+    """Return lights: one, which has published these values at time 100."""
     lights = model.DiscoveredLights()
     lights.seen([BOW], 100.0)
     for topic, value in values.items():

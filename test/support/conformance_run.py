@@ -25,7 +25,7 @@ from illuminator_ros.illuminator.model import Configuration
 from illuminator_ros.illuminator.simulated import SimulatedIlluminator
 from illuminator_ros.illuminator.simulated_properties import FAULTS, IlluminatorProperties
 from illuminator_ros.mavlink.messages import Address, CommandLong, MavCmd
-from illuminator_ros.payload.simulated import SimulatedComponents
+from illuminator_ros.payload.simulated import Effect, SimulatedComponents
 from support.checks_run import ChecksRun
 from support.simulated_lights import describe
 from support.virtual_link import START
@@ -82,11 +82,11 @@ class Run(ChecksRun):
         self.session.interrupt(self.link.now)
 
     def watch(self) -> list[Configuration]:
-        """Return a list that gets the configuration after each effect that leaves it on."""
+        """Return a list that gets the configuration after each change that leaves it on."""
         seen: list[Configuration] = []
         apply = self.light.apply
 
-        def noted(effect: Any, now: float) -> None:
+        def noted(effect: Effect, now: float) -> None:
             apply(effect, now)
             if self.lamp.enabled:
                 seen.append(self.lamp.configuration)

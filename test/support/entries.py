@@ -20,7 +20,11 @@ from types import FunctionType, ModuleType
 
 
 def entries(root: object, *others: object) -> int:
-    """Return the number of entries in all containers that an object holds, without others."""
+    """
+    Return the number of entries in all containers that an object holds, at any depth.
+
+    :param others: objects that are left out, with everything that only they hold.
+    """
     seen, todo, count = set(map(id, others)), [root], 0
     while todo:
         one = todo.pop()

@@ -75,7 +75,7 @@ class ManagerRig:
     :ivar now: s.
     :ivar sent: everything that it has sent, with the time.
     :ivar device_information: the answer of the device; None for no device.
-    :ivar lost: how many of its next answers are lost, and how many of its next informations.
+    :ivar lost: how many of its next answers are lost, and how many GIMBAL_DEVICE_INFORMATION.
     :ivar heading: of the vehicle, as the device reports it.
     """
 
@@ -153,14 +153,14 @@ class ManagerRig:
                 self._answer(message, source)
 
     def _answer(self, message: mav.CommandLong, source: mav.Address) -> None:
-        answers, informations = self.lost
+        answers, messages = self.lost
         if answers:
-            self.lost = answers - 1, informations
+            self.lost = answers - 1, messages
             return
         self.component.receive(
             DEVICE, mav.CommandAck(message.command, 0, 0, 0, *source), self.now)
-        if informations:
-            self.lost = 0, informations - 1
+        if messages:
+            self.lost = 0, messages - 1
         else:
             self.component.receive(DEVICE, self.device_information, self.now)
 
