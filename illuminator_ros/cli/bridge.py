@@ -234,8 +234,8 @@ def _parameter_file_refusal(arguments: list[str]) -> str:
     """
     Return which parameter file is not a regular file, '' if each is.
 
-    Each is read several times: a pipe is empty then, and its parameters would be lost; rcl waits
-    for the writer of a FIFO, and no signal ends that.
+    rcl and this program read each file again: a pipe would be empty, and its parameters lost. rcl
+    waits for the writer of a FIFO, and no signal ends that.
     """
     for option, path in zip(arguments, arguments[1:], strict=False):
         if option == '--params-file' and os.path.exists(path) and not os.path.isfile(path):

@@ -162,7 +162,7 @@ class _Setpoint:
     zero_at: float = math.inf
     # When a zero is sent again if the device still turns.
     zero_repeats: list[float] = field(default_factory=list)
-    # An attitude of a device without rates, and its time, since such a repetition is due.
+    # An attitude of a device that reports no rates, and its time, s; a later one is compared.
     seen: tuple[MountAttitude, float] | None = None
 
     @property
@@ -623,7 +623,7 @@ class Gimbal:
         """
         End a rate with a zero, and send no setpoint again, since a request follows.
 
-        :param place: the setpoint in place of the present one, if the request makes one.
+        :param place: the setpoint that the request makes, None if it makes none.
         :return: a callback that ends the present setpoint, unless the request fails.
         """
         if self._setpoint is not None and self._setpoint.zero_at < math.inf:

@@ -608,10 +608,10 @@ class GimbalManager(Payload):
         return MavResult.ACCEPTED
 
     def _own_information(self, now: float) -> GimbalManagerInformation | None:
-        """Return GIMBAL_MANAGER_INFORMATION, None while the device's abilities are awaited."""
+        """Return GIMBAL_MANAGER_INFORMATION, None while that of the device is awaited."""
         if (self.tracker.has_mavlink and self._information is None
                 and self._information_requests < INFORMATION_REQUESTS):
-            # Clients request the message once: they would never know the device's abilities.
+            # Clients request the message once, and would never know the device's capabilities.
             return None
         # The manager itself computes the attitude towards a place.
         capabilities = self.model.capabilities | Capabilities.CAN_POINT_LOCATION_GLOBAL

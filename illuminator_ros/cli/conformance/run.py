@@ -140,7 +140,7 @@ def parse(
 def _report_refusal(path: str) -> str:
     """Return why a report cannot be written to a path, '' if no reason is visible."""
     directory = os.path.dirname(path)
-    # Not methods of Path, which raise an error if a directory above must not be searched.
+    # Not methods of Path, which raise an error without permission to search a directory above.
     if not os.path.isdir(directory):
         return 'there is no such directory'
     if os.path.isdir(path):

@@ -30,7 +30,13 @@ SPARE_LINES = 4
 
 @dataclass(frozen=True)
 class ComponentSnapshot:
-    """The state of a simulated component at a moment, for people."""
+    """
+    The state of a simulated component at a moment, for people.
+
+    :param name: its address and name.
+    :param device: the state of its device.
+    :param faults: its present faults, '' for none.
+    """
 
     name: str
     device: Snapshot

@@ -199,7 +199,7 @@ class LightNode:
         return light
 
     def _warning_on(self, topic: str) -> ros_node.Answer:
-        """Return a function that logs the message of an answer to a topic, which has none."""
+        """Return a function that logs an answer, since a topic has none."""
         return lambda success, message: self._log.warning(f'~/{topic}: {message}', topic)
 
     def _switch(self, source: str, prefix: str, on: bool, now: float) -> None:

@@ -25,7 +25,7 @@ from .requirement import AnyRequirement, HEARTBEAT, Result, Verdict
 from ... import __version__
 
 SHOWN_LINES = 12
-# Characters that XML cannot contain: control characters, surrogates, and two others.
+# Characters that XML 1.0 excludes ("Char"): control characters, surrogates, and two others.
 _NOT_XML = {code: '?' for code in (*range(32), *range(0xd800, 0xe000), 0xfffe, 0xffff)
             if code not in (9, 10, 13)}
 
