@@ -608,7 +608,7 @@ class GimbalManager(Payload):
         return MavResult.ACCEPTED
 
     def _own_information(self, now: float) -> GimbalManagerInformation | None:
-        """Return GIMBAL_MANAGER_INFORMATION, None while that of the device is awaited."""
+        """Return GIMBAL_MANAGER_INFORMATION, None while GIMBAL_DEVICE_INFORMATION is awaited."""
         if (self.tracker.has_mavlink and self._information is None
                 and self._information_requests < INFORMATION_REQUESTS):
             # Clients request the message once, and would never know the device's capabilities.

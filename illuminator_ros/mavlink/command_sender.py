@@ -320,6 +320,16 @@ TRANSITIONS: dict[tuple[CommandState, int], CommandState] = {
 
 @dataclass(eq=False, slots=True)
 class _PendingCommand:
+    """
+    A command that has not ended. Times are s.
+
+    :param deadline: the time by which it ends.
+    :param as_int: whether it is sent as COMMAND_INT.
+    :param rejected: tries that were answered with a reason to try again: these were not lost.
+    :param due: when it is sent again, or ends.
+    :param tries_end: the time from which it is not sent again.
+    """
+
     command: Command
     key: Key
     done: Done
@@ -327,7 +337,6 @@ class _PendingCommand:
     as_int: bool
     state: CommandState = CommandState.WAITING
     tries: int = 0
-    # Tries that were answered with a reason to try again: these were not lost.
     rejected: int = 0
     first_sent: float = 0.0
     last_sent: float = 0.0
