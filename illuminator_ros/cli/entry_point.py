@@ -114,7 +114,7 @@ def log_directory_refusal() -> str:
     """Return why log files cannot be written to their directory, '' if they can."""
     home = os.environ.get('ROS_HOME') or '~/.ros'
     directory = os.environ.get('ROS_LOG_DIR') or os.path.join(home, 'log')
-    # rcl does not look for the home directory elsewhere; a system service has no HOME.
+    # rcl takes the home directory from HOME only, which a systemd service without User= lacks.
     if directory.startswith('~') and not os.environ.get('HOME'):
         return (f'log files cannot be written to {directory}: HOME is not set; set HOME or '
                 'ROS_LOG_DIR')
