@@ -153,6 +153,7 @@ class _Setpoint:
     The last setpoint, and the times at which it is sent again or ends, s.
 
     :param message: None for a place, which a command sets.
+    :param after: how many requests that suspend setpoints came before it.
     """
 
     manager: Address
@@ -164,25 +165,26 @@ class _Setpoint:
     zero_repeats: list[float] = field(default_factory=list)
     # An attitude of a device that reports no rates, and its time, s; a later one is compared.
     seen: tuple[MountAttitude, float] | None = None
+    # Whether a request has ended the repetitions of a zero.
+    is_suspended: bool = False
+    after: int = 0
 
     @property
     def moves(self) -> bool:
         """Whether the gimbal keeps turning: towards a place, or at a rate."""
         return self.message is None or self.zero_at < math.inf
 
-    @property
-    def is_zero(self) -> bool:
-        """Whether it has ended a rate or a place."""
-        return self.attitude is None and not self.moves
-
     def suspend(self) -> None:
         """Do not send it again, since a request follows it."""
+        self.is_suspended |= bool(self.zero_repeats)
         self.repeats.clear()
         self.zero_repeats.clear()
+        self.seen = None
 
     def resume(self, now: float) -> None:
-        """Send a zero again if the device still turns, since the request has failed."""
-        if self.is_zero:
+        """Send a suspended zero again if the device still turns, since the request has failed."""
+        if self.is_suspended:
+            self.is_suspended = False
             self.zero_repeats = [now + delay for delay in REPEATS]
 
 
@@ -230,6 +232,9 @@ class Gimbal:
         self._errors = ErrorFlags(0)
         self._setpoint: _Setpoint | None = None
         self._setpoints_sent = 0
+        # The requests so far that suspend setpoints, those of them that have not ended, and the
+        # number of the last one that succeeded.
+        self._requests = self._open_requests = self._last_success = 0
         self._link_problem = ''
         self._sources = Sources(settings.sources)
 
@@ -631,14 +636,24 @@ class Gimbal:
         before = self._setpoint
         if before is not None:
             before.suspend()
-        during = self._setpoint = place or before
+        self._open_requests += 1
+        number = self._requests = self._requests + 1
+        if place is not None:
+            self._setpoint = place
+            place.after = number
 
         def ended(result: request.Result, now: float) -> None:
-            if self._setpoint is during:
-                # Without an answer the gimbal may follow the place.
-                if place is None or result.refused:
-                    self._setpoint = None if result.success else before
-                if self._setpoint is not None:
+            self._open_requests -= 1
+            if result.success:
+                self._last_success = max(number, self._last_success)
+            # Without an answer the gimbal may follow the place.
+            if place is not None and self._setpoint is place and result.refused:
+                self._setpoint = before
+            if self._setpoint is not None:
+                if self._setpoint.after < self._last_success:
+                    self._setpoint = None
+                elif not self._open_requests:
+                    # Before that, the device may turn since it follows another request.
                     self._setpoint.resume(now)
             done(result, now)
 
@@ -662,7 +677,8 @@ class Gimbal:
             message = self._message(setpoint_flags(frame), to_mavlink(rotation, frame),
                                     UNSET_VECTOR)
             self._setpoint = _Setpoint(
-                self._manager, message, (rotation, frame), [now + delay for delay in REPEATS])
+                self._manager, message, (rotation, frame), [now + delay for delay in REPEATS],
+                after=self._requests)
             self._send(message)
         return reason
 
@@ -706,7 +722,7 @@ class Gimbal:
     def _send_rates(self, rates: Vector, now: float) -> None:
         frame = YawFrame.EARTH if self._flags & MountFlags.YAW_LOCK else YawFrame.VEHICLE
         message = self._message(setpoint_flags(frame), UNSET_QUATERNION, flu_frd(rates))
-        self._setpoint = _Setpoint(self._manager, message)
+        self._setpoint = _Setpoint(self._manager, message, after=self._requests)
         if rates == STILL:
             self._setpoint.zero_repeats = [now + delay for delay in REPEATS]
         else:

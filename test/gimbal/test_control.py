@@ -395,6 +395,46 @@ def test_zero_before_a_request_is_sent_again_only_if_the_request_fails(
         -0.2, *[0] * zeros]
 
 
+@pytest.mark.parametrize('asks', [
+    (set_roi, Gimbal.set_neutral), (Gimbal.clear_roi, Gimbal.set_neutral),
+    (Gimbal.set_neutral, set_roi), (Gimbal.set_neutral, Gimbal.clear_roi)])
+@pytest.mark.parametrize('refusal', [
+    mav.MavResult.DENIED, mav.MavResult.TEMPORARILY_REJECTED], ids=['at once', 'later'])
+def test_zero_is_not_sent_again_to_a_gimbal_that_follows_another_request(
+        asks: tuple[Ask, Ask], refusal: mav.MavResult) -> None:
+    rig = in_control()
+    manager = rig.managers[0]
+    manager.results = dict.fromkeys(
+        (GimbalCommand.DO_SET_ROI_LOCATION, GimbalCommand.DO_SET_ROI_NONE), refusal)
+    # The device turns to its neutral position, and shows the flag late.
+    manager.rates, manager.applies = (0.0, -0.2, 0.0), False
+    rig.gimbal.set_rates((0.0, 0.2, 0.0), rig.now)
+    rig.run(0.1)
+
+    for ask in asks:
+        ask(rig.gimbal, rig.now, rig.done)
+    rig.run(0.7)
+    manager.flags |= MountFlags.NEUTRAL
+    rig.run(3.0)
+
+    assert sorted(one.success for one in rig.results) == [False, True]
+    assert [one.angular_velocity_y for one in rig.messages(GimbalManagerSetAttitude)] == [-0.2, 0]
+
+
+def test_zero_that_has_stopped_the_gimbal_is_not_sent_again_after_a_request() -> None:
+    rig = in_control()
+    manager = rig.managers[0]
+    manager.rates = (0.0, 0.0, 0.0)
+    rig.gimbal.set_rates((0.0, 0.2, 0.0), rig.now)
+    rig.run(3.0)
+    manager.applies, manager.rates = False, (0.0, -0.2, 0.0)
+
+    assert not asked(rig, Gimbal.set_neutral)[0]
+
+    rig.run(3.0)
+    assert [one.angular_velocity_y for one in rig.messages(GimbalManagerSetAttitude)] == [-0.2, 0]
+
+
 @pytest.mark.parametrize('answers', [True, False])
 @pytest.mark.parametrize('ask', [*(ask for ask, *_ in FLAG_REQUESTS), Gimbal.clear_roi, set_roi])
 def test_place_after_a_failed_request_ends_with_the_control_of_the_node(
