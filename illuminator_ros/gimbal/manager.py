@@ -91,9 +91,11 @@ FOLLOW_INTERVAL = 0.05
 # s between statuses that are sent because control has changed.
 CHANGE_INTERVAL = 0.1
 # Requests for GIMBAL_DEVICE_INFORMATION without the message after which the manager announces the
-# gimbal without it; s between these requests, and between later ones.
+# gimbal without it; s between these requests, and between later ones; and the longest time of one,
+# which a device may prolong with progress, and command_timeout too.
 INFORMATION_REQUESTS = 3
 INFORMATION_DELAY, INFORMATION_INTERVAL = 0.5, 5.0
+INFORMATION_TIMEOUT = 2.0
 # s for which the manager does not send AUTOPILOT_STATE_FOR_GIMBAL_DEVICE after an autopilot has
 # sent it, and the shortest time between two that the manager sends.
 AUTOPILOT_SILENCE = 2.0
@@ -634,7 +636,7 @@ class GimbalManager(Payload):
         if self.tracker.device is not None:
             self._commands.start(Command(
                 self.tracker.device, mav.MavCmd.REQUEST_MESSAGE, (GimbalDeviceInformation.id,)),
-                now, self._information_answered)
+                now, self._information_answered, deadline=now + INFORMATION_TIMEOUT)
 
     def _information_answered(self, result: CommandResult, now: float) -> None:
         if self._information is None and self.tracker.state is not ManagerState.NO_DEVICE:

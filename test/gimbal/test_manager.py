@@ -127,6 +127,16 @@ def test_gm_10_information_waits_for_that_of_the_device_or_three_requests_for_it
     assert set(announced) == {capabilities}
 
 
+def test_gm_10_information_does_not_wait_for_a_device_that_reports_progress_for_ever() -> None:
+    rig = ManagerRig(active=False, lost=(math.inf, 0))
+    progress = mav.CommandAck(
+        mav.MavCmd.REQUEST_MESSAGE, mav.MavResult.IN_PROGRESS, 0, 0, *OURS)
+
+    rig.run(10.0, each=lambda: rig.component.receive(DEVICE, progress, rig.now))
+
+    assert rig.result(PILOT, request(GimbalManagerInformation)) is mav.MavResult.ACCEPTED
+
+
 def test_the_manager_passes_on_the_information_of_its_device() -> None:
     rig = ManagerRig()
 
