@@ -292,6 +292,9 @@ class Camera:
     def take_status(self, message: rededge.CameraStatus, now: float) -> None:
         """Take CAMERA_STATUS, which reports that an image was triggered."""
         if message.event_id == rededge.CameraStatusType.TRIGGER:
+            if message.img_idx == self._triggered[0] and message.img_idx not in self._indices:
+                # Each image is triggered once: the camera has restarted, and counts anew.
+                self._triggered = 0, -math.inf
             self._take_index(message.img_idx, now)
 
     def take_feedback(self, message: rededge.CameraFeedback, now: float) -> None:
