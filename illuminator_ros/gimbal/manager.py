@@ -206,6 +206,8 @@ class GimbalManager(Payload):
                       else GimbalModel.from_ranges(settings.ranges))
         self._information: GimbalDeviceInformation | None = None
         self._information_requests = 0
+        # Whether a request for GIMBAL_MANAGER_INFORMATION came too early.
+        self._is_awaited = False
         self._status: GimbalDeviceAttitudeStatus | None = None
         self._attitude: MountAttitude | None = None
         self._status_at = self._measured_at = -math.inf
@@ -309,6 +311,7 @@ class GimbalManager(Payload):
         if now >= self._status_due:
             self._status_due = max(self._status_due + STATUS_INTERVAL, now)
             self._commands.send(self.status(now))
+            self._send_awaited(now)
             if not self.tracker.has_mavlink and now >= self._measured_at + ATTITUDE_AGE:
                 self._report_commanded(now)
         if now >= self._send_due:
@@ -604,10 +607,17 @@ class GimbalManager(Payload):
         else:
             return None
         if self.tracker.state is not ManagerState.ACTIVE or message is None:
+            self._is_awaited |= message_id == GimbalManagerInformation.id
             return (MavResult.DENIED if self.tracker.state is ManagerState.INACTIVE
                     else MavResult.TEMPORARILY_REJECTED)
         self._commands.send(message)
         return MavResult.ACCEPTED
+
+    def _send_awaited(self, now: float) -> None:
+        """Send GIMBAL_MANAGER_INFORMATION that was requested too early: clients may give up."""
+        if self._is_awaited and (information := self._own_information(now)):
+            self._is_awaited = False
+            self._commands.send(information)
 
     def _own_information(self, now: float) -> GimbalManagerInformation | None:
         """Return GIMBAL_MANAGER_INFORMATION, None while GIMBAL_DEVICE_INFORMATION is awaited."""

@@ -127,6 +127,20 @@ def test_gm_10_information_waits_for_that_of_the_device_or_three_requests_for_it
     assert set(announced) == {capabilities}
 
 
+@pytest.mark.parametrize('seconds', [0.0, 1.0, 3.0], ids=['no device', 'listening', 'active'])
+def test_gm_10_information_that_was_requested_too_early_is_sent_once_later(
+        seconds: float) -> None:
+    rig = ManagerRig(active=False, lost=(6, 0))
+    rig.run(seconds)
+    early = rig.result(PILOT, request(GimbalManagerInformation))
+
+    rig.run(10.0)
+
+    assert early is mav.MavResult.TEMPORARILY_REJECTED
+    [sent] = rig.messages(GimbalManagerInformation)
+    assert sent.cap_flags == Capabilities.CAN_POINT_LOCATION_GLOBAL | FULL
+
+
 def test_gm_10_information_does_not_wait_for_a_device_that_reports_progress_for_ever() -> None:
     rig = ManagerRig(active=False, lost=(math.inf, 0))
     progress = mav.CommandAck(
