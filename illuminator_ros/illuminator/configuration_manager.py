@@ -115,8 +115,8 @@ class ConfigurationManager:
     :param emit: takes the events.
     :param limits: apply to each command that is sent.
     :param reassert: whether changes by other senders are undone.
-    :param is_switching_off: returns whether an OFF is under way. No pending values are sent then,
-        since a brightness may be an ON.
+    :param must_wait: returns whether no pending values may be sent now, since an OFF is under way
+        and a brightness may be an ON.
     :ivar confirmed: the configuration that the light last accepted from us or, if another sender
         has changed it since, last reported; None before either.
     :ivar discrepancy: why the light does not have a configuration that it should have, '' if it
@@ -127,7 +127,7 @@ class ConfigurationManager:
     def __init__(
         self, target: Target, emit: Callable[[events.AnyLightEvent], None], *,
         limits: SafetyLimits, restore: bool = True, reassert: bool = False,
-        is_switching_off: Callable[[], bool] = lambda: False,
+        must_wait: Callable[[], bool] = lambda: False,
     ) -> None:
         self.confirmed: Configuration | None = None
         self.discrepancy = ''
@@ -135,7 +135,7 @@ class ConfigurationManager:
         self._address = target.address
         self._emit = emit
         self._restore = restore
-        self._is_switching_off = is_switching_off
+        self._must_wait = must_wait
         self._limits = limits
         self._is_limited = limits != SafetyLimits()
         self.limit_exceeded = events.LimitExceeded(target.address, (), '')
@@ -545,7 +545,7 @@ class ConfigurationManager:
 
     @property
     def _pending_due(self) -> float:
-        if self._pending is None or self._is_switching_off():
+        if self._pending is None or self._must_wait():
             return math.inf
         return self._pending.due
 

@@ -141,7 +141,7 @@ class Light:
         self._configuration = ConfigurationManager(
             self._target, emit, limits=settings.limits,
             restore=settings.restore_configuration, reassert=settings.reassert,
-            is_switching_off=lambda: self._switching.has(_is_off))
+            must_wait=self._may_brightness_undo_off)
         self._tracker = StatusTracker()
         self._is_shared = False
         self._measures_temperature = False
@@ -305,6 +305,12 @@ class Light:
             self._switch_automatically(_AutomaticSwitch(
                 before, f'external_changes: another sender switched it {change}', due,
                 self._undoing))
+
+    def _may_brightness_undo_off(self) -> bool:
+        """Return whether an OFF is under way that a brightness may undo."""
+        # A brightness does not switch on a light that has shown one while it was off. Without this
+        # exception a light that confirms slowly would not be configured while OFFs are repeated.
+        return self._off_brightness in (None, 0.0) and self._switching.has(_is_off)
 
     def _is_own(self, on: bool, now: float) -> bool:
         """Return whether a switch may be the late or implied effect of a command of ours."""

@@ -486,3 +486,22 @@ def test_a_light_that_is_switched_on_beyond_a_limit_after_an_off_is_brought_back
     pair.run(5.0)
 
     assert light.fields['brightness'] == 60.0
+
+
+@pytest.mark.parametrize('case', ['beyond a limit', 'restarted'])
+def test_a_light_with_a_brightness_while_off_is_configured_while_offs_are_repeated(
+        case: str) -> None:
+    light = FakeLight(brightness=50.0)
+    # It sends a status each second, and none on request.
+    light.answers.clear()
+    pair = Pair(light, settings=Settings(limits=SafetyLimits(max_brightness=60.0))).settle()
+    assert pair.enable(False).success
+    if case == 'restarted':
+        light.restart(pair.now, brightness=40.0)
+    else:
+        light.fields['brightness'] = 90.0
+    for _ in range(50):
+        pair.ask_enable(False, is_stream=True)
+        pair.run(0.1)
+
+    assert light.fields['brightness'] == (50.0 if case == 'restarted' else 60.0)
