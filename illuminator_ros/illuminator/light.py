@@ -155,6 +155,8 @@ class Light:
         # The time until which an ON waits, s, since the light may have restarted.
         self._restart_check_until = -math.inf
         self._enabled: bool | None = None
+        # Whether a status has shown it on since the last OFF that was confirmed.
+        self._was_on = False
         self._last_switch: tuple[bool, float] = False, -math.inf
         # The time until which a switch that was not confirmed may still take effect, s.
         self._late_until = -math.inf
@@ -255,6 +257,7 @@ class Light:
         self, report: StatusReport[Status], now: float, *, restarted: bool,
     ) -> None:
         before, self._enabled = self._enabled, report.status.enabled
+        self._was_on |= bool(self._enabled)
         if self._enabled is False:
             self._off_brightness = report.status.brightness
             confirmed = self._configuration.confirmed
@@ -271,7 +274,9 @@ class Light:
         if self._enabled and (self._requested_at == -math.inf or is_by_other):
             self._note_request(now)
         if not self._switching:
-            if self._automatic and self._enabled is self._automatic.on:
+            # The OFF of one of several lights does not show that the others are off.
+            if (self._automatic and self._enabled is self._automatic.on
+                    and (self._enabled or not report.shared_address)):
                 self._automatic = None
             if not restarted:
                 self._follow_switch(before, report, now)
@@ -565,7 +570,7 @@ class Light:
             result: Result, sent: Change[Status] | None, status: Status | None, now: float,
         ) -> None:
             if result.success:
-                self._enabled = self._undoes_off = on
+                self._enabled = self._undoes_off = self._was_on = on
                 if not on and self._brightness_is_switch:
                     self._configuration.drop_pending()
             if result.success or result.refused:
@@ -714,9 +719,10 @@ class Light:
     def _silence_due(self) -> float:
         """Return the time at which the light is switched off after silence, s."""
         # A light that sends no status may be on if it was switched on, and so may one of several
-        # lights at the address. A try of an ON that has not ended may still take effect.
+        # lights at the address, whose statuses may come at once. A try of an ON that has not ended
+        # may still take effect.
         may_be_on = self._enabled or self._switching.has(_is_on) or self._last_switch[0] and (
-            self._enabled is None or self._is_shared)
+            self._enabled is None or self._is_shared) or self._was_on and self._is_shared
         if (not self._settings.off_after_silence or not may_be_on or not self.connected
                 or self._automatic and not self._automatic.on):
             return math.inf

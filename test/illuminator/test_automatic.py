@@ -93,6 +93,28 @@ def test_two_lights_that_share_an_address_go_off_after_silence() -> None:
     assert lights[0].fields['enable'] == 0
 
 
+def test_one_of_two_lights_that_share_an_address_and_report_at_once_goes_off_after_silence(
+) -> None:
+    lights = FakeLight(enable=1), FakeLight()
+    pair = Pair(SharedAddress(*lights), settings=Settings(off_after_silence=SILENCE)).settle()
+    pair.run(20.0)
+
+    assert lights[0].fields['enable'] == 0
+    assert len(pair.commands(ON_OFF)) == 1
+
+
+def test_an_off_that_one_of_two_lights_at_an_address_refuses_is_repeated_after_2_s() -> None:
+    lights = FakeLight(enable=1), FakeLight()
+    pair = Pair(SharedAddress(*lights, offset=0.3),
+                settings=Settings(off_after_silence=20.0)).settle()
+    lights[0].results[ON_OFF] = MavResult.FAILED
+    pair.run(28.0)
+    times = [at for at, _ in pair.commands_at(ON_OFF)]
+
+    assert len(times) > 2
+    assert min(after - before for before, after in zip(times, times[1:], strict=False)) >= 2.0
+
+
 def test_off_after_silence_is_repeated_until_the_light_shows_it() -> None:
     light = FakeLight()
     pair = silenced(light, drop=0.3)
