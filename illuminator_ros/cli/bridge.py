@@ -29,6 +29,7 @@ from typing import NamedTuple, TYPE_CHECKING
 from .entry_point import (
     log_directory_refusal,
     one_line,
+    parameter_file_refusal,
     print_output,
     run_program,
     wrong_arguments,
@@ -144,7 +145,7 @@ gimbal_manager = partial(main, payload='gimbal_manager')
 
 def _run(arguments: list[str], termination: Termination, executable: Executable) -> int:
     own = list(arguments)
-    if refusal := _parameter_file_refusal(arguments):
+    if refusal := parameter_file_refusal(arguments):
         return executable.refuse(refusal)
     if '--ros-args' in arguments:
         # Slow to import, like everything that is imported inside a function here.
@@ -228,19 +229,6 @@ def _use_profile() -> None:
     if not (any(map(os.environ.get, names)) or any(map(os.path.exists, files))):
         profile = os.path.join(os.path.dirname(__file__), os.pardir, 'ros', 'fastdds.xml')
         os.environ.update(dict.fromkeys(names, os.path.abspath(profile)))
-
-
-def _parameter_file_refusal(arguments: list[str]) -> str:
-    """
-    Return which parameter file is not a regular file, '' if each is.
-
-    rcl and this program read each file again: a pipe would be empty, and its parameters lost. rcl
-    waits for the writer of a FIFO, and no signal ends that.
-    """
-    for option, path in zip(arguments, arguments[1:], strict=False):
-        if option == '--params-file' and os.path.exists(path) and not os.path.isfile(path):
-            return f'parameter file {path}: it is not a regular file'
-    return ''
 
 
 def _long_name_refusal(arguments: list[str], limit: int) -> str:

@@ -16,7 +16,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 import io
 import os
 import re
@@ -128,6 +128,19 @@ def log_directory_refusal() -> str:
         reason = error.strerror or str(error)
     return (f'log files cannot be written to {directory}: {reason}; set ROS_LOG_DIR to a '
             'directory that can be written')
+
+
+def parameter_file_refusal(arguments: Sequence[str]) -> str:
+    """
+    Return which parameter file is not a regular file, '' if each is.
+
+    rcl and this program read each file again: a pipe would be empty, and its parameters lost. rcl
+    waits for the writer of a FIFO, and no signal ends that.
+    """
+    for option, path in zip(arguments, arguments[1:], strict=False):
+        if option == '--params-file' and os.path.exists(path) and not os.path.isfile(path):
+            return f'parameter file {path}: it is not a regular file'
+    return ''
 
 
 def one_line(message: object) -> str:

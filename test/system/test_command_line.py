@@ -115,6 +115,8 @@ def test_help_names_every_parameter_option_and_form_of_url() -> None:
     ('monitor', '--wait 0', 'argument --wait: 0 is outside 0.1 to 3600'),
     ('monitor', '--ros-args --banana', "wrong ROS arguments, see monitor --help: ['--banana']"),
     ('monitor', '--ros-args -r 1st:=x', "Couldn't parse remap rule: '-r 1st:=x'"),
+    ('monitor', '--ros-args --params-file KEYS/pipe',
+     'parameter file KEYS/pipe: it is not a regular file'),
     ('simulator', '--banana', 'unrecognized arguments: --banana'),
     ('simulator', 'udpin://127.0.0.1:0', 'port 0 is outside 1..65535'),
     ('simulator', '--count 0', 'argument --count: 0 is outside 1 to 200'),

@@ -37,7 +37,13 @@ from .key_bindings import KeyBindings, KeyDecoder
 from .model import DiscoveredLights, Light
 from .ros_graph import Graph
 from .view import plain, screen, ViewState
-from ..entry_point import log_directory_refusal, one_line, print_output, wrong_arguments
+from ..entry_point import (
+    log_directory_refusal,
+    one_line,
+    parameter_file_refusal,
+    print_output,
+    wrong_arguments,
+)
 from ..options import option, Parser
 from ..termination import Termination
 from ...payload.simulated_settings import number
@@ -108,9 +114,11 @@ def run(args: list[str] | None, termination: Termination) -> int:
     """Run the monitor; see the text of ``--help``."""
     arguments = sys.argv[1:] if args is None else args
     try:
-        own = remove_ros_args(['monitor', *arguments])[1:]
+        # rcl reads the files as soon as it parses the arguments.
+        refusal = parameter_file_refusal(arguments)
+        own = [] if refusal else remove_ros_args(['monitor', *arguments])[1:]
         options = parser().parse_args(own)
-        if refusal := log_directory_refusal():
+        if refusal := refusal or log_directory_refusal():
             print(f'monitor: {refusal}', file=sys.stderr)
             return 2
         termination.calls(lambda: None)
