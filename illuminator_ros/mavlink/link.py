@@ -331,6 +331,10 @@ class Link:
             ready = self._selector.select(wait)
         finally:
             self._turn.acquire()
+        if not ready:
+            # A stop of the process (SIGSTOP, docker pause) interrupts the wait, which then finds
+            # nothing. Frames that came meanwhile precede the deadlines that have passed.
+            ready = self._selector.select(0)
         for key, events in ready:
             if key.fileobj is self._wake_out:
                 with contextlib.suppress(BlockingIOError):

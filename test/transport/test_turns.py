@@ -226,6 +226,24 @@ def test_frames_of_a_channel_that_a_caller_has_lost_are_not_read(
     assert (link.state().is_open, len(talker.heard)) == (False, heard)
 
 
+def test_frames_that_came_while_the_process_was_stopped_precede_the_deadlines(
+        link: SimulatedLink, talker: Talker) -> None:
+    heard = len(talker.heard)
+    heard_at_poll: list[int] = []
+
+    def stop() -> None:
+        link.now = link.until = link.now + 10.0
+        link.socket.inbox.append((heartbeat_frame(sequence=1), PEER))
+
+    def poll(now: float) -> None:
+        heard_at_poll.append(len(talker.heard))
+
+    talker.poll = poll  # type: ignore[method-assign]
+    link.meanwhile.append(stop)
+    link.run(0.01)
+    assert heard_at_poll == [heard + 1]
+
+
 def test_fault_in_the_turn_of_a_caller_is_logged_and_ends_neither_caller_nor_link(
         run: Run, channel: Open, caplog: pytest.LogCaptureFixture) -> None:
     channel(URL)
