@@ -101,6 +101,10 @@ class DeviceNodes(Generic[K, N]):
         served = self._make(node, log)
         for warning in ignored_parameters(node, self._host.node):
             log.warning(warning)
+        if shared := _shared_names(node, self._host.node):
+            log.warning(f'{", ".join(shared)}: {self._host.node.get_fully_qualified_name()} has '
+                        'the same, since a remapping applies to all nodes; put the name of the '
+                        f'node in front, as in -r {request.name}:~/enable:=NAME', 'remapped')
         self._host.log.info(f'{self._kind} {key} is served by {served.source.node}', 'served')
 
         def bind(now: float) -> None:
@@ -134,3 +138,13 @@ class DeviceNodes(Generic[K, N]):
             self._absence_due = math.inf
             if self.first_is_free:
                 self._host.log.warning(self.first.absence(now))
+
+
+def _shared_names(node: Node, first: Node) -> list[str]:
+    """Return the services and subscribed topics that a remapping gives to two nodes."""
+    names, others = (
+        {*(service.service_name for service in one.services),
+         *(subscription.topic_name for subscription in one.subscriptions)}
+        for one in (node, first))
+    # Each node with simulated time subscribes to it.
+    return sorted(names & others - {'/clock'})

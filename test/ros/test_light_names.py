@@ -112,6 +112,14 @@ def test_only_target_leaves_other_lights_alone_and_unused_names_are_logged(
         bridge.wait_for('light 1/250 is served by /mast')
 
 
+def test_remapping_that_gives_two_nodes_the_same_service_or_topic_is_logged(start: Start) -> None:
+    bridge, _ = start(
+        '-r', '~/enable:=/lamp', '-r', '~/cmd/enable:=/on', '-r', 'illuminator:~/refresh:=/again')
+
+    bridge.wait_for('[illuminator_1_244]: /lamp, /on: /illuminator has the same')
+    assert bridge.count('has the same') == 1
+
+
 @pytest.mark.parametrize('remap', [('--remap', '__node:=spot'), ('-r', '__name:=spot')])
 def test_remapped_node_name_is_that_of_the_first_node_only(
     own_ros: Ros, start: Start, remap: tuple[str, str],
