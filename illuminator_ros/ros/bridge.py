@@ -32,6 +32,7 @@ from .diagnostics_publisher import DiagnosticsPublisher
 from .executor import NodeExecutor
 from .ignored_parameters import ignored_sections, unknown_parameters
 from .logger_services import LoggerServices
+from .node import unheard_publishers
 from .node_manager import NodeManager
 from .parameters import (
     declare_link_parameters,
@@ -60,8 +61,8 @@ TICK = 0.25
 CHECK_INTERVAL = 0.02
 # s between attempts to start a thread while the system has none to spare.
 START_RETRY = 0.5
-# s between checks for another node of the same name.
-NAMES_INTERVAL = 5.0
+# s between checks for another node of the same name, and for publishers that cannot be heard.
+GRAPH_INTERVAL = 5.0
 
 
 class Bridge:
@@ -214,16 +215,18 @@ class Bridge:
             self.log.error(f'{text} within {format_seconds(OFF_LIMIT)}')
 
     def _keep_house(self) -> None:
-        names_due, shared = 0.0, frozenset[str]()
+        graph_due, shared = 0.0, frozenset[str]()
+        unheard: dict[str, int] = {}
         while not self._ended.is_set():
             try:
                 more = self._nodes.work()
                 self.link.run_turn(self._poll)
                 self._diagnostics.poll(self._tick / 2)
                 self.log.flush()
-                if self.link.clock() >= names_due:
-                    names_due = self.link.clock() + NAMES_INTERVAL
+                if self.link.clock() >= graph_due:
+                    graph_due = self.link.clock() + GRAPH_INTERVAL
                     shared = self._check_names(shared)
+                    unheard = self._check_publishers(unheard)
             except Exception as error:
                 self.log.error(f'internal error: {error!r}', 'housekeeping')
                 more = False
@@ -253,6 +256,19 @@ class Bridge:
         for name in sorted(known - shared):
             self.log.info(f'no other node is called {name} any more', 'name')
         return shared
+
+    def _check_publishers(self, known: Mapping[str, int]) -> dict[str, int]:
+        """
+        Log the publishers that our nodes cannot hear, each once.
+
+        :param known: texts of the last checks; at first the name of a node may not be known.
+        :return: the number of successive checks that have found each text.
+        """
+        texts = set(itertools.chain.from_iterable(map(unheard_publishers, self.nodes)))
+        for text in sorted(texts):
+            if known.get(text) == 1:
+                self.log.warning(text, 'publisher')
+        return {text: known.get(text, 0) + 1 for text in texts}
 
     def _link_event(self, event: LinkEvent) -> None:
         self.log.write(logging.INFO if event.is_open else logging.WARNING, str(event), 'link')

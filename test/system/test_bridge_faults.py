@@ -22,7 +22,8 @@ from diagnostic_msgs.msg import DiagnosticArray
 import pytest
 from rcl_interfaces.msg import LoggerLevel
 from rcl_interfaces.srv import GetParameters, SetLoggerLevels
-from rclpy.qos import QoSProfile
+from rclpy.qos import QoSProfile, ReliabilityPolicy
+from std_msgs.msg import Bool, Float32
 from std_srvs.srv import SetBool, Trigger
 from support import ros
 from support.light import Address, eventually, free_port, MavCmd, ServedLight
@@ -176,3 +177,24 @@ def test_node_of_a_light_that_was_silent_for_long_is_removed(own_ros: ros.Ros, p
         eventually(lambda: 'illuminator_1_244' not in own_ros.node.get_node_names())
         # After the jumps of the clock the other light may be lost until its next heartbeat.
         eventually(lambda: own_ros.enable().success)
+
+
+@pytest.mark.parametrize(('type_', 'reliability', 'reason'), [
+    (Bool, ReliabilityPolicy.BEST_EFFORT, 'it publishes best effort'),
+    (Float32, ReliabilityPolicy.RELIABLE, 'it publishes std_msgs/msg/Float32 instead of'),
+])
+def test_publisher_that_cannot_be_heard_is_logged_once(
+    own_ros: ros.Ros, port: int, type_: type, reliability: ReliabilityPolicy, reason: str,
+) -> None:
+    own_ros.node.create_publisher(
+        type_, '/illuminator/cmd/enable', QoSProfile(depth=1, reliability=reliability))
+    own_ros.node.create_publisher(Bool, '/illuminator/cmd/enable_all', 1)
+    text = f'/illuminator/cmd/enable: messages of /tester are not received: {reason}'
+    with ros.running_bridge(own_ros.domain, port) as bridge:
+        pass_time_until(lambda: bridge.count(text), step=5.0)
+        for _ in range(2):
+            diagnostics = own_ros.subscribe(DiagnosticArray, '/diagnostics', ros.STREAM)
+            CLOCK.forward(5.0)
+            diagnostics.wait(lambda array: True)
+
+        assert bridge.count('are not received') == 1

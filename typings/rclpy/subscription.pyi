@@ -15,12 +15,14 @@
 from collections.abc import Callable
 
 from rclpy.impl.implementation_singleton import rclpy_implementation
+from rclpy.qos import QoSProfile
 
 class Subscription:
     handle: rclpy_implementation.Subscription
     raw: bool
     callback: Callable[[object], object]
     msg_type: type[object]
+    qos_profile: QoSProfile
     @property
     def topic_name(self) -> str: ...
     def get_publisher_count(self) -> int: ...
