@@ -293,7 +293,7 @@ class Camera:
         """Take CAMERA_STATUS, which reports that an image was triggered."""
         if message.event_id == rededge.CameraStatusType.TRIGGER:
             if message.img_idx == self._triggered[0] and message.img_idx not in self._indices:
-                # Each image is triggered once: the camera has restarted, and counts anew.
+                # Each image is triggered once: the camera has restarted and counts from the start.
                 self._triggered = 0, -math.inf
             self._take_index(message.img_idx, now)
 
