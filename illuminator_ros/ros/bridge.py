@@ -215,8 +215,7 @@ class Bridge:
             self.log.error(f'{text} within {format_seconds(OFF_LIMIT)}')
 
     def _keep_house(self) -> None:
-        graph_due, shared = 0.0, frozenset[str]()
-        unheard: dict[str, int] = {}
+        graph_due, shared, unheard = 0.0, frozenset[str](), frozenset[str]()
         while not self._ended.is_set():
             try:
                 more = self._nodes.work()
@@ -257,18 +256,12 @@ class Bridge:
             self.log.info(f'no other node is called {name} any more', 'name')
         return shared
 
-    def _check_publishers(self, known: Mapping[str, int]) -> dict[str, int]:
-        """
-        Log the publishers that our nodes cannot hear, each once.
-
-        :param known: texts of the last checks; at first the name of a node may not be known.
-        :return: the number of successive checks that have found each text.
-        """
-        texts = set(itertools.chain.from_iterable(map(unheard_publishers, self.nodes)))
-        for text in sorted(texts):
-            if known.get(text) == 1:
-                self.log.warning(text, 'publisher')
-        return {text: known.get(text, 0) + 1 for text in texts}
+    def _check_publishers(self, known: frozenset[str]) -> frozenset[str]:
+        """Log the publishers that our nodes cannot hear, unless known; and return the texts."""
+        texts = frozenset(itertools.chain.from_iterable(map(unheard_publishers, self.nodes)))
+        for text in sorted(texts - known):
+            self.log.warning(text, 'publisher')
+        return texts
 
     def _link_event(self, event: LinkEvent) -> None:
         self.log.write(logging.INFO if event.is_open else logging.WARNING, str(event), 'link')

@@ -50,6 +50,8 @@ COMMAND_QOS = QoSProfile(depth=10, reliability=ReliabilityPolicy.BEST_EFFORT)
 SWITCH_QOS = QoSProfile(depth=10, reliability=ReliabilityPolicy.RELIABLE)
 # Requests that the middleware queues while others are taken, so that each gets an answer.
 SERVICE_QOS = QoSProfile(depth=1000, reliability=ReliabilityPolicy.RELIABLE)
+# The name of a node in the graph until its participant has announced it (rmw_dds_common).
+UNKNOWN_NAME = '_NODE_NAME_UNKNOWN_'
 
 
 class Publication(NamedTuple):
@@ -128,6 +130,8 @@ def unheard_publishers(node: Node) -> Iterator[str]:
         if not node.count_publishers(topic):
             continue
         for info in node.get_publishers_info_by_topic(topic):
+            if info.node_name == UNKNOWN_NAME:
+                continue
             reason = ''
             if info.topic_type != wanted:
                 reason = f'it publishes {info.topic_type} instead of {wanted}'
