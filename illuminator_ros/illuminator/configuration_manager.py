@@ -268,7 +268,7 @@ class ConfigurationManager:
             self._limiting = RepeatLimit(1, REPEAT_INTERVAL)
         self._pending = None
 
-    def _drop_pending(self, names: Container[str]) -> None:
+    def _drop_fields(self, names: Container[str]) -> None:
         """Remove fields from the pending values."""
         if self._pending:
             self._pending.values = {name: value for name, value in self._pending.values.items()
@@ -346,11 +346,11 @@ class ConfigurationManager:
                 if self._sent:
                     self._sent.accepted = result.success or result.contradicted
                 if result.success:
-                    self._drop_pending(values)
+                    self._drop_fields(values)
                     if self._pending:
                         # The command carries all fields.
-                        self._drop_pending([name for name, value in self._pending.values.items()
-                                            if value == getattr(change.configuration, name)])
+                        self._drop_fields([name for name, value in self._pending.values.items()
+                                           if value == getattr(change.configuration, name)])
                     self._accept(change.configuration, status)
                 elif result.contradicted:
                     self._unapplied = change.configuration
@@ -589,7 +589,7 @@ class ConfigurationManager:
             try:
                 checked(name, value, self._strobe_range)
             except InvalidValue as error:
-                self._drop_pending([name])
+                self._drop_fields([name])
                 self._restored(False, str(error))
         if self._pending is not pending:
             return
@@ -600,7 +600,7 @@ class ConfigurationManager:
             if (result.success or result.permanent
                     or pending.attempts >= MAX_CONTRADICTIONS
                     or pending.attempts and pending.reason in _SENT_ONCE):
-                self._drop_pending(pending.values)
+                self._drop_fields(pending.values)
                 self._restored(result.success, result.message)
             if not result.success:
                 self.discrepancy = result.message
