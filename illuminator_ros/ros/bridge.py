@@ -30,9 +30,9 @@ from rclpy.node import Node
 from .diagnostics import SIGNING_NEEDED
 from .diagnostics_publisher import DiagnosticsPublisher
 from .executor import NodeExecutor
+from .graph import unheard_publishers
 from .ignored_parameters import ignored_sections, unknown_parameters
 from .logger_services import LoggerServices
-from .node import unheard_publishers
 from .node_manager import NodeManager
 from .parameters import (
     declare_link_parameters,

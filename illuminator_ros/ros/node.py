@@ -16,7 +16,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 import math
 import threading
@@ -50,8 +50,6 @@ COMMAND_QOS = QoSProfile(depth=10, reliability=ReliabilityPolicy.BEST_EFFORT)
 SWITCH_QOS = QoSProfile(depth=10, reliability=ReliabilityPolicy.RELIABLE)
 # Requests that the middleware queues while others are taken, so that each gets an answer.
 SERVICE_QOS = QoSProfile(depth=1000, reliability=ReliabilityPolicy.RELIABLE)
-# The name of a node in the graph until its participant has announced it (rmw_dds_common).
-UNKNOWN_NAME = '_NODE_NAME_UNKNOWN_'
 
 
 class Publication(NamedTuple):
@@ -120,32 +118,6 @@ class CommandTopic(Generic[T]):
 # Of any type of request, and of any type of value.
 AnyService = RequestService[Any, Any]
 AnyCommand = CommandTopic[Any]
-
-
-def unheard_publishers(node: Node) -> Iterator[str]:
-    """Return for each publisher of a topic that the node cannot hear why, for people."""
-    for subscription in node.subscriptions:
-        topic, wanted = subscription.topic_name, _type_name(subscription.msg_type)
-        # Counting takes a fifth of the time.
-        if not node.count_publishers(topic):
-            continue
-        for info in node.get_publishers_info_by_topic(topic):
-            if info.node_name == UNKNOWN_NAME:
-                continue
-            reason = ''
-            if info.topic_type != wanted:
-                reason = f'it publishes {info.topic_type} instead of {wanted}'
-            elif (subscription.qos_profile.reliability is ReliabilityPolicy.RELIABLE
-                  and info.qos_profile.reliability is ReliabilityPolicy.BEST_EFFORT):
-                reason = 'it publishes best effort, and this topic needs reliable'
-            if reason:
-                publisher = f'{info.node_namespace.rstrip("/")}/{info.node_name}'
-                yield f'{topic}: messages of {publisher} are not received: {reason}'
-
-
-def _type_name(type_: type[object]) -> str:
-    """Return the name of a message type in the graph."""
-    return f'{type_.__module__.partition(".")[0]}/msg/{type_.__name__}'
 
 
 class NodeInterface:

@@ -20,9 +20,10 @@ from typing import Any
 
 from illuminator_ros.cli.monitor import key_bindings
 from illuminator_ros.cli.monitor.model import Light, Outcome, State
-from illuminator_ros.cli.monitor.ros_graph import lights_among, TOPICS, type_name
+from illuminator_ros.cli.monitor.ros_graph import lights_among, TOPICS
 from illuminator_ros.cli.monitor.run import Monitor
 from illuminator_ros.illuminator.ros.event_publisher import PUBLICATIONS
+from illuminator_ros.ros.graph import type_name
 import pytest
 from rclpy.node import Node
 from std_msgs.msg import Bool, Float32, UInt32

@@ -35,6 +35,7 @@ from std_srvs.srv import SetBool, Trigger
 
 from .key_bindings import Ask, Request, Service
 from .model import Diagnosis, DiscoveredLights, Outcome, Values
+from ...ros.graph import type_name
 
 if TYPE_CHECKING:
     from rclpy.task import Future
@@ -69,11 +70,6 @@ SERVICES: dict[Service, tuple[type[Any], Callable[[Any], Any]]] = {
 }
 # The request for the setpoint of a light, which the operator does not see.
 GET_BRIGHTNESS = Request(Service.GET, '', ['brightness'])
-
-
-def type_name(type_: type[object]) -> str:
-    """Return the name of a message type in the graph."""
-    return f'{type_.__module__.split(".")[0]}/msg/{type_.__name__}'
 
 
 def lights_among(
