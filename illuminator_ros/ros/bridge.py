@@ -56,6 +56,8 @@ from ..payload.payload_type import PayloadType
 OFF_LIMIT = 0.6
 STOP_LIMIT = 0.15
 THREADS_LIMIT = 0.05
+# s in which other processes read the last messages; no event tells that they have.
+READING_TIME = 0.02
 # s between checks of the diagnostics, and the minimum between two checks after events.
 TICK = 0.25
 CHECK_INTERVAL = 0.02
@@ -160,10 +162,7 @@ class Bridge:
         self._nodes.join(deadline)
         for payload in self._payloads:
             payload.close()
-        # Destroy them at once, so that other nodes learn of the end; the first one last, since the
-        # others use its publisher of parameter events.
-        for node in reversed(self.nodes):
-            node.destroy_node()
+        self._leave_graph()
 
     def end(self) -> None:
         """
@@ -179,6 +178,26 @@ class Bridge:
         self._closed.set()
         self._wake.set()
         self._executor.end()
+
+    def _leave_graph(self) -> None:
+        # A process reads the last messages of another one, and learns of its end, in two threads.
+        # If it learns of the end of a service before it has read an answer, it drops the answer.
+        time.sleep(READING_TIME)
+        # If it learns of the end of the process before it has read that a node is gone, it lists
+        # that node for ever. One more node, which has nothing else to announce, delays that end.
+        with contextlib.ExitStack() as held:
+            nodes = self.nodes
+            # Without it, after a shutdown of the context for example, the nodes end all the same.
+            with contextlib.suppress(Exception):
+                last = PayloadNode(
+                    '_leaving', first=self.node, context=self.node.context, enable_rosout=False,
+                    use_global_arguments=False)
+                held.enter_context(last.handle)
+                nodes.append(last)
+            # The first one last, since the others use its publisher of parameter events.
+            for node in reversed(nodes):
+                node.destroy_node()
+            time.sleep(READING_TIME)
 
     def _start(self, start: Callable[[], None]) -> None:
         while not self._ended.is_set():

@@ -46,6 +46,8 @@ from .throttled_log import NodeLog
 
 # s between checks for calls while rclpy's own loop runs.
 FALLBACK_PERIOD = 0.1
+# The answer to requests that wait at the end.
+ENDED = 'the bridge ended first; the device may have executed the request'
 
 Q = TypeVar('Q')
 A = TypeVar('A')
@@ -60,12 +62,17 @@ class DeferredService(Generic[Q, A]):
     The callback of a service that answers later; only a :class:`NodeExecutor` calls it.
 
     :param take: called with the request, and with the function that sends the response.
+    :param refuse_waiting: called with the reason when the executor ends; answers what waits.
     :param spread: s within which the answers to requests that came together are sent.
     :ivar answers: paces its answers.
     """
 
-    def __init__(self, take: Take[Q, A], spread: float = MAX_SPREAD) -> None:
+    def __init__(
+        self, take: Take[Q, A], refuse_waiting: Callable[[str], None] = lambda reason: None,
+        spread: float = MAX_SPREAD,
+    ) -> None:
         self.take = take
+        self.refuse_waiting = refuse_waiting
         self.answers = AnswerQueue(spread)
 
     def __call__(self, request: Q, response: A) -> A:
@@ -93,7 +100,11 @@ class NodeExecutor(SingleThreadedExecutor):
         self._ended = threading.Event()
 
     def run(self) -> None:
-        """Run callbacks until :meth:`end` is called or the context is shut down."""
+        """
+        Run callbacks until :meth:`end` is called or the context is shut down.
+
+        Requests that wait are then refused.
+        """
         while not self._ended.is_set() and self.context.ok():
             try:
                 self.spin_once()
@@ -101,6 +112,10 @@ class NodeExecutor(SingleThreadedExecutor):
                 break
             except Exception as error:
                 self._log.error(f'internal error: {error!r}', 'executor')
+        try:
+            self._refuse_waiting()
+        except Exception as error:
+            self._log.error(f'internal error: {error!r}', 'executor')
         self._release()
 
     def end(self) -> None:
@@ -146,15 +161,28 @@ class NodeExecutor(SingleThreadedExecutor):
                 self._serve(service)
             for subscription in subscriptions:
                 self._deliver(subscription)
+        self._answer(time.monotonic())
+        if not self.context.ok():
+            raise ExternalShutdownException()
+
+    def _answer(self, now: float) -> None:
         while self._calls:
             self._calls.popleft()()
-        now = time.monotonic()
         for queue in tuple(self._queues):
             queue.poll(now)
             if not queue:
                 self._queues.remove(queue)
+
+    def _refuse_waiting(self) -> None:
         if not self.context.ok():
-            raise ExternalShutdownException()
+            return
+        for node in self.get_nodes():
+            for service in node.services:
+                if isinstance(service.callback, DeferredService):
+                    service.callback.refuse_waiting(ENDED)
+        # No answer pauses any more.
+        while self._calls or self._queues:
+            self._answer(math.inf)
 
     def _release(self) -> None:
         if self._entities is not None:

@@ -18,7 +18,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 import threading
-from typing import Generic, TypeVar
+from typing import Any, Generic, TypeVar
 
 from .throttled_log import NodeLog
 from ..mavlink.link import CALLER_WAIT, Link
@@ -44,7 +44,8 @@ class LinkCalls:
         self._link = link
         self._log = log
         self._limit = limit
-        self._pending = 0
+        # The refusal of each request that waits, by the function that ends it.
+        self._waiting: dict[Callable[[Any], None], Callable[[str], Any]] = {}
         # Whether the last answer came soon enough for the caller to wait for the next one.
         self._is_quick = False
         self._lock = threading.Lock()
@@ -60,23 +61,14 @@ class LinkCalls:
         :param answer: called once with the answer, in any thread.
         :param refusal: returns the answer for a reason why the request cannot be executed.
         """
-        with self._lock:
-            busy = self._pending >= self._limit
-            self._pending += not busy
-            waits = self._is_quick and self._pending == 1
-        if busy:
-            answer(refusal(f'busy: {self._limit} requests wait for an answer already'))
-            return
-        asked_at, answered = self._link.clock(), False
+        asked_at = self._link.clock()
 
         def end(value: T) -> None:
-            nonlocal answered
-            if not answered:
-                answered = True
-                with self._lock:
-                    self._pending -= 1
-                    self._is_quick = self._link.clock() <= asked_at + CALLER_WAIT
-                answer(value)
+            with self._lock:
+                if self._waiting.pop(end, None) is None:
+                    return
+                self._is_quick = self._link.clock() <= asked_at + CALLER_WAIT
+            answer(value)
 
         def run(now: float) -> None:
             try:
@@ -86,7 +78,22 @@ class LinkCalls:
                 self._log.error(reason, 'request')
                 end(refusal(reason))
 
-        self._link.run_turn(run, (lambda: answered) if waits else None)
+        with self._lock:
+            waits = self._is_quick and not self._waiting
+            busy = len(self._waiting) >= self._limit
+            if not busy:
+                self._waiting[end] = refusal
+        if busy:
+            answer(refusal(f'busy: {self._limit} requests wait for an answer already'))
+            return
+        self._link.run_turn(run, (lambda: end not in self._waiting) if waits else None)
+
+    def refuse_waiting(self, reason: str) -> None:
+        """Answer the requests that wait with a refusal; callable in any thread."""
+        with self._lock:
+            waiting = tuple(self._waiting.items())
+        for end, refusal in waiting:
+            end(refusal(reason))
 
 
 class LatestOnly(Generic[T]):

@@ -130,9 +130,10 @@ class NodeInterface:
     ) -> None:
         self._topics = {one.name: _Topic(node, one) for one in publications}
         for service in services:
+            calls = LinkCalls(link, log, service.limit)
             node.create_service(
                 service.type, f'~/{service.name}',
-                DeferredService(_taker(service, LinkCalls(link, log, service.limit))),
+                DeferredService(_taker(service, calls), calls.refuse_waiting),
                 qos_profile=SERVICE_QOS)
         for command in commands:
             node.create_subscription(

@@ -85,7 +85,8 @@ class ParameterServices:
 
         def serve(type_: type[ServiceType[Q, A]], name: str, take: Take[Q, A]) -> None:
             node.create_service(
-                type_, f'~/{name}', DeferredService(take, ANSWER_SPREAD), qos_profile=qos)
+                type_, f'~/{name}',
+                DeferredService(take, self._calls.refuse_waiting, ANSWER_SPREAD), qos_profile=qos)
 
         each = self._each
         serve(srv.DescribeParameters, 'describe_parameters', lambda request, respond: respond(

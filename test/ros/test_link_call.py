@@ -31,12 +31,14 @@ class CallerLink:
     :ivar now: s.
     :ivar waited: whether each caller waited.
     :ivar is_done: of the last caller, None if it did not wait.
+    :ivar answered: the answers that callers got.
     """
 
     def __init__(self) -> None:
         self.now = 0.0
         self.waited: list[bool] = []
         self.is_done: Callable[[], bool] | None = None
+        self.answered: list[str] = []
         self._answers: list[Callable[[str], None]] = []
 
     def clock(self) -> float:
@@ -53,7 +55,7 @@ class CallerLink:
         def start(now: float, answer: Callable[[str], None]) -> None:
             self._answers.append(answer)
 
-        calls.ask(start, lambda answer: None, str)
+        calls.ask(start, self.answered.append, 'refused: {}'.format)
 
     def answer(self, after: float) -> None:
         self.now += after
@@ -99,3 +101,14 @@ def test_caller_that_waits_is_done_when_the_answer_has_come(
     assert not link.is_done()
     link.answer(0.0)
     assert link.is_done()
+
+
+def test_each_request_that_waits_is_refused_at_the_end_and_answered_once(
+        link: CallerLink, calls: LinkCalls) -> None:
+    for _ in range(3):
+        link.ask(calls)
+    link.answer(0.0)
+    calls.refuse_waiting('the end')
+    link.answer(0.0)
+    calls.refuse_waiting('the end')
+    assert link.answered == ['done', 'refused: the end', 'refused: the end']

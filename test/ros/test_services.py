@@ -23,7 +23,7 @@ import socket
 import threading
 
 from illuminator_ros.ros import answer_queue
-from illuminator_ros.ros.executor import DeferredService, NodeExecutor, Respond
+from illuminator_ros.ros.executor import DeferredService, ENDED, NodeExecutor, Respond
 from illuminator_ros.ros.node import SERVICE_QOS
 from illuminator_ros.ros.payload_node import PayloadNode
 from illuminator_ros.ros.throttled_log import NodeLog
@@ -189,8 +189,13 @@ def serve_later(node: Node) -> Log[Respond[Trigger.Response]]:
     def take(request: Trigger.Request, respond: Respond[Trigger.Response]) -> None:
         waiting.append(respond)
 
+    def refuse_waiting(reason: str) -> None:
+        for respond in waiting:
+            respond(Trigger.Response(message=reason))
+
     node.create_service(
-        Trigger, '~/slow', DeferredService(take, math.inf), qos_profile=SERVICE_QOS)
+        Trigger, '~/slow', DeferredService(take, refuse_waiting, spread=math.inf),
+        qos_profile=SERVICE_QOS)
     return waiting
 
 
@@ -264,3 +269,16 @@ def test_answer_that_comes_while_the_executor_sends_another_one_does_not_stop_it
     for answered in calls:
         answered.result()
     Call(fast.call_async(Trigger.Request())).result()
+
+
+def test_executor_that_ends_refuses_requests_that_wait_without_a_pause(
+    node: Node, clients: MakeClient,
+) -> None:
+    waiting = serve_later(node)
+    calls = call(clients('slow'), waiting, answer_queue.MAX_UNSPACED + 2)
+    executor = node.executor
+    assert isinstance(executor, NodeExecutor)
+
+    executor.end()
+
+    assert {answered.result().message for answered in calls} == {ENDED}

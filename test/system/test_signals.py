@@ -28,11 +28,12 @@ import threading
 from illuminator_ros.cli import termination
 from illuminator_ros.mavlink.link import Link
 from illuminator_ros.ros import bridge
+from illuminator_ros.ros.executor import ENDED
 import pytest
-from support.light import ON_OFF, ServedLight
+from support.light import CONFIGURE, ON_OFF, ServedLight
 from support.ports import free_port
-from support.processes import environment, Program, start_interpreter
-from support.ros import bridge_arguments, Ros, start_bridge, start_slow_bridge
+from support.processes import ended, environment, Program, start_interpreter
+from support.ros import bridge_arguments, Parameters, Ros, start_bridge, start_slow_bridge
 from support.waiting import eventually
 
 SIGNALS = [signal.SIGINT, signal.SIGTERM, signal.SIGHUP]
@@ -159,6 +160,23 @@ def test_node_leaves_the_graph_at_once_and_further_signals_change_nothing(
     assert (program.wait(), 'Traceback' in program.log) == (0, False)
 
 
+def test_requests_that_wait_are_refused_when_the_bridge_ends(ros: Ros, port: int) -> None:
+    program = start_slow_bridge(ros.domain, port, '-r', '__node:=ending')
+    with ended(program), ServedLight(port) as light:
+        light.report(enable=0)
+        program.wait_for('connected')
+        light.fake.results.update({ON_OFF: None, CONFIGURE: None})
+        switched = ros.start_enable(node='/ending')
+        light.wait_for(ON_OFF)
+        changed = Parameters(ros, '/ending').start_set(brightness=40.0)
+        light.wait_for(CONFIGURE)
+
+        program.send(signal.SIGTERM)
+
+        assert (switched.result().success, switched.result().message) == (False, ENDED)
+        assert [one.reason for one in changed.result().results] == [ENDED]
+
+
 def test_last_line_is_written_on_a_busy_machine() -> None:
     program = Program(sys.executable, '-c', BUSY)
     try:
@@ -173,7 +191,7 @@ def test_hanging_program_is_forced_to_end_within_a_second() -> None:
 
     assert program.end(signal.SIGTERM) == 0
     assert program.count('at last') == 1
-    assert (bridge.OFF_LIMIT + bridge.STOP_LIMIT + bridge.THREADS_LIMIT
+    assert (bridge.OFF_LIMIT + bridge.STOP_LIMIT + bridge.THREADS_LIMIT + 2 * bridge.READING_TIME
             < termination.LIMIT < 1.0)
 
 

@@ -26,6 +26,7 @@ from rclpy.clock import Clock, ROSClock
 from rclpy.context import Context
 from rclpy.executors import Executor
 from rclpy.guard_condition import GuardCondition
+from rclpy.impl.implementation_singleton import Handle
 from rclpy.impl.rcutils_logger import RcutilsLogger
 from rclpy.parameter import Parameter, Value
 from rclpy.publisher import Publisher
@@ -57,6 +58,8 @@ class Node:
     # Private to rclpy: the package uses it in one place.
     _parameter_overrides: dict[str, Parameter]
     executor: Executor | None
+    @property
+    def handle(self) -> Handle: ...
     @property
     def context(self) -> Context: ...
     @property
