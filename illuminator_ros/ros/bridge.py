@@ -120,10 +120,10 @@ class Bridge:
         self._own_nodes = [node, *(
             PayloadNode(kind.node_name, namespace=node.get_namespace(), context=node.context)
             for kind in kinds[1:])]
+        self._logs = [self.log, *(NodeLog(own.get_logger()) for own in self._own_nodes[1:])]
         self._payloads: list[ServedPayload] = []
-        for own, kind, client, value in zip(
-                self._own_nodes, kinds, clients, values, strict=True):
-            log = self.log if own is node else NodeLog(own.get_logger())
+        for own, log, kind, client, value in zip(
+                self._own_nodes, self._logs, kinds, clients, values, strict=True):
             self._payloads.append(kind.serve(client, Host(
                 own, self.link, log, frame_log, self._nodes, self._diagnostics, value,
                 self._wake.set)))
@@ -240,7 +240,8 @@ class Bridge:
                 more = self._nodes.work()
                 self.link.run_turn(self._poll)
                 self._diagnostics.poll(self._tick / 2)
-                self.log.flush()
+                for log in self._logs:
+                    log.flush()
                 if self.link.clock() >= graph_due:
                     graph_due = self.link.clock() + GRAPH_INTERVAL
                     shared = self._check_names(shared)

@@ -72,6 +72,7 @@ class DeviceNodes(Generic[K, N]):
         self.get = self._nodes.get
         # Requests for the nodes of further devices, also before those are made.
         self._requests: dict[K, NodeRequest] = {}
+        self._logs: dict[K, NodeLog] = {}
         self._absence_due = host.link.clock() + ABSENCE_DELAY
         host.diagnostics.add(first.source)
 
@@ -110,6 +111,7 @@ class DeviceNodes(Generic[K, N]):
         def bind(now: float) -> None:
             # The device may have been forgotten meanwhile, and found again.
             if self._requests.get(key) is request:
+                self._logs[key] = log
                 self.bind(served, key, now)
 
         self._host.link.call(bind)
@@ -129,11 +131,14 @@ class DeviceNodes(Generic[K, N]):
                 self._host.diagnostics.remove(node.source)
                 self._host.log.info(f'{self._kind} {key} was silent for long: '
                                     f'{node.source.node} is removed', 'forgotten')
+        self._logs.pop(key, None)
         if request := self._requests.pop(key, None):
             self._host.nodes.remove(request)
 
     def poll(self, now: float) -> None:
-        """Log once why there is no device."""
+        """Log once why there is no device, and the lines that the logs of further nodes hold."""
+        for log in self._logs.values():
+            log.flush()
         if now >= self._absence_due:
             self._absence_due = math.inf
             if self.first_is_free:

@@ -18,6 +18,7 @@ from collections.abc import Callable, Iterator
 from types import SimpleNamespace
 from typing import cast
 
+from illuminator_ros.ros import throttled_log
 from illuminator_ros.ros.device_nodes import DeviceNodes
 from illuminator_ros.ros.diagnostics_publisher import DiagnosticsSource
 from illuminator_ros.ros.node_manager import NodeManager, NodeRequest
@@ -109,6 +110,42 @@ class Served:
         return ''
 
 
+def device_nodes(
+    first: PayloadNode, pool: NodeManager, make: Callable[[Node, NodeLog], Served],
+    turns: list[Callable[[float], None]], sources: set[DiagnosticsSource],
+) -> DeviceNodes[int, Served]:
+    return DeviceNodes[int, Served](
+        cast(Host, SimpleNamespace(
+            node=first, nodes=pool, log=NodeLog(first.get_logger()),
+            link=SimpleNamespace(clock=lambda: 0.0, call=turns.append),
+            diagnostics=SimpleNamespace(add=sources.add, remove=sources.discard))),
+        'light', Served(first), make, lambda node, key, now: None)
+
+
+def test_last_line_that_the_log_of_a_further_node_left_out_is_written_after_its_period(
+    first: PayloadNode, pool: NodeManager, monkeypatch: pytest.MonkeyPatch,
+    capfd: pytest.CaptureFixture[str],
+) -> None:
+    turns: list[Callable[[float], None]] = []
+
+    def make(node: Node, log: NodeLog) -> Served:
+        for number in range(throttled_log.BURST + 2):
+            log.warning(f'line {number}', 'kind')
+        return Served(node)
+
+    nodes = device_nodes(first, pool, make, turns, set())
+    nodes.serve(7, 'further')
+    pool.work()
+    turns.pop()(0.0)
+    nodes.poll(0.0)
+    assert 'left out' not in ''.join(capfd.readouterr())
+
+    monkeypatch.setattr(throttled_log, 'PERIOD', 0.0)
+    nodes.poll(0.0)
+
+    assert '[further]: line 11 (1 similar lines left out)' in ''.join(capfd.readouterr())
+
+
 def test_device_found_again_while_its_node_is_made_has_one_node_and_one_diagnostics_source(
     first: PayloadNode, pool: NodeManager,
 ) -> None:
@@ -123,12 +160,7 @@ def test_device_found_again_while_its_node_is_made_has_one_node_and_one_diagnost
             nodes.serve(7, 'further')
         return made[-1]
 
-    nodes = DeviceNodes[int, Served](
-        cast(Host, SimpleNamespace(
-            node=first, nodes=pool, log=NodeLog(first.get_logger()),
-            link=SimpleNamespace(clock=lambda: 0.0, call=turns.append),
-            diagnostics=SimpleNamespace(add=sources.add, remove=sources.discard))),
-        'light', Served(first), make, lambda node, key, now: None)
+    nodes = device_nodes(first, pool, make, turns, sources)
     nodes.serve(7, 'further')
     while pool.work():
         pass
