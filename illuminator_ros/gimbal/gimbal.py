@@ -345,7 +345,7 @@ class Gimbal:
             flag_target = request.Target(
                 address, self._commands, kind='gimbal device',
                 status_id=GimbalDeviceAttitudeStatus.id,
-                status_name='GIMBAL_DEVICE_ATTITUDE_STATUS', status_sender=self.key.address)
+                status_name='GIMBAL_DEVICE_ATTITUDE_STATUS', status_source=self.key.address)
             manager = self._managers[address] = _Manager(
                 target, request.RequestQueue(target), flag_target,
                 request.RequestQueue(flag_target))

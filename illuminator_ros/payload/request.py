@@ -66,16 +66,16 @@ class Target:
     :param ended: called with the result of each command, after its own ``done``.
     :param kind: a noun for it, such as ``light``.
     :param status_id: the message id of its status.
-    :param status_sender: the component that sends the status, if another one executes commands.
+    :param status_source: the component that sends the status, if another one executes commands.
     """
 
     def __init__(
         self, address: Address, commands: command_sender.CommandSender,
         ended: command_sender.Done = lambda result, now: None, *, kind: str, status_id: int,
-        status_name: str, status_sender: Address | None = None,
+        status_name: str, status_source: Address | None = None,
     ) -> None:
         self.address = address
-        self._status_sender = status_sender or address
+        self._status_source = status_source or address
         self.kind = kind
         self.status_name = status_name
         self._commands = commands
@@ -113,10 +113,10 @@ class Target:
     def request_status(self, now: float, done: command_sender.Done | None = None) -> None:
         """Request the status; without ``done`` only where no such request is under way."""
         if done is not None:
-            self.request_message(self._status_id, now, done, to=self._status_sender)
+            self.request_message(self._status_id, now, done, to=self._status_source)
         elif self._status_request is None:
             self._status_request = command_sender.Command(
-                self._status_sender, MavCmd.REQUEST_MESSAGE, (float(self._status_id),))
+                self._status_source, MavCmd.REQUEST_MESSAGE, (float(self._status_id),))
             self._start(self._status_request, now, self._status_answered)
 
     def cancel_status_request(self, now: float) -> None:

@@ -143,7 +143,7 @@ class SimulatedDevice(ABC):
         """Take a message of one of the classes of ``messages``; return the messages to send."""
         return ()
 
-    def sender(self, message: Message, own: Address) -> Address:
+    def source(self, message: Message, own: Address) -> Address:
         """Return the address from which it sends a message, by default its own."""
         return own
 
@@ -463,7 +463,7 @@ class SimulatedComponent(Generic[D]):
             self._after(delay, functools.partial(self._transmit, sent), now)
 
     def _transmit(self, message: Message, now: float) -> None:
-        self.outgoing.append((self.device.sender(message, self.address), message))
+        self.outgoing.append((self.device.source(message, self.address), message))
 
     def link_opened(self, now: float) -> None:
         """See :meth:`Endpoint.link_opened`; send a heartbeat at once for the new peer."""

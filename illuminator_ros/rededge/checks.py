@@ -104,20 +104,20 @@ class CameraTester:
         return []
 
     async def ping(
-        self, sequence: int | None = None, sender: Address | None = None,
+        self, sequence: int | None = None, source: Address | None = None,
     ) -> rededge.Ping:
         """
         Return the answer to a PING request.
 
         :param sequence: its sequence number, by default a new one.
-        :param sender: its address, by default the session's.
+        :param source: its address, by default the session's.
         :raises Failed: if none of several requests is answered, or one is answered late.
         """
         for _ in range(PING_ATTEMPTS):
             begun = self.session.now
             self._sequence += 1
             number = self._sequence if sequence is None else sequence
-            self.session.send(rededge.Ping(self._utc_us(), number, 0, 0), sender)
+            self.session.send(rededge.Ping(self._utc_us(), number, 0, 0), source)
             if answers := await self.session.receive_more(rededge.Ping, PING_TIMEOUT):
                 return answers[-1][1]
             # A late answer must not be assigned to the next request.
@@ -273,10 +273,10 @@ async def ping_target(tester: CameraTester) -> None:
 async def system_id(tester: CameraTester) -> str:
     """Send PING from another system, then from our own."""
     own = tester.session.address
-    for sender in (Address(own.system % 254 + 1, own.component), own):
-        await tester.ping(sender=sender)
-        if tester.session.device.system != sender.system:
-            raise Failed(f'after a message from {sender} it sends from {tester.session.device}')
+    for source in (Address(own.system % 254 + 1, own.component), own):
+        await tester.ping(source=source)
+        if tester.session.device.system != source.system:
+            raise Failed(f'after a message from {source} it sends from {tester.session.device}')
     return f'now {tester.session.device}'
 
 

@@ -343,8 +343,8 @@ class SimulatedRedEdge(simulated.SimulatedDevice):
         """Set the position of its own GPS receiver, None without a fix."""
         self.own_gps = place
 
-    def sender(self, message: Message, own: Address) -> Address:
-        """See :meth:`SimulatedDevice.sender`."""
+    def source(self, message: Message, own: Address) -> Address:
+        """See :meth:`SimulatedDevice.source`."""
         if isinstance(message, rededge.Ping):
             return Address(own.system, (own.component + self.behaviour.ping_component) & 0xFF)
         return own

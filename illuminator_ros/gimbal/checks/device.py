@@ -118,13 +118,13 @@ class DeviceTester(GimbalTester):
 
     async def point(
         self, pose: Pose | None, *, flags: int = LEVEL | VEHICLE_FRAME,
-        rates: tuple[float, float, float] = UNSET_VECTOR, sender: Address | None = None,
+        rates: tuple[float, float, float] = UNSET_VECTOR, source: Address | None = None,
         target: Address | None = None,
     ) -> None:
-        """See :class:`GimbalTester`; the default sender is the manager."""
+        """See :class:`GimbalTester`; the default source is the manager."""
         self.session.send(gimbal.GimbalDeviceSetAttitude(
             *(target or self.session.device), flags, quaternion_of(pose), *radians(rates)),
-            sender or self.manager)
+            source or self.manager)
 
 
 # GIMBAL_DEVICE_INFORMATION and GIMBAL_DEVICE_ATTITUDE_STATUS
@@ -164,12 +164,12 @@ async def north_needs_heading(tester: DeviceTester) -> None:
         raise Failed('it reports ACCEPTS_YAW_IN_EARTH_FRAME, and delta_yaw is NaN')
 
 
-# Setpoints, and their senders
+# Setpoints, and their sources
 
 async def _point_from_others(tester: DeviceTester, pose: Pose) -> None:
     """Send setpoints from our own address and from another component of the device's system."""
     for source in (tester.session.address, tester.session.free_component()):
-        await tester.point(pose, sender=source)
+        await tester.point(pose, source=source)
 
 
 async def _announce_other(tester: DeviceTester, pose: Pose) -> None:
@@ -178,7 +178,7 @@ async def _announce_other(tester: DeviceTester, pose: Pose) -> None:
     tester.announce(other)
     await tester.pause(2 * ANNOUNCE_INTERVAL)
     tester.announce(other)
-    await tester.point(pose, sender=other)
+    await tester.point(pose, source=other)
 
 
 async def _send_to_manager(tester: DeviceTester, pose: Pose) -> None:

@@ -115,10 +115,10 @@ class ManagerTester(GimbalTester):
         """Return the players in control; raise Skipped if the manager does not report them."""
         return control_of(await self.newest(MANAGER_STATUS, 'who has control'))
 
-    async def configure(self, *values: float, sender: Address | None = None) -> Transaction:
+    async def configure(self, *values: float, source: Address | None = None) -> Transaction:
         """Send MAV_CMD_DO_GIMBAL_MANAGER_CONFIGURE with four values."""
         return await self.session.command(
-            CONFIGURE, *values, 0.0, 0.0, self.device_id, sender=sender)
+            CONFIGURE, *values, 0.0, 0.0, self.device_id, source=source)
 
     async def shown(self, condition: Callable[[Control], bool]) -> Control:
         """Return the control once it meets a condition, or after :data:`SHOWN_TIMEOUT`."""
@@ -141,7 +141,7 @@ class ManagerTester(GimbalTester):
     async def prepare(self) -> None:
         """Take primary control; the second player releases any control that it has."""
         if self.other in await self.control():
-            await self.configure(-3.0, -3.0, -3.0, -3.0, sender=self.other)
+            await self.configure(-3.0, -3.0, -3.0, -3.0, source=self.other)
         if (await self.control())[0] != self.session.address:
             await self.configure(*self.session.address, *NO_COMPONENT)
             await self.pause(0.3)
@@ -160,31 +160,31 @@ class ManagerTester(GimbalTester):
 
     async def point(
         self, pose: Pose | None, *, flags: int = LEVEL | VEHICLE_FRAME,
-        rates: tuple[float, float, float] = UNSET_VECTOR, sender: Address | None = None,
+        rates: tuple[float, float, float] = UNSET_VECTOR, source: Address | None = None,
         device_id: int | None = None,
     ) -> None:
         """See :class:`GimbalTester`: GIMBAL_MANAGER_SET_ATTITUDE of a player."""
         self.session.send(gimbal.GimbalManagerSetAttitude(
             *self.session.device, flags, self.device_id if device_id is None else device_id,
-            quaternion_of(pose), *radians(rates)), sender)
+            quaternion_of(pose), *radians(rates)), source)
 
     async def send(
         self, cls: type[gimbal.GimbalManagerSetPitchyaw | gimbal.GimbalManagerSetManualControl],
         pitch: float = NAN, yaw: float = NAN, pitch_rate: float = NAN, yaw_rate: float = NAN,
-        sender: Address | None = None,
+        source: Address | None = None,
     ) -> None:
         """Send SET_PITCHYAW (rad) or SET_MANUAL_CONTROL."""
         self.session.send(
             cls(*self.session.device, int(LEVEL | VEHICLE_FRAME), self.device_id, pitch, yaw,
-                pitch_rate, yaw_rate), sender)
+                pitch_rate, yaw_rate), source)
 
     async def pitchyaw(
-        self, *values: float, sender: Address | None = None, device_id: float | None = None,
+        self, *values: float, source: Address | None = None, device_id: float | None = None,
     ) -> Transaction:
         """Send MAV_CMD_DO_GIMBAL_MANAGER_PITCHYAW with four values, degrees."""
         return await self.session.command(
             PITCHYAW, *values, float(LEVEL | VEHICLE_FRAME), 0.0,
-            self.device_id if device_id is None else device_id, sender=sender)
+            self.device_id if device_id is None else device_id, source=source)
 
     # Restoring
 
@@ -274,14 +274,14 @@ async def release_others(tester: ManagerTester) -> None:
     await tester.prepare()
     own = tester.session.address
     before = await tester.control()
-    for sender in (Address(tester.other.system, own.component),
+    for source in (Address(tester.other.system, own.component),
                    Address(own.system, own.component ^ 1)):
-        if sender == own:
+        if source == own:
             continue
-        one = await tester.configure(-3, -3, -3, -3, sender=sender)
+        one = await tester.configure(-3, -3, -3, -3, source=source)
         await tester.pause(0.5)
         if (control := await tester.control()) != before:
-            raise one.failure(f'from {sender}: {control_text(control)}')
+            raise one.failure(f'from {source}: {control_text(control)}')
 
 
 @controls('secondary', 'gives secondary control, and shows it', MESSAGES,
@@ -292,7 +292,7 @@ async def secondary(tester: ManagerTester) -> None:
         await tester.take(tester.session.address, tester.other)
     finally:
         # A manager may let only the holder end secondary control (GM-17).
-        await tester.configure(-3, -3, -3, -3, sender=tester.other)
+        await tester.configure(-3, -3, -3, -3, source=tester.other)
 
 
 @controls('unchanged', 'leaves control as it is at -1', MESSAGES,
@@ -320,13 +320,13 @@ async def configure_values(tester: ManagerTester) -> None:
 async def one_player(tester: ManagerTester) -> str:
     """Let the second player take control; the player without control must not move the gimbal."""
     before, other = await tester.begin(), tester.other
-    one = await tester.configure(*other, *NO_COMPONENT, sender=other)
+    one = await tester.configure(*other, *NO_COMPONENT, source=other)
     await tester.pause(0.5)
     holder = (await tester.control())[0]
     if one.accepted is not (holder == other):
         raise one.failure(f'{one.answer}, and then primary {holder}')
     loser = tester.session.address if holder == other else other
-    await tester.point(await tester.target(-2 * STEP, STEP), sender=loser)
+    await tester.point(await tester.target(-2 * STEP, STEP), source=loser)
     await tester.stays(before, f'primary {holder}, a setpoint of {loser}')
     return ('the second player took control' if holder == other else
             'the first player kept control')
@@ -337,18 +337,18 @@ async def one_player(tester: ManagerTester) -> str:
 async def _send_messages(tester: ManagerTester, pose: Pose) -> None:
     """Send each message that sets an attitude from the second player."""
     other = tester.other
-    await tester.point(pose, sender=other)
+    await tester.point(pose, source=other)
     await tester.send(gimbal.GimbalManagerSetPitchyaw, math.radians(pose.pitch),
-                      math.radians(pose.yaw), sender=other)
+                      math.radians(pose.yaw), source=other)
     await tester.send(gimbal.GimbalManagerSetManualControl, pitch_rate=-0.3, yaw_rate=0.3,
-                      sender=other)
+                      source=other)
 
 
 async def _clear_roi(tester: ManagerTester, pose: Pose) -> Transaction:
     """Clear the region from the second player; success would turn the gimbal to neutral."""
     await tester.requires(Capabilities.CAN_POINT_LOCATION_GLOBAL)
     return await tester.session.command(
-        GimbalCommand.DO_SET_ROI_NONE, tester.device_id, sender=tester.other)
+        GimbalCommand.DO_SET_ROI_NONE, tester.device_id, source=tester.other)
 
 
 async def _point_other_device(tester: ManagerTester, pose: Pose) -> Transaction:
@@ -467,7 +467,7 @@ REQUIREMENTS: tuple[Requirement[ManagerTester], ...] = (
     ignores('no-control-command', f'rejects {PITCHYAW_COMMAND} of a component without control '
             '(GM-19)', GIMBAL, STARTING, 'a command of the second player',
             lambda tester, pose: tester.pitchyaw(
-                pose.pitch, pose.yaw, NAN, NAN, sender=tester.other)),
+                pose.pitch, pose.yaw, NAN, NAN, source=tester.other)),
     ignores('no-control-messages', 'ignores setpoint messages of a component without control '
             '(GM-19)', GIMBAL, STARTING, 'setpoints of the second player', _send_messages),
     ignores('no-control-roi', 'rejects a region of interest of a component without control '

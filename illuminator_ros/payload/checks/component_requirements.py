@@ -339,12 +339,12 @@ def _for_each_command(
     return check
 
 
-def _not_at_first(one: Transaction, sender: Address) -> str:
+def _not_at_first(one: Transaction, own: Address) -> str:
     # On a lossy link more attempts show the loss of the link.
     return f'{len(one.sent)} attempts, {one.answer}' if len(one.sent) > 1 or not one.acks else ''
 
 
-def _more_than_once(one: Transaction, sender: Address) -> str:
+def _more_than_once(one: Transaction, own: Address) -> str:
     return f'{len(one.finals)} acknowledgements' if len(one.finals) > len(one.sent) else ''
 
 
@@ -353,16 +353,16 @@ def _delay(one: Transaction) -> float:
     return one.acks[0].at - one.sent[0] if len(one.sent) == 1 and one.acks else 0.0
 
 
-def _late(one: Transaction, sender: Address) -> str:
+def _late(one: Transaction, own: Address) -> str:
     return f'{_delay(one):.2f} s' if _delay(one) > PROMPT else ''
 
 
-def _to_others(one: Transaction, sender: Address) -> str:
+def _to_others(one: Transaction, own: Address) -> str:
     # The target fields are extensions, so they may be missing.
-    return ', '.join(f'to {ack.target}' for ack in one.acks if not ack.target.includes(sender))
+    return ', '.join(f'to {ack.target}' for ack in one.acks if not ack.target.includes(own))
 
 
-def _unfinished(one: Transaction, sender: Address) -> str:
+def _unfinished(one: Transaction, own: Address) -> str:
     reports = [ack for ack in one.acks if ack.result == MavResult.IN_PROGRESS]
     if not reports:
         return ''
@@ -373,7 +373,7 @@ def _unfinished(one: Transaction, sender: Address) -> str:
     return 'progress above 100 %' if any(100 < ack.progress < 255 for ack in reports) else ''
 
 
-def _busy(one: Transaction, sender: Address) -> str:
+def _busy(one: Transaction, own: Address) -> str:
     # The session never sends commands in parallel.
     return ', '.join(result_name(ack.result) for ack in one.acks
                      if ack.result == MavResult.TEMPORARILY_REJECTED)

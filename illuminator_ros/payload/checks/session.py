@@ -311,8 +311,8 @@ class Session(Endpoint):
     :param part_of: returns the component id of a part of the device, from a message of the
         device; the payload's messages of that component are recorded, too. 0 for no part.
     :ivar found: the present address of the device, once it is heard.
-    :ivar heard: all senders.
-    :ivar devices: the senders that are devices of this payload.
+    :ivar heard: the addresses of all components that were heard.
+    :ivar devices: the addresses of the devices of this payload among them.
     :ivar idle_until: end of the time in which the session only listened, s.
     :ivar transactions: all commands.
     :ivar versions: the number of frames of the device by MAVLink version.
@@ -480,13 +480,13 @@ class Session(Endpoint):
         """Return the messages that the device sent before the session sent a command."""
         return [(at, one) for at, one in self.received(cls) if at <= self.idle_until]
 
-    def send(self, message: Message, sender: Address | None = None) -> None:
+    def send(self, message: Message, source: Address | None = None) -> None:
         """Send a message from an address, by default the session's."""
-        self._give(message, self._describe(message) or message.name, sender)
+        self._give(message, self._describe(message) or message.name, source)
 
-    def _give(self, message: Message, text: str, sender: Address | None) -> None:
-        self.outgoing.append((sender or self.address, message))
-        self._note('>', text + (f' from {sender}' if sender else ''))
+    def _give(self, message: Message, text: str, source: Address | None) -> None:
+        self.outgoing.append((source or self.address, message))
+        self._note('>', text + (f' from {source}' if source else ''))
 
     def check_presence(self) -> None:
         """
@@ -527,23 +527,23 @@ class Session(Endpoint):
 
     async def command(
         self, command: int, *params: float, as_int: bool = False, confirmation: int = 0,
-        target: Address | None = None, sender: Address | None = None,
+        target: Address | None = None, source: Address | None = None,
     ) -> Transaction:
         """
         Send a command; repeat it while it is not acknowledged or is temporarily rejected.
 
         :param as_int: whether it is sent as COMMAND_INT.
         :param target: None for the device.
-        :param sender: the address that sends it, None for the session's.
+        :param source: the address that sends it, None for the session's.
         :raises DeviceLost: if the device has stopped sending.
         """
         for _ in range(REJECTIONS):
             # Separate requirements cover COMMAND_INT and other addresses.
             one = self._begin(
-                command, params, expected=not as_int and target is None and sender is None)
+                command, params, expected=not as_int and target is None and source is None)
             for attempt in range(ATTEMPTS):
                 self._send(one, target or self.device, confirmation + attempt, as_int=as_int,
-                           sender=sender)
+                           source=source)
                 if await self._answered(one):
                     break
                 self.check_presence()
@@ -585,7 +585,7 @@ class Session(Endpoint):
 
     def _send(
         self, one: Transaction, target: Address, confirmation: int = 0, *, as_int: bool = False,
-        sender: Address | None = None,
+        source: Address | None = None,
     ) -> None:
         values = [*map(float, one.params), *[0.0] * (7 - len(one.params))]
         message = messages.CommandInt(
@@ -595,7 +595,7 @@ class Session(Endpoint):
             *target, one.command, min(confirmation, 255), *values)
         one.sent.append(self.now)
         self._give(message, f'{message.name} to {target}: {one.text}'
-                   + (f', confirmation {confirmation}' if confirmation else ''), sender)
+                   + (f', confirmation {confirmation}' if confirmation else ''), source)
         one.lines.append(self.log[-1])
 
     async def _acknowledged(self, one: Transaction, timeout: float) -> bool:
