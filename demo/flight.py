@@ -61,13 +61,13 @@ from illuminator_ros.cli.simulator.csv_file import CsvFile  # noqa: E402
 from illuminator_ros.mavlink.link import Link  # noqa: E402
 from illuminator_ros.mavlink.messages import Address  # noqa: E402
 from illuminator_ros.mavlink.url import parse_url  # noqa: E402
+from illuminator_ros.payload.messages import GeoPoint  # noqa: E402
 from illuminator_ros.payload.rotation import enu_flu, flip, Quaternion  # noqa: E402
 from illuminator_ros.payload.simulated import Description, SimulatedComponents  # noqa: E402
 from illuminator_ros.rededge.messages import MAV_COMP_ID_CAMERA  # noqa: E402
 from illuminator_ros.rededge.simulated import (  # noqa: E402
     COLUMNS,
     DEFAULT_SYSTEM_ID,
-    Place,
     SimulatedRedEdge,
 )
 
@@ -151,7 +151,7 @@ class SimulatedCamera:
         address = Address(DEFAULT_SYSTEM_ID, MAV_COMP_ID_CAMERA)
         self._url = f'pty://{path}'
         self._device = SimulatedRedEdge(
-            address, validity=VALIDITY / speed, own_gps=Place(LATITUDE, LONGITUDE, 0.0))
+            address, validity=VALIDITY / speed, own_gps=GeoPoint(LATITUDE, LONGITUDE, 0.0))
         self._device.records.subscribe(CsvFile(str(images), tuple(COLUMNS)).append)
         self._device.set_clock(time.time(), time.monotonic())
         self._endpoint = SimulatedComponents(

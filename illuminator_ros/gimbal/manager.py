@@ -35,7 +35,6 @@ from .manager_setpoint import (
     Clipped,
     Demand,
     direction,
-    GeoPoint,
     GimbalModel,
     in_vehicle_frame,
     nudge,
@@ -71,7 +70,7 @@ from ..mavlink.command_sender import Command, CommandResult, CommandSender
 from ..mavlink.component import Payload
 from ..mavlink.messages import Address, command_name, MavResult
 from ..payload.listeners import Listeners
-from ..payload.messages import Attitude, GimbalDeviceAttitudeStatus, GlobalPositionInt
+from ..payload.messages import Attitude, GeoPoint, GimbalDeviceAttitudeStatus, GlobalPositionInt
 from ..payload.mount_attitude import (
     AXES,
     MountAttitude,

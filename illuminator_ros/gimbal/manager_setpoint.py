@@ -40,6 +40,7 @@ from .messages import (
 from ..mavlink.command_receiver import AnyCommand
 from ..mavlink.command_sender import DEGREE_SCALE
 from ..mavlink.messages import CommandInt, MavResult
+from ..payload.messages import GeoPoint
 from ..payload.mount_attitude import (
     AXES,
     Components,
@@ -486,19 +487,6 @@ def _from_angles(angles: Sequence[float]) -> Quaternion:
     if abs(pitch) > _RIGHT_ANGLE:
         pitch = math.copysign(_RIGHT_ANGLE, pitch)
     return Quaternion.from_euler(roll, pitch, yaw)
-
-
-class GeoPoint(NamedTuple):
-    """
-    A place.
-
-    :param latitude: and longitude, deg.
-    :param altitude: m above mean sea level.
-    """
-
-    latitude: float
-    longitude: float
-    altitude: float
 
 
 def read_roi(command: AnyCommand) -> tuple[GeoPoint, bool] | MavResult:

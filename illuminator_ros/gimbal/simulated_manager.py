@@ -31,14 +31,7 @@ from typing import NamedTuple
 
 from . import messages as gimbal
 from .axes import LEVEL, Range
-from .manager_setpoint import (
-    AnySetpoint,
-    Demand,
-    direction,
-    GeoPoint,
-    read_demand,
-    read_roi,
-)
+from .manager_setpoint import AnySetpoint, Demand, direction, read_demand, read_roi
 from .messages import Capabilities, DEVICE_ID_PARAM, GimbalCommand, NO_COMPONENT
 from .simulated_device import (
     COMMANDS,
@@ -59,7 +52,7 @@ from ..mavlink.messages import (
 )
 from ..payload import simulated
 from ..payload.faults import Behaviour, Fault, FaultTable
-from ..payload.messages import Attitude, GimbalDeviceAttitudeStatus, GlobalPositionInt
+from ..payload.messages import Attitude, GeoPoint, GimbalDeviceAttitudeStatus, GlobalPositionInt
 from ..payload.mount_attitude import MountFlags, UNSET_VECTOR, YawFrame
 from ..payload.simulated_settings import geo_point, integer, number, one_of, Setting, Values
 
@@ -252,8 +245,7 @@ class SimulatedManager(simulated.SimulatedDevice):
                 self.mount.motion.take_heading(
                     message.roll, message.pitch, message.yaw, message.yawspeed, now, math.inf)
         else:
-            self._position = GeoPoint(
-                message.lat / 1e7, message.lon / 1e7, message.alt / 1000.0)
+            self._position = message.place
             self._point_at_roi(now)
 
     def _is_for_device(self, device_id: float) -> bool:
@@ -408,7 +400,7 @@ SETTINGS: dict[str, Setting] = {
     'device_id': Setting('ID', 'gimbal_device_id, 1 to 6 (default: 1)', integer(1, 6)),
     'position': Setting('LAT,LON,ALT', 'of the vehicle until it sends GLOBAL_POSITION_INT, '
                         'degrees and m above mean sea level (default: '
-                        '47.397742,8.545594,488)', lambda text: GeoPoint(*geo_point(text))),
+                        '47.397742,8.545594,488)', geo_point),
     'heading': Setting('DEG', 'of the vehicle until it sends ATTITUDE (default: 0)',
                        number(-180, 360)),
 }

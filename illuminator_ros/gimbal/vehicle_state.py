@@ -19,10 +19,9 @@ from __future__ import annotations
 import math
 from typing import Generic, TypeVar
 
-from .manager_setpoint import GeoPoint
 from .messages import AutopilotStateForGimbalDevice
 from ..mavlink.messages import Address
-from ..payload.messages import Attitude, GlobalPositionInt
+from ..payload.messages import Attitude, GeoPoint, GlobalPositionInt
 from ..payload.rotation import Quaternion, Vector
 
 T = TypeVar('T')
@@ -75,8 +74,7 @@ class VehicleState:
             self._yaw_rate.set(message.yawspeed, now, link=True)
         elif message.lat or message.lon:
             # Autopilots send 0, 0 while they have no fix.
-            self._position.set(GeoPoint(
-                message.lat / 1e7, message.lon / 1e7, message.alt / 1e3), now, link=True)
+            self._position.set(message.place, now, link=True)
             self._velocity.set(
                 (message.vx / 100, message.vy / 100, message.vz / 100), now, link=True)
             self._home_altitude = (message.alt - message.relative_alt) / 1e3

@@ -17,8 +17,22 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 import math
+from typing import NamedTuple
 
 from ..mavlink import messages as mav
+
+
+class GeoPoint(NamedTuple):
+    """
+    A place.
+
+    :param latitude: and longitude, deg.
+    :param altitude: m above mean sea level.
+    """
+
+    latitude: float
+    longitude: float
+    altitude: float
 
 
 @mav.define(2, 'SYSTEM_TIME')
@@ -63,6 +77,11 @@ class GlobalPositionInt(mav.Message):
     vy: mav.Int16
     vz: mav.Int16
     hdg: mav.UInt16
+
+    @property
+    def place(self) -> GeoPoint:
+        """Return the position."""
+        return GeoPoint(self.lat / 1e7, self.lon / 1e7, self.alt / 1e3)
 
 
 @mav.define(285, 'GIMBAL_DEVICE_ATTITUDE_STATUS', extensions=3)

@@ -20,6 +20,8 @@ from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
+from .messages import GeoPoint
+
 # The values of settings by name, untyped: each is what its Setting.read returns.
 Values = Mapping[str, Any]
 
@@ -67,7 +69,7 @@ def integer(low: int, high: int) -> Callable[[str], int]:
     return read
 
 
-def geo_point(text: str) -> tuple[float, float, float]:
+def geo_point(text: str) -> GeoPoint:
     """
     Read ``LAT,LON,ALT``: degrees, and m above mean sea level.
 
@@ -77,8 +79,8 @@ def geo_point(text: str) -> tuple[float, float, float]:
     if len(parts) != 3:
         raise ValueError(f'{text!r} is not LAT,LON,ALT')
     latitude, longitude, altitude = parts
-    return (number(-90, 90)(latitude), number(-180, 180)(longitude),
-            number(-1000, 100_000)(altitude))
+    return GeoPoint(number(-90, 90)(latitude), number(-180, 180)(longitude),
+                    number(-1000, 100_000)(altitude))
 
 
 def text(value: str) -> str:

@@ -26,14 +26,14 @@ from dataclasses import dataclass, field, fields, replace
 from enum import Enum
 from functools import partial
 import math
-from typing import Any, Generic, NamedTuple, TypeVar
+from typing import Any, Generic, TypeVar
 
 from . import messages as rededge
 from ..mavlink.messages import Address, Heartbeat, Message, target_of
 from ..payload import simulated
 from ..payload.faults import Behaviour, Fault, FaultTable
 from ..payload.faults import FAULTS as COMPONENT_FAULTS
-from ..payload.messages import Attitude, GlobalPositionInt, SystemTime
+from ..payload.messages import Attitude, GeoPoint, GlobalPositionInt, SystemTime
 from ..payload.rotation import Quaternion
 from ..payload.simulated_settings import geo_point, number, Setting, Values
 
@@ -63,14 +63,6 @@ class Source(Enum):
     INJECTED = 'injected'
     OWN = 'own'
     NONE = 'none'
-
-
-class Place(NamedTuple):
-    """A position: degrees, and m above mean sea level."""
-
-    latitude: float
-    longitude: float
-    altitude: float
 
 
 @dataclass(frozen=True)
@@ -227,7 +219,7 @@ def _position(message: rededge.GpsRawInt | GlobalPositionInt) -> Values:
             'satellites': None if satellites == UNKNOWN_SATELLITES else satellites}
 
 
-def _own_position(place: Place | None) -> Values:
+def _own_position(place: GeoPoint | None) -> Values:
     """Return the columns of the position of its own GPS."""
     return {} if place is None else {
         'fix_type': FIX_3D, 'latitude_deg': place.latitude, 'longitude_deg': place.longitude,
@@ -307,7 +299,7 @@ class SimulatedRedEdge(simulated.SimulatedDevice):
 
     def __init__(
         self, address: Address, *, validity: float = 5.0, interval: float = 0.0,
-        own_gps: Place | None = None,
+        own_gps: GeoPoint | None = None,
     ) -> None:
         super().__init__(RedEdgeBehaviour(validity=validity))
         self.own_gps = own_gps
@@ -339,7 +331,7 @@ class SimulatedRedEdge(simulated.SimulatedDevice):
         self._interval = interval
         self._image_due = now + (interval or math.inf)
 
-    def set_own_gps(self, place: Place | None) -> None:
+    def set_own_gps(self, place: GeoPoint | None) -> None:
         """Set the position of its own GPS receiver, None without a fix."""
         self.own_gps = place
 
@@ -492,13 +484,13 @@ def _microseconds(seconds: float) -> int:
     return min(max(round(seconds * 1e6), 0), 2 ** 64 - 1)
 
 
-def read_place(text: str) -> Place | None:
+def read_place(text: str) -> GeoPoint | None:
     """
     Read ``LAT,LON,ALT`` or ``none``.
 
     :raises ValueError: if it is neither.
     """
-    return None if text == 'none' else Place(*geo_point(text))
+    return None if text == 'none' else geo_point(text)
 
 
 # Over a field near Zurich.

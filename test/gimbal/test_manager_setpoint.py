@@ -27,7 +27,6 @@ from illuminator_ros.gimbal.manager_setpoint import (
     Clipped,
     Demand,
     direction,
-    GeoPoint,
     GimbalModel,
     nudge,
     resolve,
@@ -35,6 +34,7 @@ from illuminator_ros.gimbal.manager_setpoint import (
     turned,
     turned_by,
 )
+from illuminator_ros.payload.messages import GeoPoint
 from illuminator_ros.payload.mount_attitude import MountFlags, STILL, YawFrame
 from illuminator_ros.payload.rotation import Quaternion, Vector
 import pytest

@@ -21,9 +21,10 @@ from typing import Any
 
 from illuminator_ros.mavlink.messages import Address
 from illuminator_ros.payload.checks.requirement import Verdict
+from illuminator_ros.payload.messages import GeoPoint
 from illuminator_ros.payload.simulated import Description, SimulatedComponents
 from illuminator_ros.rededge.checks import CHECKS, REQUIREMENTS
-from illuminator_ros.rededge.simulated import FAULTS, Place, SimulatedRedEdge
+from illuminator_ros.rededge.simulated import FAULTS, SimulatedRedEdge
 import pytest
 from support.checks_run import ChecksRun
 from support.virtual_link import START
@@ -84,7 +85,7 @@ def start(
 
     :param others: component ids of further cameras.
     """
-    camera = SimulatedRedEdge(address, own_gps=Place(47.0, 8.0, 400.0))
+    camera = SimulatedRedEdge(address, own_gps=GeoPoint(47.0, 8.0, 400.0))
     if fault:
         camera.behave(FAULTS.add(camera.behaviour, fault), START)
     camera.set_clock(UTC + START, START)

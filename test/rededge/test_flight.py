@@ -25,12 +25,13 @@ import sys
 from illuminator_ros.mavlink.command_sender import CommandSender
 from illuminator_ros.mavlink.component import Component
 from illuminator_ros.mavlink.messages import Address
+from illuminator_ros.payload.messages import GeoPoint
 from illuminator_ros.payload.rotation import enu_flu, flip, Quaternion
 from illuminator_ros.payload.simulated import Description, SimulatedComponents
 from illuminator_ros.rededge.client import RedEdgeClient, Settings
 from illuminator_ros.rededge.conversions import Position
 from illuminator_ros.rededge.feeder import FeederSettings, Input, PositionSource, Stamp, UNKNOWN
-from illuminator_ros.rededge.simulated import COLUMNS, Place, SimulatedRedEdge
+from illuminator_ros.rededge.simulated import COLUMNS, SimulatedRedEdge
 import pytest
 from support.virtual_link import START, VirtualLink
 
@@ -73,7 +74,7 @@ class Rig:
         commands = CommandSender(Address(1, 191))
         self.client = RedEdgeClient(commands, Settings(settings))
         self.camera = SimulatedRedEdge(
-            Address(255, 100), interval=IMAGE_INTERVAL, own_gps=Place(0.0, 0.0, 0.0))
+            Address(255, 100), interval=IMAGE_INTERVAL, own_gps=GeoPoint(0.0, 0.0, 0.0))
         cameras = SimulatedComponents([Description(Address(255, 100), self.camera)], START)
         self.camera.set_clock(UTC, START)
         self.link = PullableLink(Component(commands, [self.client]), cameras, version=1)

@@ -21,7 +21,7 @@ import math
 from typing import Any
 
 from illuminator_ros.mavlink.messages import Address, CommandLong, Heartbeat, heartbeat, Message
-from illuminator_ros.payload.messages import Attitude, GlobalPositionInt, SystemTime
+from illuminator_ros.payload.messages import Attitude, GeoPoint, GlobalPositionInt, SystemTime
 from illuminator_ros.payload.rotation import Vector
 from illuminator_ros.payload.simulated import Description, SimulatedComponents
 from illuminator_ros.rededge.messages import (
@@ -39,7 +39,6 @@ from illuminator_ros.rededge.simulated import (
     FAULTS,
     Image,
     MAX_IMAGES,
-    Place,
     SIMULATED,
     SimulatedRedEdge,
     Source,
@@ -50,7 +49,7 @@ HOST = Address(7, 191)
 START = 1000.0
 # UTC, s: of the camera's own GPS at START, and of the host.
 OWN_UTC, HOST_UTC = 1.8e9, 1.7e9
-OWN_PLACE = Place(47.0, 8.0, 400.0)
+OWN_PLACE = GeoPoint(47.0, 8.0, 400.0)
 FIX = GpsRawInt(int(HOST_UTC * 1e6), 3, 481234567, -91234567, 500_250, 120, 65535, 1234, 35999,
                 17)
 LEVEL_NORTH = Attitude(0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
@@ -275,7 +274,7 @@ def console(device: SimulatedRedEdge, line: str) -> Callable[[], None]:
     ('capture panel', lambda device: device.images[-1].trigger == 'console'),
     ('interval 2', lambda device: device.next_deadline() == START + 2.0),
     ('own-gps none', lambda device: device.own_gps is None),
-    ('own-gps -1,2.5,3', lambda device: device.own_gps == Place(-1.0, 2.5, 3.0)),
+    ('own-gps -1,2.5,3', lambda device: device.own_gps == GeoPoint(-1.0, 2.5, 3.0)),
 ])
 def test_command_of_the_console_has_its_effect(
         line: str, effect: Callable[[SimulatedRedEdge], bool]) -> None:

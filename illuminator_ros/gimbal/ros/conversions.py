@@ -23,6 +23,7 @@ from geometry_msgs.msg import QuaternionStamped, Vector3, Vector3Stamped
 from sensor_msgs.msg import NavSatFix
 from std_msgs.msg import Header
 
+from ...payload.messages import GeoPoint
 from ...payload.mount_attitude import AXES, YawFrame
 from ...payload.rotation import Quaternion, Vector
 from ...ros.conversions import read_quaternion, read_vector
@@ -113,9 +114,9 @@ def read_rates(message: Vector3Stamped) -> Vector:
     return rates
 
 
-def read_place(message: NavSatFix, geoid_separation: float) -> Vector:
+def read_place(message: NavSatFix, geoid_separation: float) -> GeoPoint:
     """
-    Return latitude and longitude, deg, and the altitude above mean sea level, m.
+    Return the place that a message has.
 
     :param geoid_separation: m; the altitude of a NavSatFix is above the ellipsoid.
     :raises ValueError: if the message does not have a place.
@@ -125,7 +126,7 @@ def read_place(message: NavSatFix, geoid_separation: float) -> Vector:
             and abs(place[2]) <= ALTITUDE_LIMIT):
         raise ValueError('latitude {:g}, longitude {:g}, altitude {:g} is not a place'.format(
             *place))
-    return place[0], place[1], place[2] - geoid_separation
+    return GeoPoint(place[0], place[1], place[2] - geoid_separation)
 
 
 def vector_message(header: Header, vector: Vector) -> Vector3Stamped:

@@ -35,8 +35,8 @@ from ..gimbal import Gimbal
 from ..messages import ErrorFlags, flag_names
 from ...payload import request
 from ...payload.command_sources import DEFAULT, describe
+from ...payload.messages import GeoPoint
 from ...payload.mount_attitude import MountFlags
-from ...payload.rotation import Vector
 from ...ros import node as ros_node
 from ...ros.command_sources import prefixes, release_services
 from ...ros.conversions import quaternion_message
@@ -243,11 +243,11 @@ class GimbalNode:
 
             return ros_node.CommandTopic(f'{prefix}{name}', type_, take, read)
 
-        def point(gimbal: Gimbal, place: Vector, now: float) -> str:
+        def point(gimbal: Gimbal, place: GeoPoint, now: float) -> str:
             pointing.offer(place, now)
             return ''
 
-        pointing = LatestOnly[Vector](functools.partial(self._point, source, f'{prefix}cmd/roi'))
+        pointing = LatestOnly[GeoPoint](functools.partial(self._point, source, f'{prefix}cmd/roi'))
         return (
             topic('cmd/attitude', QuaternionStamped,
                   lambda gimbal, value, now: gimbal.set_attitude(*value, now),
@@ -260,7 +260,7 @@ class GimbalNode:
                   lambda message: conversions.read_place(message, self._separation)))
 
     def _point(
-        self, source: str, topic: str, place: Vector, now: float, ended: Callable[[float], None],
+        self, source: str, topic: str, place: GeoPoint, now: float, ended: Callable[[float], None],
     ) -> None:
         def done(result: request.Result, now: float) -> None:
             if not result.success:

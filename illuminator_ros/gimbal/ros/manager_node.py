@@ -30,13 +30,12 @@ from .gimbals import GIMBAL_PARAMETERS, Gimbals, settings
 from .. import manager as gimbal_manager
 from ..axes import other_signs, Range
 from ..manager_control import ControlSettings, Role, RoleHolderChanged
-from ..manager_setpoint import GeoPoint
 from ..manager_state import ManagerState, StateChanged
 from ..manager_with_client import ManagerWithClient
 from ...mavlink.command_sender import CommandSender
 from ...mavlink.messages import Address, time_boot_ms
 from ...payload.arbitration import Cause, Policy
-from ...payload.messages import GimbalDeviceAttitudeStatus
+from ...payload.messages import GeoPoint, GimbalDeviceAttitudeStatus
 from ...payload.mount_attitude import AXES, from_mavlink, to_mavlink, YawFrame
 from ...payload.rotation import enu_ned, ned_frd, Quaternion, Vector
 from ...ros.conversions import quaternion_message, read_orientation, read_quaternion, read_vector
@@ -157,8 +156,8 @@ class ManagerNode(ServedPayload):
         self._manager.vehicle.set_velocity(velocity, now)
         self._take_imu((attitude, yaw_rate), now)
 
-    def _take_place(self, place: Vector, now: float) -> None:
-        self._manager.vehicle.set_position(GeoPoint(*place), now)
+    def _take_place(self, place: GeoPoint, now: float) -> None:
+        self._manager.vehicle.set_position(place, now)
 
     def _take_attitude(self, value: tuple[Quaternion, YawFrame], now: float) -> None:
         rotation, frame = value
@@ -299,7 +298,7 @@ def _within(value: float, limit: float) -> float:
     return value
 
 
-def _read_fix(message: NavSatFix, geoid_separation: float) -> Vector:
+def _read_fix(message: NavSatFix, geoid_separation: float) -> GeoPoint:
     """Return the place of a message; ValueError if it has no fix."""
     if message.status.status < NavSatStatus.STATUS_FIX:
         raise ValueError(f'no fix (status {message.status.status})')
