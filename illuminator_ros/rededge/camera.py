@@ -36,8 +36,11 @@ CAPTURE_TIMEOUT = 5.0
 # s in which the answer to a capture that had none may still come; captures fail meanwhile, since a
 # lost request looks the same.
 LATE_ANSWER = 15.0
-# Image indices that are remembered: the image of a new request has a new index.
-MAX_INDICES = 32
+# An image whose index is less than this behind the newest one is older; an index farther behind is
+# that of a restarted camera.
+OLDER_INDICES = 32
+# Requests without an answer that are remembered.
+MAX_LATE = 32
 # So many heartbeats in CONFLICT_WINDOW s show several components: each sends one a second.
 CONFLICT_HEARTBEATS = 10
 CONFLICT_WINDOW = 7.0
@@ -159,9 +162,9 @@ class Camera:
         self._round_trip: float | None = None
         self._unanswered_pings = 0
         self._capture: _Capture | None = None
-        self._indices: deque[int] = deque(maxlen=MAX_INDICES)
+        self._newest: int | None = None
         # The ends of the times in which late answers to captures may come, s.
-        self._late: deque[float] = deque(maxlen=MAX_INDICES)
+        self._late: deque[float] = deque(maxlen=MAX_LATE)
         # The index of the latest image that a request has triggered, and the time until which its
         # CAMERA_FEEDBACK may still come, s.
         self._triggered = 0, -math.inf
@@ -177,7 +180,7 @@ class Camera:
         return CameraSnapshot(
             self._address, self._connected, self._heard_at, self._loss(now),
             self._is_conflict(now), self._round_trip, self._unanswered_pings, self._images,
-            self._indices[-1] if self._indices else None)
+            self._newest)
 
     def _is_conflict(self, now: float) -> bool:
         return (len(self._heartbeats) == CONFLICT_HEARTBEATS
@@ -222,7 +225,7 @@ class Camera:
             self._connected = False
             self._heartbeats.clear()
             # After a restart the camera counts its images from the beginning.
-            self._indices.clear()
+            self._newest = None
             self._emit(CameraLost(self.target, reason))
 
     def _loss(self, now: float) -> str:
@@ -292,7 +295,7 @@ class Camera:
     def take_status(self, message: rededge.CameraStatus, now: float) -> None:
         """Take CAMERA_STATUS, which reports that an image was triggered."""
         if message.event_id == rededge.CameraStatusType.TRIGGER:
-            if message.img_idx == self._triggered[0] and message.img_idx not in self._indices:
+            if message.img_idx == self._triggered[0] and self._is_new(message.img_idx):
                 # Each image is triggered once: the camera has restarted and counts from the start.
                 self._triggered = 0, -math.inf
             self._take_index(message.img_idx, now)
@@ -301,8 +304,6 @@ class Camera:
         """Take CAMERA_FEEDBACK, which reports that an image was taken."""
         self._images += 1
         self._take_index(message.img_idx, now)
-        if message.img_idx == self._triggered[0]:
-            self._triggered = 0, -math.inf
         self._emit(ImageTaken(message))
         capture = self._capture
         if (capture is not None and capture.index == message.img_idx
@@ -313,11 +314,15 @@ class Camera:
                 True, f'image {capture.index} taken, confirmed after '
                       f'{format_seconds(now - capture.sent_at)}{note}')
 
+    def _is_new(self, index: int) -> bool:
+        """Return whether an image is newer than all others; its index has 16 bits."""
+        return self._newest is None or (self._newest - index) & 0xFFFF >= OLDER_INDICES
+
     def _take_index(self, index: int, now: float) -> None:
         """Record an image; a request causes the first new image after it."""
-        if index in self._indices:
+        if not self._is_new(index):
             return
-        self._indices.append(index)
+        self._newest = index
         triggered, until = self._triggered
         if index == triggered and now < until:
             # The camera was lost meanwhile.

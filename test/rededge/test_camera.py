@@ -16,6 +16,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import Any
 
 from illuminator_ros.mavlink.command_sender import CommandSender
@@ -53,9 +54,10 @@ class Rig:
         self.results: list[tuple[bool, str]] = []
         self.client.events.subscribe(self.events.append)
         self.component.link_opened(self.now)
+        # Our own heartbeats then coincide with no other deadline.
+        self.run(0.3)
         if connected:
             self.hear(BEAT)
-        self.run(0.0)
 
     def hear(self, *messages: Message, source: Address = NEW) -> None:
         for message in messages:
@@ -149,6 +151,10 @@ def test_two_components_with_the_camera_s_id_are_noticed() -> None:
         rig.hear(BEAT, source=ADOPTED)
         rig.run(1.0, beats=True)
     assert rig.state.conflict
+    rig.capture()
+    rig.hear(status(1), feedback(1))
+    assert rig.results == [(True, 'image 1 taken, confirmed after 0 ms; several components have '
+                                  "the camera's id, so another may have taken it")]
     rig.run(10.0, beats=True)
     assert not rig.state.conflict
 
@@ -166,6 +172,7 @@ def test_ping_answers_with_the_round_trip_by_our_clock_re_11() -> None:
     request = rig.ping()
     rig.run(0.25)
     rig.hear(reply(request, time_usec=1))
+    rig.run(2.1, beats=True)
     assert rig.results == [(True, '250.0 ms round trip')]
     assert rig.state.round_trip == pytest.approx(0.25)
 
@@ -195,7 +202,7 @@ def test_a_lost_ping_is_sent_again_with_another_number_re_12() -> None:
 
 def test_a_camera_that_hears_nothing_is_noticed() -> None:
     rig = Rig()
-    rig.run(4.9, beats=True)
+    rig.run(4.6, beats=True)
     assert not rig.state.is_unresponsive
     rig.run(3.0, beats=True)
     assert rig.state.is_unresponsive
@@ -208,6 +215,7 @@ def test_no_request_waits_without_a_link() -> None:
     rig.ping()
     rig.capture()
     rig.component.link_closed(rig.now, 'unplugged')
+    assert rig.component.next_deadline() == math.inf
     rig.client.camera.ping(rig.now, rig.take_result)
     rig.capture()
     assert rig.results == [
@@ -267,9 +275,29 @@ def test_a_late_answer_does_not_confirm_the_next_capture() -> None:
     rig.capture()
     rig.hear(feedback(3))
     assert len(rig.results) == 3
+    rig.hear(status(4), feedback(4))
+    assert rig.results[3:] == [(True, 'image 4 taken, confirmed after 0 ms')]
 
 
-@pytest.mark.parametrize('triggered', [[], [status(1)]], ids=['no status', 'status'])
+@pytest.mark.parametrize(('newer', 'older'), [(2, 1), (0, 0xFFFF)])
+def test_an_older_image_than_the_newest_does_not_confirm_a_capture(newer: int, older: int) -> None:
+    rig = Rig()
+    rig.capture()
+    rig.run(5.0, beats=True)
+    rig.capture()
+    rig.hear(status(newer), feedback(older))
+    assert rig.results == [(False, NO_ANSWER)]
+
+
+def test_an_image_that_was_not_requested_here_is_reported() -> None:
+    rig = Rig()
+    rig.hear(status(3), feedback(3))
+    assert rig.events[1:] == [ImageTaken(feedback(3))]
+    assert (rig.state.images, rig.state.image_index) == (1, 3)
+
+
+@pytest.mark.parametrize('triggered', [[], [status(1)], [status(1), status(1)]],
+                         ids=['no status', 'status', 'status twice'])
 @pytest.mark.parametrize('end', ['link', 'heartbeat', 'both'])
 def test_an_answer_from_before_a_loss_does_not_confirm_the_next_capture(
         end: str, triggered: list[Message]) -> None:
