@@ -169,7 +169,7 @@ def test_fused_position_needs_a_velocity_since_none_can_be_left_unknown_re_18() 
 
 @pytest.mark.parametrize('settings', [{}, FUSED])
 @pytest.mark.parametrize(('position', 'age', 'reason'), [
-    (replace(HERE, status=-1), 0.0, 'no fix (status -1)'),
+    (replace(HERE, status=-1), 1.1, 'no fix (status -1)'),
     (replace(HERE, latitude=math.nan), 0.0,
      'latitude of ~/fix: nan deg is outside -90 to 90 deg'),
     (HERE, 1.1, 'its stamp is 1.10 s old by the ROS clock'),
@@ -279,6 +279,7 @@ def test_an_old_reference_or_a_jump_of_ros_time_ends_the_position_until_a_new_re
     rig.feeder.clock_jumped()
     assert rig.fix() == []
     assert rig.state(Input.FIX)[1] == 'ROS time has jumped: waiting for ~/time_reference'
+    assert (Input.TIME_REFERENCE,) in rig.feeder.snapshot(rig.now).needed
     rig.reference(EPOCH)
     assert classes(rig.fix()) == [GpsRawInt]
 
@@ -291,6 +292,7 @@ def test_after_a_step_back_of_the_clock_fixes_and_attitudes_are_sent_again() -> 
     rig.clock -= 3600.0
     rig.feeder.clock_jumped()
     assert classes(rig.fix()) == [GpsRawInt]
+    assert rig.mount() == []
     assert classes(rig.imu()) == [Attitude, MountStatus]
 
 
@@ -300,6 +302,15 @@ def test_a_fix_that_another_has_overtaken_is_refused_however_old_it_is_re_29() -
     rig.run(0.1)
     assert rig.fix(age=0.5) == []
     assert rig.fix(age=-0.8) == []
+
+
+@pytest.mark.parametrize(('name', 'take'), [(Input.IMU, Rig.imu), (Input.MOUNT, Rig.mount)])
+def test_an_attitude_or_mount_that_another_has_overtaken_is_refused_re_29(
+        name: Input, take: Callable[..., Any]) -> None:
+    rig = Rig()
+    take(rig)
+    take(rig, age=0.1)
+    assert rig.state(name) == (InputState.OK, 'its stamp is not newer than the last')
 
 
 def test_satellites_are_sent_for_the_web_page_if_that_is_asked_for_re_28() -> None:
@@ -399,6 +410,7 @@ def test_a_mount_that_moves_is_sent_with_the_attitude_of_the_same_instant_re_26(
         # Pan of a camera that looks down is its roll; yaw from north is 90 degrees less.
         assert math.degrees(one.yaw) - 90 + other.pointing_b / 100 == pytest.approx(0, abs=0.02)
         assert (other.pointing_a, other.pointing_c) == (0, 0)
+    assert len({one.yaw for one, _ in pairs if isinstance(one, Attitude)}) == len(pairs)
 
 
 @pytest.mark.parametrize('frame_id', ['', 'boat/base_link', 'base_link_stabilized', 'map'])
@@ -438,7 +450,9 @@ def test_mounts_in_different_frames_are_not_mixed() -> None:
 def test_without_its_moving_mount_no_attitude_is_sent_and_no_fixed_mount_re_29_re_30(
         expected: Callable[[Rig], Any]) -> None:
     rig = Rig()
+    rig.feeder.link_opened(rig.now)
     expected(rig)
+    assert rig.feeder.next_deadline() > rig.now
     rig.feeder.link_opened(rig.now)
     rig.feeder.set_fixed_mount((0.0, 0.0, 0.0), rig.now)
     rig.take()
@@ -480,6 +494,8 @@ def test_each_input_reports_when_it_comes_and_when_it_is_missing_re_30() -> None
     assert rig.state(Input.FIX) == (InputState.MISSING, '')
     rig.fix()
     rig.imu()
+    rig.run(0.1)
+    rig.fix()
     rig.run(1.5)
     assert [(one.input, one.state) for one in rig.events] == [
         (Input.FIX, InputState.OK), (Input.IMU, InputState.OK), (Input.IMU, InputState.STALE),
@@ -487,7 +503,7 @@ def test_each_input_reports_when_it_comes_and_when_it_is_missing_re_30() -> None
     snapshot = rig.feeder.snapshot(rig.now)
     assert snapshot.inputs[Input.FIX].age == pytest.approx(1.5)
     assert snapshot.inputs[Input.VELOCITY].age is None
-    assert (snapshot.positions, snapshot.attitudes) == (1, 1)
+    assert (snapshot.positions, snapshot.attitudes) == (2, 1)
 
     rig.fix(replace(HERE, latitude=math.nan))
     rig.run(1.5)
