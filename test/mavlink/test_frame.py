@@ -241,6 +241,12 @@ def test_frame_that_is_cut_short_or_has_noise_inside_costs_no_other(
     assert authentic(found) == others
 
 
+@pytest.mark.parametrize('missing', [1, 6, 12])
+def test_a_signature_that_is_cut_short_costs_no_frame_after_it(missing: int) -> None:
+    found = Decoder().feed(SIGNED[0][:-missing] + SIGNED[1] + V2[0])
+    assert authentic(found) == [SIGNED[1], V2[0]]
+
+
 @given(st.lists(st.tuples(frames, st.binary(min_size=6, max_size=6)), min_size=1, max_size=8))
 @example([(SIGNED[0], b'\xfd\xb5\x00\xbe\x8a\xdc'), (SIGNED[0], bytes(6))])
 @PROPERTY
