@@ -33,7 +33,7 @@ from .executor import NodeExecutor
 from .graph import unheard_publishers
 from .ignored_parameters import ignored_sections, unknown_parameters
 from .logger_services import LoggerServices
-from .node_manager import NodeManager
+from .node_manager import NodeManager, without_node_name
 from .parameters import (
     declare_link_parameters,
     declare_payloads,
@@ -88,6 +88,7 @@ class Bridge:
         self.log = NodeLog(node.get_logger())
         frame_log = LogForwarder(self.log)
         kinds = [_load(name, types) for name in declare_payloads(node, payload)]
+        _check_names(node, kinds)
         parameters = _link_parameters(node, kinds, url)
         values = [declare_read_only(node, kind.parameters) for kind in kinds]
         commands = CommandSender(
@@ -118,7 +119,8 @@ class Bridge:
         self._executor = NodeExecutor(node.context, self.log)
         self._executor.add_node(node)
         self._own_nodes = [node, *(
-            PayloadNode(kind.node_name, namespace=node.get_namespace(), context=node.context)
+            PayloadNode(kind.node_name, namespace=node.get_namespace(), context=node.context,
+                        cli_args=without_node_name(arguments), use_global_arguments=False)
             for kind in kinds[1:])]
         self._logs = [self.log, *(NodeLog(own.get_logger()) for own in self._own_nodes[1:])]
         self._payloads: list[ServedPayload] = []
@@ -303,6 +305,13 @@ def _link_parameters(node: Node, kinds: Sequence[RosPayload], url: str) -> LinkP
             f'mavlink_version: {parameters.mavlink_version}, but {needs}; a link sends one '
             'version, so payloads that need different ones need a process each')
     return parameters
+
+
+def _check_names(node: Node, kinds: Sequence[RosPayload]) -> None:
+    if node.get_name() in (kind.node_name for kind in kinds[1:]):
+        raise ParameterError(
+            f'payloads: two nodes would be called {node.get_name()!r}: name that payload first, '
+            'or give the first node another name with -r __node:=NAME')
 
 
 def _load(name: str, types: Mapping[str, PayloadType]) -> RosPayload:

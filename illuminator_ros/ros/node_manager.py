@@ -165,7 +165,7 @@ def without_node_name(arguments: Sequence[str]) -> list[str]:
     """
     Return the ROS arguments without those that name the node.
 
-    ``-r __node:=spot`` names every node of a process; further devices keep names of their own.
+    ``-r __node:=spot`` names every node of a process; nodes after the first keep their own names.
     """
     kept: list[str] = []
     for argument in arguments:

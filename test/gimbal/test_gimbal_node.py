@@ -370,6 +370,15 @@ def test_gimbal_is_served_beside_a_light_with_one_address(own_ros: Ros) -> None:
         assert {'gimbal_device_id', 'beam_range'} <= {*Parameters(own_ros, '/gimbal').names()}
 
 
+def test_a_name_of_the_first_node_leaves_the_gimbal_beside_the_light_its_name(
+        own_ros: Ros) -> None:
+    # ros2 launch names the first node, too.
+    with running_bridge(own_ros.domain, free_port(), '-r', '__node:=spot',
+                        payloads='[illuminator, gimbal]'):
+        for name in ('spot', 'gimbal'):
+            assert own_ros.subscribe(Bool, f'/{name}/connected').wait().data is False
+
+
 def test_node_of_a_gimbal_that_is_silent_for_long_is_removed(
         own_ros: Ros) -> None:
     port = free_port()
