@@ -148,6 +148,18 @@ def test_a_velocity_is_stale_by_its_stamp_and_refused_if_it_is_repeated_re_29_re
     assert rig.state(Input.VELOCITY)[0] is InputState.OK
 
 
+@pytest.mark.parametrize(('speed', 'age', 'reason'), [
+    (math.nan, 0.0, 'a component is not a finite number'),
+    (math.inf, 0.0, 'a component is not a finite number'),
+    (3.0, 1.1, 'its stamp is 1.10 s old by the ROS clock'),
+    (3.0, -1.1, 'its stamp is 1.10 s ahead of the ROS clock')])
+def test_a_velocity_that_cannot_be_trusted_is_refused_with_the_reason_re_30(
+        speed: float, age: float, reason: str) -> None:
+    rig = Rig()
+    rig.velocity(speed, 4.0, 0.0, age=age)
+    assert rig.state(Input.VELOCITY) == (InputState.REFUSED, reason)
+
+
 def test_fused_position_comes_with_its_utc_and_never_with_gps_raw_int_re_17_re_19() -> None:
     rig = Rig(**FUSED)
     rig.velocity(1.0, 2.0, 3.0)
@@ -226,11 +238,11 @@ def test_an_image_has_its_own_ros_time_or_the_present_one_while_that_is_not_know
     assert rig.image_time(EPOCH) == rig.stamp().time
 
 
-def test_an_image_with_a_time_that_no_stamp_can_have_has_the_present_one_re_14() -> None:
+def test_an_image_without_a_time_that_a_stamp_can_have_has_the_present_one_re_14() -> None:
     rig = Rig()
     present = rig.stamp().time
-    assert [rig.image_time(seconds) for seconds in (2**31 - 1, 2**31, 4 * 10**9)] == [
-        (2**31 - 1) * 10**9, present, present]
+    assert [rig.image_time(seconds) for seconds in (0, 2**31 - 1, 2**31, 4 * 10**9)] == [
+        present, (2**31 - 1) * 10**9, present, present]
     # ROS time began with the boot, after this image.
     since_boot(rig)
     rig.reference(EPOCH)
@@ -426,6 +438,15 @@ def test_a_mount_in_any_frame_of_a_gimbal_is_sent_relative_to_the_vehicle_re_24(
     assert isinstance(sent, MountStatus)
     assert (sent.pointing_b, sent.pointing_a, sent.pointing_c) == tuple(
         round(100 * angle) for angle in mount_angles(mount, MountFrame.CAMERA))
+
+
+@pytest.mark.parametrize(('age', 'reason'), [
+    (0.6, 'its stamp is 600 ms old by the ROS clock'),
+    (-0.6, 'its stamp is 600 ms ahead of the ROS clock')])
+def test_a_mount_of_another_time_is_refused_re_30(age: float, reason: str) -> None:
+    rig = Rig()
+    rig.mount(age=age)
+    assert rig.state(Input.MOUNT) == (InputState.REFUSED, reason)
 
 
 @pytest.mark.parametrize('frame_id', ['camera_link', 'odom/', '/'])
