@@ -135,8 +135,8 @@ class Link:
         self._connecting = False
         self._connect_at = -math.inf
         self._channel: Channel | None = None
-        self._receiver = FrameReader(self._signing, self._classes)
-        self._router = RoutingTable()
+        self._reader = FrameReader(self._signing, self._classes)
+        self._routes = RoutingTable()
         # The address and the peer that the last frame came from, and its time, s.
         self._heard_last: tuple[Address, Peer, float] | None = None
         self._traffic = Traffic()
@@ -287,12 +287,12 @@ class Link:
         channel, status = self._channel, self._status
         return LinkSnapshot(
             status.state, status.since, channel.name if channel else self._label, status.reason,
-            status.openings, self._router.peer_count(now), self._traffic.snapshot(now),
-            copy.copy(self._receiver.counters), copy.copy(self._signing.counters))
+            status.openings, self._routes.peer_count(now), self._traffic.snapshot(now),
+            copy.copy(self._reader.counters), copy.copy(self._signing.counters))
 
     def peer_count_of(self, source: Address, now: float) -> int:
         """Return over how many peers a component is heard, which may be several senders."""
-        return self._router.peer_count_of(source, now)
+        return self._routes.peer_count_of(source, now)
 
     def reset_loss(self, source: Address) -> None:
         """Forget recent losses of a component: its sequence numbers have restarted."""
@@ -321,7 +321,7 @@ class Link:
 
     def _run_once(self) -> None:
         """Wait for the transport, a call or a deadline, and handle it."""
-        due = min(self._due, self._receiver.next_deadline())
+        due = min(self._due, self._reader.next_deadline())
         now = self.clock()
         wait = min(max(due - now, self._pause), MAX_WAIT)
         self._pause = 0.0
@@ -350,7 +350,7 @@ class Link:
 
     def _collect(self, now: float) -> None:
         """Let foreign frames collect on a busy link."""
-        foreign = self._receiver.counters.foreign
+        foreign = self._reader.counters.foreign
         count, gap = foreign - self._foreign_before, now - self._foreign_at
         if not count or self._channel is None or self._channel.more:
             return
@@ -377,7 +377,7 @@ class Link:
         """Return when :meth:`_poll` is due."""
         return min(
             self.endpoint.next_deadline(), self._announce_at, self._proven_at, self._store_due,
-            self._status.next_deadline(), self._stream_due(), self._receiver.next_deadline(),
+            self._status.next_deadline(), self._stream_due(), self._reader.next_deadline(),
             math.inf if self._channel is not None or self._connecting else self._connect_at)
 
     def _poll(self) -> None:
@@ -425,7 +425,7 @@ class Link:
 
     def _take(self, channel: Channel, peer: Peer, data: bytes) -> None:
         now = self.clock()
-        frames = self._receiver.take(peer, data, now, self._wall_clock())
+        frames = self._reader.take(peer, data, now, self._wall_clock())
         if frames:
             for frame in frames:
                 if isinstance(frame, Frame):
@@ -473,7 +473,7 @@ class Link:
             if _frame_log.isEnabledFor(logging.DEBUG):
                 _frame_log.debug('new peer %s on %s', peer, channel.name)
             self._safe_call(self.endpoint.link_opened, now)
-        self._router.heard(source, peer, now)
+        self._routes.heard(source, peer, now)
 
     def _poll_channel(self, channel: Channel, now: float) -> None:
         if now >= self._proven_at:
@@ -481,7 +481,7 @@ class Link:
             self._proven_at = math.inf
             self._connector.backoff.succeeded()
             self._status.take(LinkInput.PROVED, now, channel.name)
-        for peer, frame in self._receiver.give_up(now, self._wall_clock()):
+        for peer, frame in self._reader.give_up(now, self._wall_clock()):
             self._accept(channel, peer, frame, now)
         if now >= self._announce_at:
             self._announce_at = now + ANNOUNCE_INTERVAL
@@ -530,7 +530,7 @@ class Link:
         for source, message in messages:
             if getattr(message, 'target_system', 0):
                 self._answer_expected_until = now + ANSWER_TIME
-            towards = (self._router.towards(message, all_peers, now) if len(all_peers) > 1
+            towards = (self._routes.towards(message, all_peers, now) if len(all_peers) > 1
                        else all_peers)
             if frames and towards != peers:
                 self._send(frames, peers, now)
@@ -626,8 +626,8 @@ class Link:
         with contextlib.suppress(OSError):
             channel.close()
         self._proven_at = self._announce_at = math.inf
-        self._receiver.clear()
-        self._router.clear()
+        self._reader.clear()
+        self._routes.clear()
         self._heard_last = None
 
     def _safe_call(self, function: Callable[..., None], *arguments: object) -> None:
