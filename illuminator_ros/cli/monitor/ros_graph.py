@@ -27,7 +27,7 @@ from rcl_interfaces.srv import GetParameters, SetParametersAtomically
 from rclpy.clock import Clock, ClockType
 from rclpy.node import Node
 from rclpy.parameter import Parameter, parameter_value_to_python
-from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
+from rclpy.qos import QoSProfile, ReliabilityPolicy
 from rclpy.subscription import Subscription
 from sensor_msgs.msg import Temperature
 from std_msgs.msg import Bool, Float32, Float64, String, UInt32
@@ -36,6 +36,7 @@ from std_srvs.srv import SetBool, Trigger
 from .key_bindings import Ask, Request, Service
 from .model import Diagnosis, DiscoveredLights, Outcome, Values
 from ...ros.graph import type_name
+from ...ros.node import STATE_QOS, STREAM_QOS
 
 if TYPE_CHECKING:
     from rclpy.task import Future
@@ -48,9 +49,6 @@ TOPICS: dict[str, type[object]] = {
 }
 # A node that publishes these topics with their types is a light.
 SIGNATURE = ('connected', 'enabled', 'brightness', 'error_flags')
-STATE_QOS = QoSProfile(depth=1, reliability=ReliabilityPolicy.RELIABLE,
-                       durability=DurabilityPolicy.TRANSIENT_LOCAL)
-STREAM_QOS = QoSProfile(depth=10, reliability=ReliabilityPolicy.RELIABLE)
 EVENT_QOS = QoSProfile(depth=100, reliability=ReliabilityPolicy.RELIABLE)
 # s between queries of the graph.
 QUERY_INTERVAL = 0.5
