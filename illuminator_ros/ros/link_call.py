@@ -18,7 +18,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 import threading
-from typing import Any, Generic, TypeVar
+from typing import Any, TypeVar
 
 from .throttled_log import NodeLog
 from ..mavlink.link import CALLER_WAIT, Link
@@ -94,39 +94,3 @@ class LinkCalls:
             waiting = tuple(self._waiting.items())
         for end, refusal in waiting:
             end(refusal(reason))
-
-
-class LatestOnly(Generic[T]):
-    """
-    Executes one request after the other; of those that come meanwhile only the newest.
-
-    For turns of the link.
-
-    :param start: starts a request, given its value, the time (s), and the function to call with
-        the time when it has ended.
-    """
-
-    def __init__(self, start: Callable[[T, float, Callable[[float], None]], None]) -> None:
-        self._start = start
-        self._waiting: list[T] = []
-        self._is_running = False
-
-    def offer(self, value: T, now: float) -> None:
-        """Execute a request, unless a newer one comes before it is started."""
-        self._waiting[:] = [value]
-        if not self._is_running:
-            self._start_next(now)
-
-    def _start_next(self, now: float) -> None:
-        self._is_running = True
-
-        def ended(now: float) -> None:
-            self._is_running = False
-            if self._waiting:
-                self._start_next(now)
-
-        try:
-            self._start(self._waiting.pop(), now, ended)
-        except Exception:
-            self._is_running = False
-            raise

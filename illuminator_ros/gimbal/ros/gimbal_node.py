@@ -41,7 +41,6 @@ from ...ros import node as ros_node
 from ...ros.command_sources import prefixes, release_services
 from ...ros.conversions import quaternion_message
 from ...ros.diagnostics_publisher import DiagnosticsSource, MakeReports
-from ...ros.link_call import LatestOnly
 from ...ros.parameter_services import ParameterServices
 from ...ros.payload import Host
 from ...ros.throttled_log import NodeLog
@@ -247,7 +246,7 @@ class GimbalNode:
             pointing.offer(place, now)
             return ''
 
-        pointing = LatestOnly[GeoPoint](functools.partial(self._point, source, f'{prefix}cmd/roi'))
+        pointing = _LatestPlace(functools.partial(self._point, source, f'{prefix}cmd/roi'))
         return (
             topic('cmd/attitude', QuaternionStamped,
                   lambda gimbal, value, now: gimbal.set_attitude(*value, now),
@@ -298,3 +297,36 @@ def _refusal(gimbal: Gimbal, name: str, now: float) -> str:
     if name == 'release_control':
         return gimbal.refusal_of_claim(DEFAULT)
     return gimbal.claim(DEFAULT, now)
+
+
+class _LatestPlace:
+    """
+    Sends one place after the other; of those that come meanwhile only the newest.
+
+    :param send: starts to send a place, given the time (s), and the function to call with the
+        time when it has ended.
+    """
+
+    def __init__(
+        self, send: Callable[[GeoPoint, float, Callable[[float], None]], None],
+    ) -> None:
+        self._send = send
+        self._waiting: GeoPoint | None = None
+        self._is_sending = False
+
+    def offer(self, place: GeoPoint, now: float) -> None:
+        """Send a place, unless a newer one comes before it is sent."""
+        self._waiting = place
+        if not self._is_sending:
+            self._send_next(now)
+
+    def _send_next(self, now: float) -> None:
+        place, self._waiting = self._waiting, None
+        self._is_sending = place is not None
+        if place is None:
+            return
+        try:
+            self._send(place, now, self._send_next)
+        except Exception:
+            self._is_sending = False
+            raise
