@@ -224,6 +224,15 @@ def test_counting_foreign_frames_finds_the_same_frames_as_reading_them(
     assert replace(counting.counters, foreign=0) == reading.counters
 
 
+def test_foreign_frames_around_another_of_their_source_stay_in_order() -> None:
+    data = b''.join(encode_frame(
+        id_, b'\1', sequence=sequence, source=Address(1, 1), crc_extra=LAYOUTS[id_].crc_extra)
+        for sequence, id_ in enumerate((1, 0, 1)))
+    found = Decoder().sort(data, {1: bytes((LAYOUTS[1].crc_extra,))})
+    assert [one.sequences if isinstance(one, ForeignFrames) else one.sequence
+            for one in found] == [b'\0', 1, b'\2']
+
+
 # A signature, which the checksum does not cover, can only be cut short by a MAVLink 2 frame.
 @given(st.one_of(st.tuples(st.sampled_from(SIGNED), st.lists(st.sampled_from(V2), max_size=5)),
                  st.tuples(st.sampled_from(UNSIGNED), st.lists(frames, max_size=5))),
