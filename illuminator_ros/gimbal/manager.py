@@ -133,7 +133,7 @@ class DemandRefused:
 
 @dataclass(frozen=True)
 class SetpointClipped:
-    """Angles beyond the ranges of the device were clipped."""
+    """Angles beyond the ranges of the device are clipped, other ones than before."""
 
     clipped: tuple[Clipped, ...]
 
@@ -531,9 +531,10 @@ class GimbalManager(Payload):
         self._send_due = now + (
             FOLLOW_INTERVAL if setpoint.turning != STILL or converts or self._roi is not None
             else HOLD_INTERVAL)
+        before = self._clipped
         attitude, self._clipped = clip(
-            setpoint, self.model.ranges, ahead, self._offsets, self._clipped)
-        if self._clipped:
+            setpoint, self.model.ranges, ahead, self._offsets, before)
+        if self._clipped and self._clipped != before:
             self.events.emit(SetpointClipped(self._clipped))
         sent = setpoint
         if attitude is not setpoint.attitude:

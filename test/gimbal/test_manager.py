@@ -549,6 +549,17 @@ def test_gm_9_limits_are_applied_after_mixing_and_reported() -> None:
     assert (clipped.axis, round(clipped.requested, 4), clipped.limit) == ('pitch', 0.6, 0.5)
 
 
+def test_a_clipped_setpoint_is_reported_once_though_it_is_sent_each_second() -> None:
+    rig = in_control()
+    rig.points(PILOT, 2.0, 0.0)
+
+    rig.run(3.0, each=rig.heartbeats(PILOT))
+
+    assert len(of(gimbal_manager.SetpointClipped, rig.events)) == 1
+    rig.points(PILOT, 2.1, 0.0)
+    assert len(of(gimbal_manager.SetpointClipped, rig.events)) == 2
+
+
 def test_gm_9_an_offset_beyond_a_stop_does_not_turn_the_gimbal_to_the_other() -> None:
     rig = in_control(device=information(yaw_min=-3.1, yaw_max=3.1))
     rig.points(PILOT, 0.0, 3.0)
