@@ -27,8 +27,8 @@ from .transport import Peer
 
 # Peers whose incomplete frames are kept apart.
 MAX_DECODERS = 64
-# s; the longest frame takes 0.3 s at 9600 baud. An older beginning of
-# a frame is noise, which delays the valid frames after it.
+# s; the longest frame takes 0.3 s at 9600 baud. An older beginning of a frame is noise, which
+# delays the valid frames after it.
 STALL = 0.5
 
 

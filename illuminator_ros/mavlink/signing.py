@@ -163,8 +163,8 @@ class Signing:
         elif stamp <= last:
             return False
         self._streams[stream] = stamp
-        # A peer with a better clock, or a longer memory, is followed; but not
-        # an implausible clock, after which correct time stamps would count as too old.
+        # A peer with a better clock, or a longer memory, is followed; but not an implausible
+        # clock, after which correct time stamps would count as too old.
         if stamp <= ticks(unix_time) + FOLLOWED_TICKS:
             self.timestamp = max(self.timestamp, stamp)
         return True

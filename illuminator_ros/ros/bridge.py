@@ -88,7 +88,7 @@ class Bridge:
         self.log = NodeLog(node.get_logger())
         frame_log = LogForwarder(self.log)
         kinds = [_load(name, types) for name in declare_payloads(node, payload)]
-        _check_names(node, kinds)
+        _refuse_same_names(node, kinds)
         parameters = _link_parameters(node, kinds, url)
         values = [declare_read_only(node, kind.parameters) for kind in kinds]
         commands = CommandSender(
@@ -307,7 +307,7 @@ def _link_parameters(node: Node, kinds: Sequence[RosPayload], url: str) -> LinkP
     return parameters
 
 
-def _check_names(node: Node, kinds: Sequence[RosPayload]) -> None:
+def _refuse_same_names(node: Node, kinds: Sequence[RosPayload]) -> None:
     if node.get_name() in (kind.node_name for kind in kinds[1:]):
         raise ParameterError(
             f'payloads: two nodes would be called {node.get_name()!r}: name that payload first, '

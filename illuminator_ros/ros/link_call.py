@@ -44,7 +44,8 @@ class LinkCalls:
         self._link = link
         self._log = log
         self._limit = limit
-        # The refusal of each request that waits, by the function that ends it.
+        # The refusal of each request that waits, by the function that ends it. Untyped: the
+        # answers of requests have different types.
         self._waiting: dict[Callable[[Any], None], Callable[[str], Any]] = {}
         # Whether the last answer came soon enough for the caller to wait for the next one.
         self._is_quick = False

@@ -27,7 +27,6 @@ from rcl_interfaces.srv import GetParameters, SetParametersAtomically
 from rclpy.clock import Clock, ClockType
 from rclpy.node import Node
 from rclpy.parameter import Parameter, parameter_value_to_python
-from rclpy.qos import QoSProfile, ReliabilityPolicy
 from rclpy.subscription import Subscription
 from sensor_msgs.msg import Temperature
 from std_msgs.msg import Bool, Float32, Float64, String, UInt32
@@ -49,7 +48,6 @@ TOPICS: dict[str, type[object]] = {
 }
 # A node that publishes these topics with their types is a light.
 SIGNATURE = ('connected', 'enabled', 'brightness', 'error_flags')
-EVENT_QOS = QoSProfile(depth=100, reliability=ReliabilityPolicy.RELIABLE)
 # s between queries of the graph.
 QUERY_INTERVAL = 0.5
 # s for an answer: longer than a bridge takes, whatever its light does.
@@ -235,7 +233,7 @@ class Graph:
         self._jobs: deque[Callable[[], None]] = deque()
         self._guard = node.create_guard_condition(self._do_jobs)
         node.create_subscription(DiagnosticArray, '/diagnostics', self._diagnosed, STREAM_QOS)
-        node.create_subscription(ParameterEvent, '/parameter_events', self._changed, EVENT_QOS)
+        node.create_subscription(ParameterEvent, '/parameter_events', self._changed, 100)
         steady = Clock(clock_type=ClockType.STEADY_TIME)
         node.create_timer(QUERY_INTERVAL, self.query, clock=steady)
 
