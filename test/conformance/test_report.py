@@ -22,7 +22,7 @@ from illuminator_ros.illuminator.checks.requirements import REQUIREMENTS
 from illuminator_ros.illuminator.simulated_properties import IlluminatorProperties
 from illuminator_ros.mavlink.messages import Address
 from illuminator_ros.payload.checks import report as reports
-from illuminator_ros.payload.checks.report import lines, Report, Table
+from illuminator_ros.payload.checks.report import lines, RunReport, Table
 from illuminator_ros.payload.identity import Identity
 import pytest
 from support.conformance_run import Run
@@ -35,9 +35,9 @@ def run() -> Run:
 
 
 @pytest.fixture(scope='module')
-def report(run: Run) -> Report:
-    return Report('illuminator', 'light', 'udpin://127.0.0.1:1', 'light 1/243: x&<y>',
-                  tuple(run.runner.results), run.runner.restored, 12.5, run.runner.passed)
+def report(run: Run) -> RunReport:
+    return RunReport('illuminator', 'light', 'udpin://127.0.0.1:1', 'light 1/243: x&<y>',
+                     tuple(run.runner.results), run.runner.restored, 12.5, run.runner.passed)
 
 
 def shown(run: Run) -> list[str]:
@@ -45,7 +45,7 @@ def shown(run: Run) -> list[str]:
     return [line for one in run.runner.results for line in table.add(one)] + table.end()
 
 
-def test_the_json_report_has_every_requirement_with_its_messages(report: Report) -> None:
+def test_the_json_report_has_every_requirement_with_its_messages(report: RunReport) -> None:
     content = json.loads(reports.as_json(report))
     assert [one['name'] for one in content['results']] == [one.name for one in REQUIREMENTS]
     (nan,) = [one for one in content['results'] if one['name'] == 'not-a-number']
@@ -60,7 +60,7 @@ def test_the_json_report_has_every_requirement_with_its_messages(report: Report)
     assert (content['light'], content['restored']) == (report.device, 'the light is as it was')
 
 
-def test_the_junit_report_has_counts_reasons_and_sections(report: Report) -> None:
+def test_the_junit_report_has_counts_reasons_and_sections(report: RunReport) -> None:
     suite = ElementTree.fromstring(reports.as_junit(report))
     assert (suite.tag, suite.get('name')) == ('testsuite', 'illuminator conformance')
     assert [suite.get(key) for key in ('tests', 'failures', 'skipped')] == ['48', '3', '1']
@@ -74,7 +74,7 @@ def test_the_junit_report_has_counts_reasons_and_sections(report: Report) -> Non
     assert 'COMMAND_LONG to 1/200' in str(case.findtext('system-out'))
 
 
-def test_the_junit_report_contains_no_character_that_xml_excludes(report: Report) -> None:
+def test_the_junit_report_contains_no_character_that_xml_excludes(report: RunReport) -> None:
     url = 'a\0b\x1bc\udcffd\uffffe'
     suite = ElementTree.fromstring(reports.as_junit(dataclasses.replace(report, url=url)))
 

@@ -33,7 +33,7 @@ from illuminator_ros.illuminator.checks.requirements import REQUIREMENTS
 from illuminator_ros.illuminator.simulated import COMMANDS as LIGHT_COMMANDS
 from illuminator_ros.illuminator.simulated import SIMULATED
 from illuminator_ros.illuminator.simulated_properties import FAULTS, PROFILES
-from illuminator_ros.payload.checks.report import as_json, Report
+from illuminator_ros.payload.checks.report import as_json, RunReport
 from illuminator_ros.payload.checks.requirement import Requirement, Result, Verdict
 from illuminator_ros.payload.faults import FaultTable
 from illuminator_ros.payload.simulated import SimulatedType
@@ -74,7 +74,7 @@ def test_the_keys_of_a_json_report_are_listed_in_order_for_each_kind_of_device()
     devices = [one.load('checks').device for one in PAYLOADS.values() if one.checks]
 
     for device_key in devices:
-        content = json.loads(as_json(Report(
+        content = json.loads(as_json(RunReport(
             'name', device_key, '', '', (Result(REQUIREMENTS[0], Verdict.PASS),), '', 0.0, True)))
         others = {*devices} - {device_key}
         assert list(content) == [key for key in report_keys if key not in others]

@@ -52,7 +52,7 @@ from ...mavlink.messages import Address
 from ...mavlink.signing import Signing
 from ...mavlink.signing_files import TimestampStore
 from ...mavlink.url import parse_url, Url
-from ...payload.checks.report import as_json, as_junit, catalogue, Report, Table
+from ...payload.checks.report import as_json, as_junit, catalogue, RunReport, Table
 from ...payload.checks.requirement import AnyChecks, AnyRequirement, Conditions, Result, Verdict
 from ...payload.checks.runner import absence, CheckRunner, names
 from ...payload.checks.session import Main
@@ -230,7 +230,7 @@ class Conformance:
         self._finish(suite.run(missing))
         self._link.stop()
         self._write_line(*self._table.end())
-        report = Report(
+        report = RunReport(
             checks.payload, checks.device, options.url, self._describe_device(),
             tuple(suite.results), suite.restored, self._link.clock() - begun, suite.passed)
         # A failed check has already given the reason why there is no device.

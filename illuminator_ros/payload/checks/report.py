@@ -31,7 +31,7 @@ _NOT_XML = {code: '?' for code in (*range(32), *range(0xd800, 0xe000), 0xfffe, 0
 
 
 @dataclass(frozen=True)
-class Report:
+class RunReport:
     """
     The report of a run.
 
@@ -121,7 +121,7 @@ def catalogue(requirements: Iterable[AnyRequirement], kind: str) -> list[str]:
             for one in requirements]
 
 
-def as_json(report: Report) -> str:
+def as_json(report: RunReport) -> str:
     """Return the report as JSON."""
     return json.dumps({
         'tool': f'illuminator_ros conformance {__version__}',
@@ -145,7 +145,7 @@ def as_json(report: Report) -> str:
     }, indent=2) + '\n'
 
 
-def as_junit(report: Report) -> str:
+def as_junit(report: RunReport) -> str:
     """Return the report as JUnit XML, in UTF-8."""
     def add(parent: ElementTree.Element, tag: str, **attributes: str) -> ElementTree.Element:
         return ElementTree.SubElement(
