@@ -25,7 +25,7 @@ from .command_sources import LightSources
 from .commands import SWITCHES
 from .configuration_manager import ConfigurationManager
 from .messages import STATUS_ID
-from .model import Changes, DIMMING_FLAGS, ErrorFlag, Mode, SafetyLimits, Status, StrobeRange
+from .model import Changes, DIMMING_FLAGS, ErrorFlags, Mode, SafetyLimits, Status, StrobeRange
 from .status_tracker import RESTART_PROOF_TIME, StatusTracker, Uptime
 from ..mavlink.command_sender import CommandResult, CommandSender, CommandStatus, format_seconds
 from ..mavlink.messages import Address, MavCmd
@@ -266,7 +266,7 @@ class Light:
                 or bool(before and confirmed and confirmed.brightness)
                 and not self._configuration.is_changing)
         was_hot = self._is_hot
-        self._is_hot = bool(report.status.error_flags & ErrorFlag.OVER_TEMPERATURE_SHUTDOWN)
+        self._is_hot = bool(report.status.error_flags & ErrorFlags.OVER_TEMPERATURE_SHUTDOWN)
         # Several lights at one address seem to be one light that switches repeatedly, and a light
         # that has cooled down switches itself on.
         is_by_other = before is False and not (
@@ -414,7 +414,7 @@ class Light:
         """Return the temperature, degC; None where it is not measured, or the sensor fails."""
         status = self.status
         if (status is None or not self._measures_temperature
-                or status.error_flags and status.error_flags & ErrorFlag.THERMISTOR_FAILURE):
+                or status.error_flags and status.error_flags & ErrorFlags.THERMISTOR_FAILURE):
             return None
         return status.temperature
 

@@ -47,7 +47,7 @@ FLOAT32_STEP = 1e-6
 SHORTEST_PERIOD = 1e-6
 
 
-class ErrorFlag(IntFlag):
+class ErrorFlags(IntFlag):
     """ILLUMINATOR_ERROR_FLAGS."""
 
     THERMAL_THROTTLING = 1
@@ -57,15 +57,15 @@ class ErrorFlag(IntFlag):
 
 # The flags under which a light is less bright than it was set. Plain ints: each operation
 # of an IntFlag takes 1 us, and since Python 3.11 its complement has no unknown bits.
-DIMMING_FLAGS = int(ErrorFlag.THERMAL_THROTTLING | ErrorFlag.OVER_TEMPERATURE_SHUTDOWN)
-KNOWN_FLAGS = DIMMING_FLAGS | int(ErrorFlag.THERMISTOR_FAILURE)
+DIMMING_FLAGS = int(ErrorFlags.THERMAL_THROTTLING | ErrorFlags.OVER_TEMPERATURE_SHUTDOWN)
+KNOWN_FLAGS = DIMMING_FLAGS | int(ErrorFlags.THERMISTOR_FAILURE)
 
 
 def flag_names(flags: int) -> list[str]:
     """Return readable names of error flags; unknown bits as one hexadecimal number."""
     if not flags:
         return []
-    names = [flag.name.lower().replace('_', ' ') for flag in ErrorFlag
+    names = [flag.name.lower().replace('_', ' ') for flag in ErrorFlags
              if flag & flags and flag.name]
     if unknown := flags & ~KNOWN_FLAGS:
         names.append(f'unknown flags 0x{unknown:x}')
@@ -291,7 +291,7 @@ class Status:
 
     :param uptime_ms: ms since the light started, wrapping at 2**32.
     :param mode_bitmask: as sent; its meaning differs between lights.
-    :param error_flags: as sent; see :class:`ErrorFlag`.
+    :param error_flags: as sent; see :class:`ErrorFlags`.
     :param brightness: %, 0..100.
     :param strobe_period: s, 0..:data:`MAX_STROBE_PERIOD`.
     :param strobe_duty_cycle: %, 0..100.

@@ -144,7 +144,7 @@ class SimulatedIlluminator(SimulatedDevice):
             brightness = 0.0
         flags = thermal.flags | behaviour.false_flags
         if behaviour.inverted_flags and self.enabled:
-            flags ^= model.ErrorFlag.THERMAL_THROTTLING
+            flags ^= model.ErrorFlags.THERMAL_THROTTLING
         strobe_range = self.properties.strobe_range if behaviour.measures else model.StrobeRange()
         fields = (
             self.uptime_ms(now) if behaviour.has_clock else 0, int(self.enabled),

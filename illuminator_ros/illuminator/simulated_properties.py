@@ -21,7 +21,7 @@ import functools
 from typing import NamedTuple
 
 from .messages import MAV_COMP_ID_ILLUMINATOR
-from .model import ErrorFlag, Mode, StrobeRange
+from .model import ErrorFlags, Mode, StrobeRange
 from .thermal import ThermalProperties
 from .. import __version__
 from ..mavlink import messages
@@ -88,7 +88,7 @@ FAULTS = FaultTable({
     'anything': Fault('accepts_out_of_range', 'accepts values out of range'),
     'toggle': Fault('toggles', 'is switched off by switching it on again'),
     'flags': Fault('false_flags', 'reports error flags without a reason',
-                   'FLAGS', integer(1, 0xFFFFFFFF), int(ErrorFlag.OVER_TEMPERATURE_SHUTDOWN)),
+                   'FLAGS', integer(1, 0xFFFFFFFF), int(ErrorFlags.OVER_TEMPERATURE_SHUTDOWN)),
     'cold-throttling': Fault('inverted_flags', 'reports THERMAL_THROTTLING while it is on and '
                              'cool, not while it is hot'),
 })

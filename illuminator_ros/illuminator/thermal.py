@@ -19,14 +19,14 @@ from __future__ import annotations
 from dataclasses import dataclass
 import math
 
-from .model import ErrorFlag
+from .model import ErrorFlags
 
 # degC; the reading of an open thermistor, which receivers take for "not measured".
 BROKEN_READING = 0.0
 # Plain ints: each operation of an IntFlag takes 1 us.
-_THROTTLING = int(ErrorFlag.THERMAL_THROTTLING)
-_SHUTDOWN = int(ErrorFlag.OVER_TEMPERATURE_SHUTDOWN)
-_FAILURE = int(ErrorFlag.THERMISTOR_FAILURE)
+_THROTTLING = int(ErrorFlags.THERMAL_THROTTLING)
+_SHUTDOWN = int(ErrorFlags.OVER_TEMPERATURE_SHUTDOWN)
+_FAILURE = int(ErrorFlags.THERMISTOR_FAILURE)
 
 
 @dataclass(frozen=True)

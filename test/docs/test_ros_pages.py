@@ -26,7 +26,7 @@ from illuminator_ros.cli.monitor.run import parser
 from illuminator_ros.gimbal.ros.gimbals import GIMBAL_PARAMETERS
 from illuminator_ros.gimbal.ros.manager_node import MANAGER_PARAMETERS
 from illuminator_ros.illuminator.messages import IlluminatorStatus
-from illuminator_ros.illuminator.model import ErrorFlag
+from illuminator_ros.illuminator.model import ErrorFlags
 from illuminator_ros.illuminator.ros.diagnostics import FLAG_LEVELS
 from illuminator_ros.illuminator.ros.parameters import DEVICE_PARAMETERS, LIGHT_PARAMETERS
 from illuminator_ros.mavlink.messages import CommandAck, ComponentInformationBasic, MavCmd
@@ -143,7 +143,7 @@ def test_the_protocol_page_has_each_command_and_error_flag() -> None:
     assert {cells[0] for cells in table(PROTOCOL, 'command')} == {
         f'MAV_CMD_{command.name} ({command.value})' for command in MavCmd}
     rows = {cells[0]: cells[1:] for cells in table(PROTOCOL, 'ILLUMINATOR_ERROR_FLAGS')}
-    for flag in ErrorFlag:
+    for flag in ErrorFlags:
         level, text = FLAG_LEVELS[flag]
         assert rows[f'{flag.name} ({flag.value})'] == [LEVELS[level], text]
 

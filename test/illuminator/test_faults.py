@@ -16,7 +16,7 @@
 
 from typing import Any
 
-from illuminator_ros.illuminator.model import ErrorFlag
+from illuminator_ros.illuminator.model import ErrorFlags
 from illuminator_ros.illuminator.simulated_properties import FAULTS, IlluminatorBehaviour
 from illuminator_ros.mavlink.messages import CommandAck, Heartbeat, MavCmd, MavResult
 from illuminator_ros.payload.faults import FaultError
@@ -49,9 +49,9 @@ def test_a_silent_light_neither_sends_nor_obeys_until_its_silence_is_over() -> N
 def test_a_hot_light_reports_its_heat_as_soon_as_its_sensor_is_mended() -> None:
     bench = LightBench('thermistor')
     bench.lamp.heat_to(85.0, bench.now)
-    assert bench.status().error_status == ErrorFlag.THERMISTOR_FAILURE
+    assert bench.status().error_status == ErrorFlags.THERMISTOR_FAILURE
     bench.component.behave(NORMAL, bench.now)
-    assert bench.status().error_status == ErrorFlag.THERMAL_THROTTLING
+    assert bench.status().error_status == ErrorFlags.THERMAL_THROTTLING
 
 
 @pytest.mark.parametrize('fault', ['slow=2', 'progress=2', 'delay=3'])

@@ -33,7 +33,7 @@ from .tester import (
     status_text,
 )
 from ..messages import IlluminatorStatus
-from ..model import ErrorFlag, flag_names, float32, KNOWN_FLAGS, Mode, Status, StrobeRange
+from ..model import ErrorFlags, flag_names, float32, KNOWN_FLAGS, Mode, Status, StrobeRange
 from ...mavlink import messages
 from ...payload.checks import component_requirements as component
 from ...payload.checks.requirement import (
@@ -282,7 +282,7 @@ STROBE = (
 
 # K; the smallest rise of temperature that explains a flag.
 STEP = 0.5
-THERMAL = (ErrorFlag.THERMAL_THROTTLING, ErrorFlag.OVER_TEMPERATURE_SHUTDOWN)
+THERMAL = (ErrorFlags.THERMAL_THROTTLING, ErrorFlags.OVER_TEMPERATURE_SHUTDOWN)
 
 reports = partial(requirement, specification=MESSAGES, section='ILLUMINATOR_STATUS')
 
@@ -389,7 +389,7 @@ async def thermal(tester: LightTester) -> str:
     start = await tester.status()
     if start is None or start.temperature is None:
         raise Skipped('it reports no temperature')
-    if start.error_flags & ErrorFlag.THERMISTOR_FAILURE:
+    if start.error_flags & ErrorFlags.THERMISTOR_FAILURE:
         raise Skipped('its temperature sensor has failed')
     await tester.configure(brightness=100.0)
     on = (await tester.switch(True)).transaction

@@ -20,7 +20,7 @@ from dataclasses import asdict, dataclass
 import math
 
 from ..events import LightSnapshot
-from ..model import ErrorFlag, flag_names, KNOWN_FLAGS
+from ..model import ErrorFlags, flag_names, KNOWN_FLAGS
 from ...mavlink.command_sender import format_seconds
 from ...mavlink.messages import Address
 from ...ros import diagnostics
@@ -32,10 +32,11 @@ STATUS_SILENCE = 10.0
 FLAG_PAUSE = 5.0
 
 # The consequence of each flag for the user of the light.
-FLAG_LEVELS: dict[ErrorFlag, tuple[bytes, str]] = {
-    ErrorFlag.THERMAL_THROTTLING: (diagnostics.WARN, 'dimmed because it is hot'),
-    ErrorFlag.OVER_TEMPERATURE_SHUTDOWN: (diagnostics.ERROR, 'switched off because it is too hot'),
-    ErrorFlag.THERMISTOR_FAILURE: (diagnostics.WARN, 'temperature sensor failed'),
+FLAG_LEVELS: dict[ErrorFlags, tuple[bytes, str]] = {
+    ErrorFlags.THERMAL_THROTTLING: (diagnostics.WARN, 'dimmed because it is hot'),
+    ErrorFlags.OVER_TEMPERATURE_SHUTDOWN: (
+        diagnostics.ERROR, 'switched off because it is too hot'),
+    ErrorFlags.THERMISTOR_FAILURE: (diagnostics.WARN, 'temperature sensor failed'),
 }
 
 
