@@ -36,8 +36,8 @@ CAPTURE_TIMEOUT = 5.0
 # s in which the answer to a capture that had none may still come; captures fail meanwhile, since a
 # lost request looks the same.
 LATE_ANSWER = 15.0
-# An image whose index is less than this behind the newest one is older; an index farther behind is
-# that of a restarted camera.
+# An image whose index is less than this behind the newest one is older; if it is farther behind,
+# the camera has restarted.
 OLDER_INDICES = 32
 # Requests without an answer that are remembered.
 MAX_LATE = 32
