@@ -191,9 +191,7 @@ class Bridge:
             nodes = self.nodes
             # Without it, after a shutdown of the context for example, the nodes end all the same.
             with contextlib.suppress(Exception):
-                last = PayloadNode(
-                    '_leaving', first=self.node, context=self.node.context, enable_rosout=False,
-                    use_global_arguments=False)
+                last = PayloadNode('_leaving', first=self.node, enable_rosout=False)
                 held.enter_context(last.handle)
                 nodes.append(last)
             # The first one last, since the others use its publisher of parameter events.

@@ -180,7 +180,7 @@ class NodeExecutor(SingleThreadedExecutor):
             for service in node.services:
                 if isinstance(service.callback, DeferredService):
                     service.callback.refuse_waiting(ENDED)
-        # No answer pauses any more.
+        # No more requests are taken, so this ends; and no answer pauses any more.
         while self._calls or self._queues:
             self._answer(math.inf)
 

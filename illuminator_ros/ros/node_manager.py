@@ -24,7 +24,6 @@ import threading
 import time
 
 from rclpy.node import Node
-from rclpy.parameter import Parameter
 
 from .executor import NodeExecutor
 from .parameters import ParameterError
@@ -59,8 +58,7 @@ class NodeManager:
 
     One thread runs the callbacks of all of them; each node adds 5 us to a callback.
 
-    :param first: the process's first node; the others share its namespace and context,
-        and its publisher of parameter events.
+    :param first: the process's first node, whose namespace the others share.
     :param arguments: the ROS arguments that the nodes follow.
     :param wake: requests a call of :meth:`work`.
     """
@@ -143,10 +141,7 @@ class NodeManager:
             self._thread.start()
         node = PayloadNode(
             request.name, first=self._first, namespace=self._first.get_namespace(),
-            context=self._first.context, cli_args=self._arguments, use_global_arguments=False,
-            # The service takes 0.13 MB, and the service of the first node describes the same
-            # types.
-            parameter_overrides=[Parameter('start_type_description_service', value=False)])
+            cli_args=self._arguments)
         try:
             request.serve(node)
         except BaseException:

@@ -21,6 +21,7 @@ from typing import Any
 from rcl_interfaces.msg import ParameterEvent
 from rclpy.event_handler import PublisherEventCallbacks, SubscriptionEventCallbacks
 from rclpy.node import Node
+from rclpy.parameter import Parameter
 from rclpy.publisher import Publisher
 
 PARAMETER_EVENTS = '/parameter_events'
@@ -36,14 +37,19 @@ class PayloadNode(Node):
 
     An executor would wait for an event of each publisher and subscription, which also take memory.
 
-    :param first: the first node of the process, whose publisher of parameter events this one uses:
-        each event names its node, and each publisher takes memory.
+    :param first: the first node of the process. This one shares its context; its publisher of
+        parameter events, since each event names its node; and its service of type descriptions,
+        which takes 0.13 MB.
     :param options: as for rclpy's Node: namespace, parameter_overrides, context ...
     """
 
     # Untyped: rclpy's own signatures are long, and differ between its versions.
     def __init__(self, name: str, *, first: PayloadNode | None = None, **options: Any) -> None:
         self._events: Publisher[ParameterEvent] | None = first._events if first else None
+        if first:
+            options |= {
+                'context': first.context, 'use_global_arguments': False, 'parameter_overrides': [
+                    Parameter('start_type_description_service', value=False)]}
         super().__init__(name, start_parameter_services=False, **options)
 
     def create_publisher(self, *arguments: Any, **options: Any) -> Any:
