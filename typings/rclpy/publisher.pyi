@@ -14,7 +14,6 @@
 
 from typing import Generic, TypeVar
 
-from rclpy.duration import Duration
 from rclpy.qos import QoSProfile
 
 Message = TypeVar('Message')
@@ -27,5 +26,4 @@ class Publisher(Generic[Message]):
     # Bytes are the message as serialized CDR.
     def publish(self, msg: Message | bytes) -> None: ...
     def get_subscription_count(self) -> int: ...
-    def wait_for_all_acked(self, timeout: Duration = ...) -> bool: ...
     def destroy(self) -> None: ...

@@ -21,7 +21,6 @@ from dataclasses import dataclass, replace
 import math
 import time
 
-from rclpy.duration import Duration
 from rclpy.node import Node
 
 from .parameters import BeamGeometry
@@ -45,8 +44,6 @@ REFRESH = 1.0
 LIFETIME = 5
 # s between publications of a beam that a gimbal turns.
 MOVE_INTERVAL = 0.1
-# The longest wait of a bridge that ends for the removal of its beam.
-REMOVAL_TIMEOUT = Duration(seconds=0.05)
 
 
 def cone(length: float, angle: float) -> list[Point]:
@@ -165,10 +162,7 @@ class BeamPublisher:
 
     def close(self) -> None:
         """Remove the beam, after the link's thread has ended."""
-        if self._beam.alpha:
-            self._show(replace(self._beam, on=False))
-            # The last message of a publisher may be lost when it is destroyed.
-            self._publisher.wait_for_all_acked(REMOVAL_TIMEOUT)
+        self._show(replace(self._beam, on=False))
 
     def _show(self, beam: Beam) -> None:
         before, self._beam = self._beam, beam
