@@ -199,7 +199,7 @@ class Conformance:
                           mavlink_version=mavlink_version(
                               options.mavlink_version, {checks.device: checks.mavlink_version}))
         self._traces = f', besides {checks.traces}' if checks.traces else ''
-        self._suite: CheckRunner[Any] | None = None
+        self._runner: CheckRunner[Any] | None = None
         self._signals = 0
         self._written = True
         # Written by the link's thread before the main thread reads them.
@@ -225,14 +225,14 @@ class Conformance:
         conditions = Conditions(
             bool(self._announcement) and self._consent(),
             lambda: self._link_state().decoding.crc_errors, self._payload_options, time.time)
-        suite = self._suite = CheckRunner(
+        runner = self._runner = CheckRunner(
             checks, self._session, conditions, self._requirements, self._show)
-        self._finish(suite.run(missing))
+        self._finish(runner.run(missing))
         self._link.stop()
         self._write_line(*self._table.end())
         report = RunReport(
             checks.payload, checks.device, options.url, self._describe_device(),
-            tuple(suite.results), suite.restored, self._link.clock() - begun, suite.passed)
+            tuple(runner.results), runner.restored, self._link.clock() - begun, runner.passed)
         # A failed check has already given the reason why there is no device.
         explained = missing and any(one.verdict is Verdict.FAIL for one in report.results)
         self._write_line('', *(() if explained else (report.device,)), report.summary)
@@ -243,7 +243,7 @@ class Conformance:
             except OSError as error:
                 _complain(f'{path}: {error.strerror}')
                 self._written = False
-        return 0 if suite.passed and self._written else 1
+        return 0 if runner.passed and self._written else 1
 
     def _write_line(self, *texts: str) -> None:
         # Reports in files do not need standard output.
@@ -324,7 +324,7 @@ class Conformance:
         if self._signals and number == signal.SIGHUP:
             return
         self._signals += 1
-        changed = self._suite is not None and self._suite.changed
+        changed = self._runner is not None and self._runner.changed
         device = self._checks.device
         if self._signals > 1:
             _complain(f'ended; the {device} is not as it was' if changed else 'ended')
