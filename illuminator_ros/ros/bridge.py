@@ -31,7 +31,7 @@ from .diagnostics import SIGNING_NEEDED
 from .diagnostics_publisher import DiagnosticsPublisher
 from .executor import NodeExecutor
 from .graph import unheard_publishers
-from .ignored_parameters import ignored_sections, unknown_parameters
+from .ignored_parameters import ignored_sections, overruled_parameters, unknown_parameters
 from .logger_services import LoggerServices
 from .node_manager import NodeManager, without_node_name
 from .parameters import (
@@ -137,6 +137,10 @@ class Bridge:
         for warning in (*unknown_parameters(self._own_nodes, arguments, restrictions),
                         *ignored_sections(arguments, names, self._may_name)):
             self.log.warning(warning)
+        for own, log, kind in zip(self._own_nodes, self._logs, kinds, strict=True):
+            for warning in overruled_parameters(
+                    own, node, {spec.name for spec in kind.parameters if spec.restricts}):
+                log.warning(warning)
         # A period is a whole number of ticks, otherwise some periods would be a tick too long.
         self._tick = parameters.diagnostics_period / math.ceil(
             parameters.diagnostics_period / TICK)

@@ -67,18 +67,37 @@ def unknown_parameters(
 
 def ignored_parameters(node: Node, first: Node) -> list[str]:
     """Return a warning for each parameter that is given for a further node and has no effect."""
+    return [
+        *overruled_parameters(node, first),
+        *(_unknown(name, difflib.get_close_matches(
+            name, node.list_parameters([], 0).names, 1, 0.75))
+          for name in given_parameters(node)
+          if not any(one.has_parameter(name) for one in (node, first))
+          and name not in given_parameters(first))]
+
+
+def overruled_parameters(
+    node: Node, first: Node, restrictions: Set[str] = frozenset(),
+) -> list[str]:
+    """
+    Return a warning for each parameter of the first node that is given otherwise for another.
+
+    :param restrictions: names of parameters that must not be ignored.
+    :raises ParameterError: if one of them is given otherwise.
+    """
     warnings = []
     for name, parameter in given_parameters(node).items():
-        if node.has_parameter(name):
+        if node.has_parameter(name) or not first.has_parameter(name):
             continue
-        if not first.has_parameter(name):
-            if name not in given_parameters(first):
-                warnings.append(_unknown(name, difflib.get_close_matches(
-                    name, node.list_parameters([], 0).names, 1, 0.75)))
-        elif parameter.value not in (None, first.get_parameter(name).value):
-            # None is an empty list.
-            warnings.append(f'parameter {name!r} is ignored here: the value of '
-                            f'{first.get_fully_qualified_name()} applies')
+        applied = given_parameters(first).get(name) or first.get_parameter_or(name)
+        # None is an empty list.
+        if parameter.value in (None, applied.value):
+            continue
+        text = f'the value of {first.get_fully_qualified_name()} applies'
+        if name in restrictions:
+            raise ParameterError(
+                f'{name}: is given for {node.get_fully_qualified_name()}, but {text}')
+        warnings.append(f'parameter {name!r} is ignored here: {text}')
     return warnings
 
 

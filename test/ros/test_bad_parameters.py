@@ -147,5 +147,18 @@ def test_unknown_parameters_are_warned_about_and_those_of_other_nodes_are_not(
         assert bridge.count('WARN') == len(misspelt) + len(unknown) + 1, bridge.log
 
 
+def test_parameter_of_the_first_node_that_is_given_otherwise_for_another_is_warned_about(
+    ros: Ros,
+) -> None:
+    with running_bridge(
+            ros.domain, free_port(), '-p', 'gimbal:setpoint_timeout:=1.5',
+            '-p', 'gimbal:max_brightness:=60.0', payloads='[illuminator, gimbal]',
+            max_brightness=30.0, attitude_interval=1, sources='[]', brightness=20.0) as bridge:
+        for name in ('setpoint_timeout', 'max_brightness'):
+            bridge.wait_for(f"[gimbal]: parameter '{name}' is ignored here: the value of "
+                            '/illuminator applies')
+        assert bridge.count('WARN') == 2, bridge.log
+
+
 def test_off_as_yaml_reads_it_and_integers_for_doubles_are_accepted(ros: Ros) -> None:
     assert refusal(ros.context, signing_mode=False, heartbeat_timeout=2, command_timeout=2) == ''
