@@ -23,6 +23,7 @@ from illuminator_ros.illuminator.simulated_properties import IlluminatorProperti
 from illuminator_ros.mavlink.messages import Address
 from illuminator_ros.payload.checks import report as reports
 from illuminator_ros.payload.checks.report import lines, RunReport, Table
+from illuminator_ros.payload.checks.requirement import Verdict
 from illuminator_ros.payload.identity import Identity
 import pytest
 from support.conformance_run import Run
@@ -72,6 +73,21 @@ def test_the_junit_report_has_counts_reasons_and_sections(report: RunReport) -> 
     assert 'switched on by a command for 1/200' in failure.attrib['message']
     assert 'guide/routing.html' in str(failure.text)
     assert 'COMMAND_LONG to 1/200' in str(case.findtext('system-out'))
+
+
+@pytest.mark.parametrize('passed, errors', [(True, 0), (False, 1)])
+def test_the_junit_report_of_a_run_without_exit_status_0_has_a_failure_or_an_error(
+    report: RunReport, passed: bool, errors: int,
+) -> None:
+    assert ElementTree.fromstring(reports.as_junit(report)).get('errors') == '0'
+    no_fault = tuple(one for one in report.results if one.verdict is not Verdict.FAIL)
+    suite = ElementTree.fromstring(reports.as_junit(dataclasses.replace(
+        report, results=no_fault, restored='THE LIGHT IS NOT AS IT WAS', passed=passed)))
+
+    assert [suite.get(key) for key in ('tests', 'failures', 'errors')] == [
+        str(len(suite.findall('testcase'))), '0', str(errors)]
+    assert [one.get('message') for one in suite.findall('testcase/error')] == [
+        'incomplete: 44 passed, 0 failed, 1 skipped in 12 s; THE LIGHT IS NOT AS IT WAS'][:errors]
 
 
 def test_the_junit_report_contains_no_character_that_xml_excludes(report: RunReport) -> None:

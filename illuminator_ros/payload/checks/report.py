@@ -151,9 +151,12 @@ def as_junit(report: RunReport) -> str:
         return ElementTree.SubElement(
             parent, tag, {name: text.translate(_NOT_XML) for name, text in attributes.items()})
 
+    failures = report.count(Verdict.FAIL)
+    # A reader of the report alone must not take an incomplete run for one without a fault.
+    error = not (report.passed or failures)
     suite = ElementTree.Element(
-        'testsuite', name=f'{report.payload} conformance', tests=str(len(report.results)),
-        failures=str(report.count(Verdict.FAIL)), errors='0',
+        'testsuite', name=f'{report.payload} conformance',
+        tests=str(len(report.results) + error), failures=str(failures), errors=str(int(error)),
         skipped=str(report.count(Verdict.SKIPPED)), time=f'{report.seconds:.3f}')
     properties = add(suite, 'properties')
     for name, value in (('url', report.url), (report.kind, report.device),
@@ -169,6 +172,9 @@ def as_junit(report: RunReport) -> str:
         elif result.verdict is Verdict.SKIPPED:
             add(case, 'skipped', message=result.detail)
         add(case, 'system-out').text = '\n'.join(result.exchange).translate(_NOT_XML)
+    if error:
+        case = add(suite, 'testcase', name='run', classname='conformance', time='0.000')
+        add(case, 'error', message=f'incomplete: {report.summary}')
     ElementTree.indent(suite)
     # Not 'unicode', which declares the encoding of the locale.
     text: bytes = ElementTree.tostring(suite, encoding='utf-8', xml_declaration=True)
