@@ -76,9 +76,11 @@ class Executable(NamedTuple):
 
 def usage(executable: Executable) -> str:
     """Return the text of ``--help``."""
+    from .options import invocation
     from ..ros.parameters import LINK_PARAMETERS, ParameterSpec
 
     kind, name = executable.load(), executable.name
+    command = invocation(name)
     defaults = {'payloads': [executable.payload], **kind.all_link_defaults}
 
     def row(spec: ParameterSpec, default: str) -> str:
@@ -101,9 +103,9 @@ usage: {name} [-h | --version] [URL] [--ros-args -p NAME:=VALUE ... | --params-f
 Runs the ROS 2 node /{kind.node_name} for {kind.summary}.
 
 examples:
-  ros2 run illuminator_ros {name}
-  ros2 run illuminator_ros {name} serial:///dev/ttyACM0:57600
-  ros2 run illuminator_ros {name} --ros-args -p connection_url:=udpin://0.0.0.0:14550
+  {command}
+  {command} serial:///dev/ttyACM0:57600
+  {command} --ros-args -p connection_url:=udpin://0.0.0.0:14550
 
 {examples}--ros-args --log-level {kind.node_name}:=debug shows the messages of this device in the
 log, and --log-level debug those of all nodes, among many lines of ROS itself.

@@ -72,10 +72,11 @@ class Parser(argparse.ArgumentParser):
 def invocation(name: str) -> str:
     """Return the command that starts a program in the way in which this process was started."""
     started = Path(sys.argv[0])
-    if started.name == f'illuminator-{name}':
-        return started.name
-    return f'python3 -m illuminator_ros.{name}' if started.suffix == '.py' else (
-        f'ros2 run illuminator_ros {name}')
+    if started.suffix == '.py':
+        return f'python3 -m illuminator_ros.{name}'
+    # colcon installs the executables of a package, which may be another one, in lib/PACKAGE.
+    return (f'ros2 run {started.parent.name} {started.name}'
+            if started.parent.parent.name == 'lib' else started.name)
 
 
 def option(read: Callable[[str], T]) -> Callable[[str], T]:

@@ -25,6 +25,7 @@ import pytest
 
 STARTED = [
     ('/opt/ws/install/lib/illuminator_ros/{}', 'ros2 run illuminator_ros {}'),
+    ('/opt/ws/install/my_winch/lib/my_winch/{}', 'ros2 run my_winch {}'),
     ('/home/me/venv/bin/illuminator-{}', 'illuminator-{}'),
     ('/home/me/src/illuminator_ros/{}.py', 'python3 -m illuminator_ros.{}')]
 

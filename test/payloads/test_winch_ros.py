@@ -95,8 +95,11 @@ def test_executable_of_one_payload_has_its_node_name_link_defaults_and_help() ->
         'component_id 195 our MAVLink component id (1 to 255)']
 
 
-def test_the_help_of_a_payload_without_examples_has_no_gap() -> None:
+def test_the_help_of_a_payload_without_examples_has_no_gap(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr(sys, 'argv', ['/opt/ws/install/my_winch/lib/my_winch/winch'])
     text = usage(Executable('winch', {'winch': WINCH}))
 
-    assert 'ros2 run illuminator_ros winch\n' in text
+    assert '  ros2 run my_winch winch serial:///dev/ttyACM0:57600\n' in text
     assert '\n\n\n' not in text
