@@ -179,7 +179,10 @@ def define(id_: int, name: str, *, extensions: int = 0) -> Callable[[type[M]], t
              + '    return message\n', namespace)
         cls.encode = namespace['encode']  # type: ignore[method-assign]
         cls.decode = staticmethod(namespace['decode'])  # type: ignore[method-assign]
-        LAYOUTS.setdefault(id_, Layout(cls.crc_extra, layout.size))
+        # A class may lack extension fields, which CRC_EXTRA does not cover. With another CRC_EXTRA
+        # it is a message of another dialect that has the same id.
+        if (known := LAYOUTS.get(id_)) is None or known.crc_extra != cls.crc_extra:
+            LAYOUTS[id_] = Layout(cls.crc_extra, layout.size)
         return cls
     return complete
 

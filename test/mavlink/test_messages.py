@@ -16,7 +16,7 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict
+from dataclasses import asdict, dataclass
 import struct
 
 from illuminator_ros.illuminator.messages import STATUS_ID
@@ -24,6 +24,7 @@ from illuminator_ros.mavlink import messages as mav
 from illuminator_ros.mavlink.crc_extra import DIALECT
 from pymavlink.dialects.v20 import ardupilotmega, common
 import pytest
+from support.frames import frame_of, only
 from support.messages import EVERY_MESSAGE, INFORMATION, STATUS
 
 each_message = pytest.mark.parametrize('message', EVERY_MESSAGE, ids=lambda one: one.name)
@@ -64,6 +65,20 @@ def test_frames_of_all_messages_of_pymavlink_can_be_checked() -> None:
     known = ardupilotmega.mavlink_map
     assert {id_: (known[id_].crc_extra, known[id_].unpacker.size) for id_ in DIALECT} == DIALECT
     assert {*common.mavlink_map, STATUS_ID} <= {*mav.LAYOUTS}
+
+
+def test_a_message_of_another_dialect_is_read_in_place_of_the_one_with_its_id(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setitem(mav.LAYOUTS, 180, mav.LAYOUTS[180])
+
+    @mav.define(180, 'WINCH_LOAD')
+    @dataclass(slots=True)
+    class WinchLoad(mav.Message):
+        load: mav.Float
+
+    frame = only(frame_of(WinchLoad(12.5)))
+    assert WinchLoad.decode(frame.payload) == WinchLoad(12.5)
 
 
 def test_every_result_has_a_name_of_its_own() -> None:
