@@ -54,11 +54,13 @@ def unknown_parameters(
     for name in given:
         if name in known:
             continue
-        close = difflib.get_close_matches(name, known, 1, 0.75)
+        # A file may nest the node's name below ros__parameters instead of above it.
+        bare = name.removeprefix(f'{nodes[0].get_name()}.')
+        close = difflib.get_close_matches(bare, known, 1, 0.75)
         is_ours = name.partition('.')[0] not in {*others, 'qos_overrides'}
         # Another node may have a parameter with a similar name.
         if not restrictions.isdisjoint(
-                close if is_ours else difflib.get_close_matches(name, known, 1, 0.9)):
+                close if is_ours else difflib.get_close_matches(bare, known, 1, 0.9)):
             raise ParameterError(f'{name} is unknown; did you mean {close[0]!r}?')
         if is_ours or close:
             warnings.append(_unknown(name, close))

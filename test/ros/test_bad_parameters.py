@@ -101,7 +101,8 @@ def test_section_of_a_parameter_file_that_matches_no_node_is_warned_about(
 
 
 @pytest.mark.parametrize(('name', 'ends'), [
-    ('max_brightnes', True), ('max_brightness_level', False)])
+    ('max_brightnes', True), ('max_brightness_level', False),
+    ('illuminator.max_brightness', True), ('lamp.max_brightness', False)])
 def test_misspelt_restriction_in_a_section_for_other_nodes_ends_the_start_if_it_is_clear(
     ros: Ros, tmp_path: Path, name: str, ends: bool,
 ) -> None:
