@@ -136,7 +136,7 @@ def main(
     arguments = sys.argv[1:] if args is None else args
     executable = Executable(payload, payloads)
     return run_program(
-        executable.name, lambda termination: _run(arguments, termination, executable), queued=[2])
+        executable.name, lambda termination: _run(arguments, termination, executable))
 
 
 # The other entry points of setup.py.
@@ -181,6 +181,9 @@ def _serve(
 
         from ..ros.payload_node import MAX_NODE_NAME, PayloadNode
 
+        # Not before: the import exits at once if the selected middleware is not installed, and a
+        # queue would lose the reason.
+        termination.queue_output(2)
         # From here on the process must leave the ROS graph in order, so a signal acts later.
         termination.calls(lambda: None)
         if refusal := _long_name_refusal(arguments, MAX_NODE_NAME) or log_directory_refusal():

@@ -37,18 +37,16 @@ _REMEDIES = {
 
 
 def run_program(
-    name: str, run: Callable[[Termination], int], more: Iterable[signal.Signals] = (), *,
-    queued: Iterable[int] = (),
+    name: str, run: Callable[[Termination], int], more: Iterable[signal.Signals] = (),
 ) -> int:
     """
     Run a program and return its exit status.
 
     :param run: must import its modules itself, so that a signal meanwhile ends the process.
     :param more: signals that end it too, see :class:`Termination`.
-    :param queued: descriptors that are written to through an :class:`~.output_queue.OutputQueue`.
     """
     escape_output()
-    termination = Termination(more, queued)
+    termination = Termination(more)
     status = explained(name, lambda: run(termination))
     termination.finish()
     return status

@@ -49,19 +49,16 @@ class Termination:
     blocked in this thread and in the threads that it starts, and one thread waits for them.
 
     :param more: signals beside SIGINT, SIGTERM and SIGHUP. Under nohup SIGHUP is left ignored.
-    :param queued: descriptors that are written to through an :class:`OutputQueue`.
     :ivar is_terminal: whether stderr leads to a terminal.
     """
 
-    def __init__(
-        self, more: Iterable[signal.Signals] = (), queued: Iterable[int] = (),
-    ) -> None:
+    def __init__(self, more: Iterable[signal.Signals] = ()) -> None:
         # sigwait() would return a blocked signal although it is ignored.
         ignored = {signal.SIGHUP} if signal.getsignal(signal.SIGHUP) == signal.SIG_IGN else set()
         self._signals = {*SIGNALS, *more} - ignored
         signal.pthread_sigmask(signal.SIG_BLOCK, self._signals)
         self.is_terminal = sys.stderr is not None and sys.stderr.isatty()
-        self._output = OutputQueue(*queued)
+        self._output: OutputQueue | None = None
         self._lock = threading.Lock()
         self._end: Callable[[], None] | None = None
         self._last: Callable[[], None] | None = None
@@ -84,6 +81,10 @@ class Termination:
             signalled = self._signalled
         if signalled:
             end()
+
+    def queue_output(self, *descriptors: int) -> None:
+        """Have descriptors written to through an :class:`OutputQueue`; call this once."""
+        self._output = OutputQueue(*descriptors)
 
     def finish(self) -> None:
         """
@@ -122,7 +123,8 @@ class Termination:
         flushing = _run_in_thread(_flush)
         if flushing is not None:
             flushing.join(limit)
-        self._output.finish(max(until - time.monotonic(), OVERDUE_OUTPUT_LIMIT))
+        if self._output is not None:
+            self._output.finish(max(until - time.monotonic(), OVERDUE_OUTPUT_LIMIT))
 
 
 def _run_in_thread(function: Callable[[], None]) -> threading.Thread | None:

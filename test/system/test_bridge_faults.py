@@ -27,7 +27,7 @@ from std_msgs.msg import Bool, Float32
 from std_srvs.srv import SetBool, Trigger
 from support import ros
 from support.light import Address, eventually, free_port, MavCmd, ServedLight
-from support.processes import ended, Program, python
+from support.processes import ended, Program, python, start_interpreter
 from support.recording import Call
 from support.slow import CLOCK, pass_time_until
 
@@ -123,6 +123,14 @@ def test_directory_for_log_files_that_cannot_be_written_is_named(
     assert program.wait() == 2
     assert f'log files cannot be written {reason}' in program.log
     assert program.log.count('\n') == 1
+
+
+def test_reason_is_printed_if_ros_itself_ends_the_start() -> None:
+    # The import of rclpy exits if this middleware is not installed.
+    program = start_interpreter(BRIDGE, env={'RMW_IMPLEMENTATION': 'rmw_missing_cpp'})
+
+    assert program.wait() != 0
+    assert "'rmw_missing_cpp'" in program.log
 
 
 @pytest.mark.parametrize('descriptors', [8, 14, 18, 20])

@@ -71,12 +71,13 @@ def run_late(thread):
 
 
 def fail(termination):
+    termination.queue_output(2)
     print('the reason', file=sys.stderr)
     return 2
 
 
 threading.Thread.run = run_late
-sys.exit(run_program('program', fail, queued=[2]))
+sys.exit(run_program('program', fail))
 """
 
 

@@ -34,12 +34,14 @@ def main(
     :param args: the command line without the program's name.
     :param payloads: the kinds of payloads that ``--payload`` may name.
     """
-    def start(termination: Termination) -> int:
-        from .run import run
-        return run(args, termination, payloads)
-
     # The live view needs the terminal itself; only the view waits while the terminal is stopped.
     # The exit status after --help depends on whether the text was written.
     texts = {'-h', '--help', '--version'}.intersection(sys.argv[1:] if args is None else args)
     live = sys.stdout is not None and sys.stdout.isatty()
-    return run_program('simulator', start, queued=[2] if live or texts else [1, 2])
+
+    def start(termination: Termination) -> int:
+        termination.queue_output(*([2] if live or texts else [1, 2]))
+        from .run import run
+        return run(args, termination, payloads)
+
+    return run_program('simulator', start)
