@@ -81,6 +81,11 @@ class IlluminatorClient(Payload):
         return tuple(self._discovery.ignored)
 
     @property
+    def unanswering(self) -> tuple[Address, ...]:
+        """Return the addresses that send an illuminator's heartbeat, and no status or answer."""
+        return tuple(self._discovery.candidates)
+
+    @property
     def limit_reached(self) -> bool:
         """Return whether there are more lights than the client takes."""
         return self._discovery.limit_reached

@@ -76,6 +76,7 @@ class Discovery(Generic[D]):
     :param forgotten: called when an announced device was dropped.
     :param wanted: returns whether a device at an address is of interest; others are ignored.
     :ivar devices: the announced devices, by address, in the order of their announcement.
+    :ivar candidates: the devices that are not announced yet, by address.
     :ivar ignored: the first devices that are not wanted, by address.
     :ivar changed: must be called with the address of a device whose deadline may have changed.
     :ivar next_deadline: returns when :meth:`poll` is due, infinity if never.
@@ -96,7 +97,7 @@ class Discovery(Generic[D]):
         self._found = found
         self._forgotten = forgotten
         self._wanted = wanted
-        self._candidates: dict[Address, D] = {}
+        self.candidates: dict[Address, D] = {}
         self._found_at: dict[Address, float] = {}
         self._deadlines: DeadlineQueue[Address] = DeadlineQueue(self._deadline_of)
         self.changed = self._deadlines.changed
@@ -105,11 +106,11 @@ class Discovery(Generic[D]):
     def __iter__(self) -> Iterator[D]:
         """Return the devices and the candidates."""
         yield from self.devices.values()
-        yield from self._candidates.values()
+        yield from self.candidates.values()
 
     def get(self, address: Address) -> D | None:
         """Return the device or the candidate at an address."""
-        return self.devices.get(address) or self._candidates.get(address)
+        return self.devices.get(address) or self.candidates.get(address)
 
     def hear(self, address: Address, now: float, *, proved: bool) -> D | None:
         """
@@ -123,7 +124,7 @@ class Discovery(Generic[D]):
         if device is not None:
             self._deadlines.changed(address)
             return device
-        device = self._candidates.get(address) or self._candidate(address, now, proved=proved)
+        device = self.candidates.get(address) or self._candidate(address, now, proved=proved)
         if device is not None:
             self.changed(address)
             if proved:
@@ -138,20 +139,20 @@ class Discovery(Generic[D]):
         if len(self.devices) >= MAX_DEVICES:
             self.limit_reached = True
             return None
-        if len(self._candidates) >= MAX_CANDIDATES:
+        if len(self.candidates) >= MAX_CANDIDATES:
             oldest, found_at = next(iter(self._found_at.items()))
             if not proved and now < found_at + CANDIDATE_TIME:
                 return None
             self._drop(oldest, now)
-        device = self._candidates[address] = self._make(address)
+        device = self.candidates[address] = self._make(address)
         self._found_at[address] = now
         return device
 
     def prove(self, address: Address, now: float) -> None:
         """Note a valid status or an answer, which announces a candidate."""
-        if address in self._candidates and len(self.devices) < MAX_DEVICES:
+        if address in self.candidates and len(self.devices) < MAX_DEVICES:
             del self._found_at[address]
-            device = self.devices[address] = self._candidates.pop(address)
+            device = self.devices[address] = self.candidates.pop(address)
             self._found(device, now)
 
     def _forgotten_at(self, device: D) -> float:
@@ -159,7 +160,7 @@ class Discovery(Generic[D]):
 
     def _drop(self, address: Address, now: float) -> None:
         self._found_at.pop(address, None)
-        self._candidates.pop(address, None)
+        self.candidates.pop(address, None)
         device = self.devices.pop(address, None)
         self.changed(address)
         self._commands.end_all(now, CommandStatus.CANCELLED, address)

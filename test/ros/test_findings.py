@@ -74,7 +74,7 @@ class Reported:
         light = self.snapshot()
         made = reports(
             link_diagnostics(self.link, self.client, 'udpin://', self.link.now), light=light,
-            heard=heard or LightsHeard(0, (), False),
+            heard=heard or LightsHeard(0, (), (), False),
             hardware_id=hardware_id(light) if light else '', started=self._started)
         return {one.name: one.message('/illuminator') for one in made}
 
@@ -206,7 +206,7 @@ def test_silent_light_that_signs_while_signing_is_off_is_a_warning_with_the_reme
 
 
 def test_lights_that_are_not_the_target_or_too_many_are_named() -> None:
-    link = Reported().statuses(LightsHeard(100, (LIGHT, AUTOPILOT), True))['link']
+    link = Reported().statuses(LightsHeard(100, (LIGHT, AUTOPILOT), (), True))['link']
     assert link.message == (
         'no light connected for 0 ms: 1/243, 1/1 heard, none of which is the target: set '
         'target_system and target_component; '

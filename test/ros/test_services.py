@@ -121,6 +121,17 @@ def test_requests_fail_at_once_and_say_why_while_no_light_was_ever_heard(
         assert Parameters(own_ros).get('brightness') == [None]
 
 
+def test_light_that_is_heard_and_answers_nothing_is_the_reason(own_ros: Ros, port: int) -> None:
+    # The line to the light is broken, and the light sends no status unasked.
+    with (running_bridge(own_ros.domain, port),
+          ServedLight(port, stream=0.0, results=dict.fromkeys(MavCmd))):
+        eventually(lambda: 'none heard yet' not in own_ros.enable().message)
+
+        assert no_light_messages(own_ros) == {
+            'no light connected: 1/243 heard, without an answer or an ILLUMINATOR_STATUS so far: '
+            'check the line to it, and whether it requires signed messages'}
+
+
 def test_requests_fail_at_once_and_say_why_while_the_light_is_lost(
     own_ros: Ros, port: int,
 ) -> None:

@@ -89,11 +89,13 @@ class LightsHeard:
     The lights on a link.
 
     :param some: the first few, including lights that are not served.
+    :param unanswering: the first few that send heartbeats, and no status or answer.
     :param limit_reached: whether there are more than are taken.
     """
 
     count: int
     some: tuple[Address, ...]
+    unanswering: tuple[Address, ...]
     limit_reached: bool
 
 
@@ -104,6 +106,10 @@ def why_no_light(link: diagnostics.LinkDiagnostics, heard: LightsHeard) -> str:
     if heard.some:
         return (f'{", ".join(map(str, heard.some))} heard, none of which is the target: set '
                 'target_system and target_component')
+    if heard.unanswering:
+        return (f'{", ".join(map(str, heard.unanswering))} heard, without an answer or an '
+                'ILLUMINATOR_STATUS so far: check the line to it, and whether it requires signed '
+                'messages')
     return (f'none heard yet on {link.state.name}: '
             + diagnostics.why_nothing_is_heard(link, 'an illuminator'))
 

@@ -254,9 +254,10 @@ class LightNode:
     def _heard(self) -> LightsHeard:
         client = self._client
         # Only a node without a light names them.
-        some = () if self._light() else tuple(itertools.islice(
-            sorted({*client.lights, *client.ignored}), MAX_NAMED))
-        return LightsHeard(len(client.lights), some, client.limit_reached)
+        some, unanswering = ((), ()) if self._light() else (
+            tuple(itertools.islice(sorted(addresses), MAX_NAMED))
+            for addresses in ({*client.lights, *client.ignored}, client.unanswering))
+        return LightsHeard(len(client.lights), some, unanswering, client.limit_reached)
 
 
 def _checked(overrides: Mapping[str, object], limits: SafetyLimits) -> dict[str, float]:
