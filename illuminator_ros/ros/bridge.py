@@ -213,14 +213,15 @@ class Bridge:
                 self._ended.wait(START_RETRY)
 
     def _shut_down_devices(self) -> None:
-        reports: queue.SimpleQueue[tuple[Hashable, int, str]] = queue.SimpleQueue()
-        expected: queue.SimpleQueue[dict[Hashable, str]] = queue.SimpleQueue()
+        reports: queue.SimpleQueue[tuple[NodeLog, Hashable, int, str]] = queue.SimpleQueue()
+        expected: queue.SimpleQueue[dict[tuple[NodeLog, Hashable], str]] = queue.SimpleQueue()
 
         def start(now: float) -> None:
-            late: dict[Hashable, str] = {}
-            for payload in self._payloads:
-                late |= payload.shut_down(
-                    now, lambda key, severity, text: reports.put((key, severity, text)))
+            late: dict[tuple[NodeLog, Hashable], str] = {}
+            for log, payload in zip(self._logs, self._payloads, strict=True):
+                texts = payload.shut_down(
+                    now, lambda *outcome, log=log: reports.put((log, *outcome)))
+                late |= {(log, key): text for key, text in texts.items()}
             expected.put(late)
 
         deadline = time.monotonic() + OFF_LIMIT
@@ -228,14 +229,16 @@ class Bridge:
         try:
             late = expected.get(timeout=OFF_LIMIT)
         except queue.Empty:
-            late = {None: 'the link did not answer, devices may still be on: no confirmation'}
+            late = {(self.log, None):
+                    'the link did not answer, devices may still be on: no confirmation'}
         with contextlib.suppress(queue.Empty):
             while late:
-                key, severity, text = reports.get(timeout=max(deadline - time.monotonic(), 0.0))
-                late.pop(key, None)
-                self.log.write(severity, text)
-        for text in late.values():
-            self.log.error(f'{text} within {format_seconds(OFF_LIMIT)}')
+                log, key, severity, text = reports.get(
+                    timeout=max(deadline - time.monotonic(), 0.0))
+                late.pop((log, key), None)
+                log.write(severity, text)
+        for (log, _), text in late.items():
+            log.error(f'{text} within {format_seconds(OFF_LIMIT)}')
 
     def _keep_house(self) -> None:
         graph_due, shared, unheard = 0.0, frozenset[str](), frozenset[str]()

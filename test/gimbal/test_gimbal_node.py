@@ -16,7 +16,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 import contextlib
 import math
 from typing import Any
@@ -27,6 +27,7 @@ from illuminator_ros.gimbal.messages import (
     GimbalCommand,
     NO_COMPONENT,
 )
+from illuminator_ros.mavlink.link import Link
 from illuminator_ros.mavlink.messages import CommandInt, MavResult
 from illuminator_ros.payload.mount_attitude import from_mavlink, MountFlags, to_mavlink, YawFrame
 from illuminator_ros.payload.rotation import Quaternion
@@ -43,7 +44,15 @@ from std_srvs.srv import SetBool, Trigger  # noqa: E402
 from support.gimbals import ALL, FakeManager, NAN, OTHER, OURS, served_gimbals  # noqa: E402
 from support.ports import free_port  # noqa: E402
 from support.processes import ended, Program, slow_python  # noqa: E402
-from support.ros import bridge_arguments, Parameters, Ros, running_bridge, STREAM  # noqa: E402
+from support.ros import (  # noqa: E402
+    bridge_arguments,
+    Parameters,
+    Ros,
+    running_bridge,
+    start_bridge,
+    start_slow_bridge,
+    STREAM,
+)
 from support.slow import pass_time_until, SlowLink, time_passes  # noqa: E402
 from support.waiting import eventually  # noqa: E402
 
@@ -345,6 +354,22 @@ def test_control_is_released_when_the_node_ends_and_taken_at_the_start_if_asked(
         assert program.end() == 0
         assert (manager.primary, manager.secondary) == (NO_COMPONENT, NO_COMPONENT)
         assert program.count('gimbal 1/154: control released') == 1
+
+
+@pytest.mark.parametrize(('start', 'link', 'line'), [
+    (start_slow_bridge, SlowLink, 'gimbal 1/154: control released'),
+    (start_bridge, Link, 'this node may still control gimbal 1/154: no confirmation within ')])
+def test_the_release_at_the_end_is_in_the_log_of_the_node_of_the_gimbal(
+        start: Callable[..., Program], link: type[Link], line: str, own_ros: Ros) -> None:
+    port = free_port()
+    manager = FakeManager(primary=OURS, answers=start is start_slow_bridge)
+    with (ended(start(own_ros.domain, port, payloads='[illuminator, gimbal]')) as program,
+          served_gimbals(port, manager, link=link)):
+        with time_passes():
+            own_ros.subscribe(Bool, '/gimbal/in_control').wait_value(True)
+        assert program.end() == 0
+        [found] = [one for one in program.lines if line in one]
+        assert '[gimbal]' in found
 
 
 def test_gm_3_earth_frame_is_refused_where_the_gimbal_lacks_it(
