@@ -133,7 +133,7 @@ class DemandRefused:
 
 @dataclass(frozen=True)
 class SetpointClipped:
-    """Angles beyond the ranges of the device are clipped, other ones than before."""
+    """Angles beyond the ranges of the device are clipped; once for an axis and a setpoint."""
 
     clipped: tuple[Clipped, ...]
 
@@ -155,7 +155,7 @@ class AddressShared:
 @dataclass(frozen=True)
 class ReferenceLost:
     """
-    The gimbal does not follow its region of interest, or a yaw relative to north.
+    The gimbal no longer follows its region of interest, or a yaw relative to north.
 
     :param unknown: the unknown value of the vehicle: ``position`` or ``heading``.
     """
@@ -213,6 +213,9 @@ class GimbalManager(Payload):
         self._setpoint: Setpoint | None = None
         self._sent: Setpoint | None = None
         self._clipped: tuple[Clipped, ...] = ()
+        # By axis, the demand whose clipped angle was reported.
+        self._reported: dict[str, object] = {}
+        self._lost: set[str] = set()
         self._changed_at = -math.inf
         self._offsets = STILL
         self._roi: GeoPoint | None = None
@@ -531,17 +534,16 @@ class GimbalManager(Payload):
         self._send_due = now + (
             FOLLOW_INTERVAL if setpoint.turning != STILL or converts or self._roi is not None
             else HOLD_INTERVAL)
-        before = self._clipped
         attitude, self._clipped = clip(
-            setpoint, self.model.ranges, ahead, self._offsets, before)
-        if self._clipped and self._clipped != before:
-            self.events.emit(SetpointClipped(self._clipped))
+            setpoint, self.model.ranges, ahead, self._offsets, self._clipped)
+        if self._clipped or self._reported:
+            self._report_clipped(setpoint)
         sent = setpoint
         if attitude is not setpoint.attitude:
             sent = setpoint._replace(attitude=attitude)
+        self._note_lost('heading', is_lost=converts and ahead is None)
         if converts:
             if ahead is None:
-                self.events.emit(ReferenceLost('heading'))
                 return
             sent = in_vehicle_frame(sent, ahead)
         self._sent = sent
@@ -551,6 +553,25 @@ class GimbalManager(Payload):
             self._commands.send(GimbalDeviceSetAttitude(
                 *self.tracker.device, sent.device_flags, sent.attitude or UNSET_QUATERNION,
                 *sent.rates))
+
+    def _report_clipped(self, setpoint: Setpoint) -> None:
+        """Report a clipped angle once, although it changes while the vehicle turns or moves."""
+        demands: dict[str, object] = {
+            axis: (setpoint.frame, self._roi or (
+                math.copysign(1.0, rate) if rate else round(angle + offset, 6)))
+            for axis, angle, offset, rate in zip(
+                AXES, setpoint.target, self._offsets, setpoint.turning, strict=True)}
+        self._reported = {axis: demand for axis, demand in self._reported.items()
+                          if demand == demands[axis]}
+        if new := tuple(one for one in self._clipped if one.axis not in self._reported):
+            self._reported |= {one.axis: demands[one.axis] for one in new}
+            self.events.emit(SetpointClipped(new))
+
+    def _note_lost(self, name: str, *, is_lost: bool) -> None:
+        """Report once that a value of the vehicle, which the setpoint needs, is unknown."""
+        if is_lost and name not in self._lost:
+            self.events.emit(ReferenceLost(name))
+        self._lost = self._lost | {name} if is_lost else self._lost - {name}
 
     # A region of interest
 
@@ -586,9 +607,8 @@ class GimbalManager(Payload):
         """Send the setpoint, which follows the region of interest if there is one."""
         if self._roi is not None:
             position = self.vehicle.position(now)
-            if position is None:
-                self.events.emit(ReferenceLost('position'))
-            elif (angles := direction(position, self._roi)) is not None:
+            self._note_lost('position', is_lost=position is None)
+            if position and (angles := direction(position, self._roi)) is not None:
                 self._setpoint = Setpoint(
                     self._roi_flags(), YawFrame.EARTH, Quaternion.from_euler(0.0, *angles),
                     since=now)
@@ -666,6 +686,7 @@ class GimbalManager(Payload):
             self._setpoint = stopped(setpoint) if setpoint and setpoint.has_rates_only else None
             self._roi = None
             self._offsets = STILL
+            self._clipped, self._reported = (), {}
         if change.after is ManagerState.LISTENING:
             # Another manager may send no status, but answers a request.
             self._commands.send(Command(
