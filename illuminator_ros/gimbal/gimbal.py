@@ -460,10 +460,10 @@ class Gimbal:
         manager = self._active
         if manager is None or not self._manager_heard:
             done(request.Result(False, self.unavailable(now)), now)
-        elif self._control is not None and not manager.requests and (
-                self.in_control if take else not self.has_any_control):
-            state = 'in control already' if take else 'not in control'
-            ended(request.Result(True, f'{state}: {self._control}'), now)
+        elif (not take and self._control is not None and not manager.requests
+                and not self.has_any_control):
+            # PX4 would take the system id from another component of our system.
+            ended(request.Result(True, f'not in control: {self._control}'), now)
         else:
             change = Configure(self._commands.address, self.key.device_id, take)
             manager.requests.submit(_request(

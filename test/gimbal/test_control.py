@@ -91,15 +91,24 @@ def test_gm_16_control_that_no_status_shows_is_not_a_success(
     assert not rig.gimbal.in_control
 
 
-@pytest.mark.parametrize(('primary', 'ask', 'text'), [
-    (OURS, Gimbal.take_control, 'in control already: primary 1/194, secondary none'),
-    (OTHER, Gimbal.release_control, 'not in control: primary 1/195, secondary none')])
-def test_request_for_what_the_status_shows_already_sends_nothing(
-        primary: mav.Address, ask: Ask, text: str) -> None:
-    rig = Rig(FakeManager(primary=primary)).run(3.0)
+def test_release_without_control_sends_nothing() -> None:
+    rig = Rig(FakeManager(primary=OTHER)).run(3.0)
 
-    assert asked(rig, ask, 0.1) == (True, text)
+    assert asked(rig, Gimbal.release_control, 0.1) == (
+        True, 'not in control: primary 1/195, secondary none')
     assert commands(rig, CONFIGURE) == []
+
+
+@pytest.mark.parametrize('is_restarted', [False, True])
+def test_gm_16_control_that_an_earlier_status_showed_is_asked_of_the_manager_again(
+        is_restarted: bool) -> None:
+    rig = in_control()
+    if is_restarted:
+        # It rejects commands while it listens for other managers, and sends no status.
+        rig.managers[0].results[CONFIGURE] = mav.MavResult.TEMPORARILY_REJECTED
+        rig.managers[0].reports = False
+
+    assert asked(rig, Gimbal.take_control)[0] is not is_restarted
 
 
 @pytest.mark.parametrize(('primary', 'asks', 'last'), [
