@@ -54,6 +54,7 @@ from ..payload.mount_attitude import (
     to_mavlink,
     UNSET_QUATERNION,
     UNSET_VECTOR,
+    yaw_frame,
     YawFrame,
 )
 from ..payload.rotation import flu_frd, Quaternion, Vector
@@ -64,6 +65,8 @@ SILENCE_LIMIT = 3.0
 REQUEST_LIMIT = 5.0
 # s after which an attitude is sent again, since the message is not acknowledged.
 REPEATS = (0.2, 0.4, 0.8)
+# s after an attitude in which the device may still report the yaw lock that it had before.
+LOCK_DELAY = 1.0
 # rad/s above which a device turns, and the least s between two attitudes that show it: one may be
 # a copy of the other.
 TURNING, ATTITUDE_SPACING = 0.01, 0.1
@@ -232,6 +235,9 @@ class Gimbal:
         self._errors = ErrorFlags(0)
         self._setpoint: _Setpoint | None = None
         self._setpoints_sent = 0
+        # The yaw frame of the last attitude or request, which implies the yaw lock; and the time
+        # until which rates keep it, s: later the reported lock counts.
+        self._frame, self._frame_until = YawFrame.VEHICLE, -math.inf
         # The requests so far that suspend setpoints, those of them that have not ended, and the
         # number of the last one that succeeded.
         self._requests = self._open_requests = self._last_success = 0
@@ -562,9 +568,16 @@ class Gimbal:
         if reason or manager is None:
             done(request.Result(False, reason), now)
             return
+        suspended = self._suspend(None, now, done)
+        self._frame, self._frame_until = yaw_frame(flags), now + REQUEST_LIMIT
+
+        def ended(result: request.Result, now: float) -> None:
+            self._frame_until = now
+            suspended(result, now)
+
         manager.flag_requests.submit(_request(
             manager.flag_target, SetFlags(flags, flag, self.key.device_id, goal), now,
-            self._explained(goal, self._suspend(None, now, done))), now)
+            self._explained(goal, ended)), now)
 
     def _capabilities(self) -> Capabilities | None:
         manager = self._active
@@ -674,11 +687,11 @@ class Gimbal:
         reason = self.unavailable(now) or (
             self._missing(*absolute) if frame is YawFrame.EARTH else '')
         if not reason:
-            message = self._message(setpoint_flags(frame), to_mavlink(rotation, frame),
-                                    UNSET_VECTOR)
+            message = self._message(frame, to_mavlink(rotation, frame), UNSET_VECTOR)
             self._setpoint = _Setpoint(
                 self._manager, message, (rotation, frame), [now + delay for delay in REPEATS],
                 after=self._requests)
+            self._frame, self._frame_until = frame, now + LOCK_DELAY
             self._send(message)
         return reason
 
@@ -721,7 +734,9 @@ class Gimbal:
 
     def _send_rates(self, rates: Vector, now: float) -> None:
         frame = YawFrame.EARTH if self._flags & MountFlags.YAW_LOCK else YawFrame.VEHICLE
-        message = self._message(setpoint_flags(frame), UNSET_QUATERNION, flu_frd(rates))
+        if now < self._frame_until:
+            frame = self._frame
+        message = self._message(frame, UNSET_QUATERNION, flu_frd(rates))
         self._setpoint = _Setpoint(self._manager, message, after=self._requests)
         if rates == STILL:
             self._setpoint.zero_repeats = [now + delay for delay in REPEATS]
@@ -730,8 +745,11 @@ class Gimbal:
         self._send(message)
 
     def _message(
-        self, flags: MountFlags, q: tuple[float, float, float, float], rates: Vector,
+        self, frame: YawFrame, q: tuple[float, float, float, float], rates: Vector,
     ) -> GimbalManagerSetAttitude:
+        flags = setpoint_flags(frame)
+        if self._missing(Capabilities.HAS_YAW_LOCK):
+            flags &= ~MountFlags.YAW_LOCK
         return GimbalManagerSetAttitude(*self._manager, flags, self.key.device_id, q, *rates)
 
     def _send(self, message: GimbalManagerSetAttitude) -> None:

@@ -20,7 +20,12 @@ from collections.abc import Callable
 import math
 
 from illuminator_ros.gimbal.gimbal import REPEATS
-from illuminator_ros.gimbal.messages import Capabilities, GimbalManagerSetAttitude
+from illuminator_ros.gimbal.messages import (
+    Capabilities,
+    GimbalCommand,
+    GimbalManagerSetAttitude,
+)
+from illuminator_ros.mavlink.messages import MavResult
 from illuminator_ros.payload.mount_attitude import from_mavlink, MountFlags, to_mavlink, YawFrame
 from illuminator_ros.payload.rotation import Quaternion, Vector
 import pytest
@@ -117,6 +122,35 @@ def test_gm_2_rate_leaves_the_yaw_lock_as_the_device_has_it(shown: int, sent: in
     rig.gimbal.set_rates((0.0, 0.2, 0.0), rig.now)
 
     assert setpoints(rig.run(0.1))[0][1].flags == sent
+
+
+def request_lock(rig: Rig, lock: bool) -> None:
+    rig.gimbal.set_yaw_lock(lock, rig.now, rig.done)
+
+
+def send_attitude(rig: Rig, lock: bool) -> None:
+    rig.gimbal.set_attitude(Quaternion(), EARTH if lock else VEHICLE, rig.now)
+
+
+@pytest.mark.parametrize('lock', [True, False])
+@pytest.mark.parametrize(('change', 'result', 'changes'), [
+    (request_lock, MavResult.ACCEPTED, True), (request_lock, MavResult.DENIED, False),
+    (send_attitude, MavResult.ACCEPTED, True)])
+def test_gm_2_rate_leaves_a_yaw_lock_that_the_device_does_not_report_yet(
+        change: Callable[[Rig, bool], None], result: MavResult, changes: bool,
+        lock: bool) -> None:
+    rig = in_control()
+    rig.managers[0].flags = MountFlags(0) if lock else MountFlags.YAW_LOCK
+    rig.managers[0].results[GimbalCommand.DO_GIMBAL_MANAGER_PITCHYAW] = result
+    rig.run(1.0)
+
+    change(rig, lock)
+    rig.run(0.02)
+    rig.gimbal.set_rates((0.0, 0.2, 0.0), rig.now)
+    rig.run(0.02)
+
+    has_lock = bool(setpoints(rig)[-1][1].flags & MountFlags.YAW_LOCK)
+    assert has_lock is (lock is changes)
 
 
 def test_gm_17_setpoints_stop_when_control_is_lost() -> None:
@@ -243,10 +277,11 @@ def test_gm_14_setpoint_without_control_is_not_sent(
 
 
 @pytest.mark.parametrize(('has', 'sent'), [
-    (Capabilities(0), False), (Capabilities.HAS_YAW_LOCK, True),
-    (Capabilities.SUPPORTS_YAW_IN_EARTH_FRAME, True)])
+    (Capabilities(0), None),
+    (Capabilities.HAS_YAW_LOCK, MountFlags.YAW_IN_EARTH_FRAME | MountFlags.YAW_LOCK),
+    (Capabilities.SUPPORTS_YAW_IN_EARTH_FRAME, MountFlags.YAW_IN_EARTH_FRAME)])
 def test_gm_3_yaw_relative_to_the_earth_is_sent_only_to_a_gimbal_that_has_it(
-        has: Capabilities, sent: bool) -> None:
+        has: Capabilities, sent: MountFlags | None) -> None:
     lacking = ALL & ~Capabilities.HAS_YAW_LOCK & ~Capabilities.SUPPORTS_YAW_IN_EARTH_FRAME
     rig = Rig(FakeManager(primary=OURS, capabilities=lacking | has)).run(3.0)
 
@@ -254,6 +289,8 @@ def test_gm_3_yaw_relative_to_the_earth_is_sent_only_to_a_gimbal_that_has_it(
 
     assert reason == ('' if sent else 'gimbal 1/154 does not have HAS_YAW_LOCK or '
                       'SUPPORTS_YAW_IN_EARTH_FRAME')
+    rig.run(0.1)
+    assert [one.flags for _, one in setpoints(rig)] == ([LEVEL | sent] if sent else [])
     assert rig.gimbal.set_attitude(Quaternion(), VEHICLE, rig.now) == ''
 
 
