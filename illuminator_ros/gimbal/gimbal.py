@@ -16,7 +16,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Container
 from dataclasses import dataclass, field
 import math
 from typing import Any, TypeVar
@@ -82,6 +82,8 @@ MAV_FRAME_GLOBAL = 0
 S = TypeVar('S')
 # Commands that move a gimbal.
 _MOVES = DEVICE_ID_PARAM.keys() - {GimbalCommand.DO_GIMBAL_MANAGER_CONFIGURE}
+# Commands that must not be sent again after a later setpoint or request, which they would undo.
+_PLACES = (GimbalCommand.DO_SET_ROI_LOCATION, GimbalCommand.DO_SET_ROI_NONE)
 
 
 @dataclass
@@ -450,6 +452,7 @@ class Gimbal:
             done(result, now)
 
         self._begin(now)
+        self._cancel(_PLACES, now)
         self._end_motion(now)
         if self._setpoint is not None and self._setpoint.moves and self._manager_heard:
             self._send_rates(STILL, now)
@@ -528,12 +531,16 @@ class Gimbal:
         self._end_motion(now)
         if self._active is not None and change.before is not None:
             self._active.flag_requests.cancel(self.refusal(change.before), now)
-            # The manager may have other gimbals, whose commands must not end.
-            self._commands.end_all(
-                now, CommandStatus.CANCELLED, self._manager, lambda command: (
-                    command.command in _MOVES and self.key.device_id == command.params[
-                        DEVICE_ID_PARAM[command.command]]))
+            self._cancel(_MOVES, now)
         self._emit(events.GimbalHeld(self.key, change))
+
+    def _cancel(self, commands: Container[int], now: float) -> None:
+        """End commands of these kinds that are under way."""
+        # The manager may have other gimbals, whose commands must not end.
+        self._commands.end_all(
+            now, CommandStatus.CANCELLED, self._manager, lambda command: (
+                command.command in commands and self.key.device_id == command.params[
+                    DEVICE_ID_PARAM[command.command]]))
 
     # Requests
 
@@ -631,7 +638,8 @@ class Gimbal:
 
         def ended(result: CommandResult, now: float) -> None:
             explained(request.Result(
-                result.accepted, str(result), refused=result.refused), now)
+                result.accepted, str(result), refused=result.refused,
+                superseded=result.status is CommandStatus.CANCELLED), now)
 
         self._commands.start(command, now, ended, deadline=now + REQUEST_LIMIT)
 
@@ -644,6 +652,7 @@ class Gimbal:
         :param place: the setpoint that the request makes, None if it makes none.
         :return: a callback that ends the present setpoint, unless the request fails.
         """
+        self._cancel(_PLACES, now)
         if self._setpoint is not None and self._setpoint.zero_at < math.inf:
             self._send_rates(STILL, now)
         before = self._setpoint
@@ -687,6 +696,7 @@ class Gimbal:
         reason = self.unavailable(now) or (
             self._missing(*absolute) if frame is YawFrame.EARTH else '')
         if not reason:
+            self._cancel(_PLACES, now)
             message = self._message(frame, to_mavlink(rotation, frame), UNSET_VECTOR)
             self._setpoint = _Setpoint(
                 self._manager, message, (rotation, frame), [now + delay for delay in REPEATS],
@@ -729,6 +739,7 @@ class Gimbal:
         self._begin(now)
         reason = self.unavailable(now)
         if not reason:
+            self._cancel(_PLACES, now)
             self._send_rates(rates, now)
         return reason
 

@@ -345,6 +345,25 @@ def set_roi(gimbal: Gimbal, now: float, done: Done) -> None:
     gimbal.set_roi(47.0, 8.5, 500.0, now, done)
 
 
+@pytest.mark.parametrize('later', [
+    *(ask for ask, *_ in FLAG_REQUESTS), Gimbal.clear_roi, Gimbal.release_control,
+    lambda gimbal, now, done: gimbal.set_attitude(Quaternion(), YawFrame.VEHICLE, now),
+    lambda gimbal, now, done: gimbal.set_rates((0.0, 0.1, 0.0), now)])
+def test_gm_8_place_without_an_answer_is_not_sent_again_after_a_later_setpoint_or_request(
+        later: Ask) -> None:
+    rig = in_control()
+    rig.managers[0].answers = False
+    set_roi(rig.gimbal, rig.now, rig.done)
+    rig.run(0.1)
+    rig.managers[0].answers = True
+
+    later(rig.gimbal, rig.now, rig.done)
+    rig.run(3.0)
+
+    assert len(rig.messages(mav.CommandInt)) == 1
+    assert (rig.results[0].success, rig.results[0].superseded) == (False, True)
+
+
 @pytest.mark.parametrize(('ask', 'command', 'goal'), [
     (FLAG_REQUESTS[2][0], GimbalCommand.DO_GIMBAL_MANAGER_PITCHYAW, 'yaw locked'),
     (set_roi, GimbalCommand.DO_SET_ROI_LOCATION, 'point at 47, 8.5, 500 m'),

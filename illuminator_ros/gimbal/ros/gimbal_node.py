@@ -259,12 +259,13 @@ class GimbalNode:
                   lambda message: conversions.read_place(message, self._separation)))
 
     def _point(
-        self, source: str, topic: str, place: GeoPoint, now: float, ended: Callable[[float], None],
+        self, source: str, topic: str, place: GeoPoint, now: float,
+        ended: Callable[[float, bool], None],
     ) -> None:
         def done(result: request.Result, now: float) -> None:
             if not result.success:
                 self._refused(topic, result.message)
-            ended(now)
+            ended(now, result.superseded)
 
         gimbal = self._gimbal()
         # The source may have lost the gimbal while the previous place was sent.
@@ -303,12 +304,12 @@ class _LatestPlace:
     """
     Sends one place after the other; of those that come meanwhile only the newest.
 
-    :param send: starts to send a place, given the time (s), and the function to call with the
-        time when it has ended.
+    :param send: starts to send a place, given the time (s), and the function to call when it has
+        ended: with the time, and whether a place that waits is outdated, too.
     """
 
     def __init__(
-        self, send: Callable[[GeoPoint, float, Callable[[float], None]], None],
+        self, send: Callable[[GeoPoint, float, Callable[[float, bool], None]], None],
     ) -> None:
         self._send = send
         self._waiting: GeoPoint | None = None
@@ -318,10 +319,10 @@ class _LatestPlace:
         """Send a place, unless a newer one comes before it is sent."""
         self._waiting = place
         if not self._is_sending:
-            self._send_next(now)
+            self._send_next(now, False)
 
-    def _send_next(self, now: float) -> None:
-        place, self._waiting = self._waiting, None
+    def _send_next(self, now: float, is_outdated: bool) -> None:
+        place, self._waiting = None if is_outdated else self._waiting, None
         self._is_sending = place is not None
         if place is None:
             return
