@@ -299,7 +299,9 @@ class GimbalManager(Payload):
             return None
         if params[DEVICE_ID_PARAM[command.command]] not in (0, self.tracker.device_id):
             return MavResult.DENIED
-        if self.tracker.state is not ManagerState.ACTIVE:
+        if inactive := self._inactivity():
+            if command.command != GimbalCommand.DO_GIMBAL_MANAGER_CONFIGURE:
+                self.events.emit(DemandRefused(source, inactive))
             return (MavResult.DENIED if self.tracker.state is ManagerState.INACTIVE
                     else MavResult.TEMPORARILY_REJECTED)
         return handler(source, command, now)
@@ -435,8 +437,8 @@ class GimbalManager(Payload):
 
     def _demand(self, player: Address, demand: Demand, now: float) -> str:
         """Follow a player's demand; return why it is refused, or ''."""
-        if self.tracker.state is not ManagerState.ACTIVE:
-            return f'the manager is not active: {self.tracker.state.value}'
+        if inactive := self._inactivity():
+            return inactive
         if self.control.primary.holder == player:
             return self._set(demand, now)
         if self.control.secondary.holder == player:
@@ -447,6 +449,11 @@ class GimbalManager(Payload):
             self._send(now)
             return ''
         return self._lacks_control(player)
+
+    def _inactivity(self) -> str:
+        """Return that the manager gives no setpoints now, '' if it does."""
+        state = self.tracker.state
+        return '' if state is ManagerState.ACTIVE else f'the manager is not active: {state.value}'
 
     def _lacks_control(self, player: Address) -> str:
         """Return why a player may not set the gimbal, '' if it has primary control."""
@@ -580,6 +587,8 @@ class GimbalManager(Payload):
             return self._answer(source, refusal, now)
         read = read_roi(command)
         if isinstance(read, MavResult):
+            self.events.emit(DemandRefused(
+                source, f'{command_name(command.command)}: no place, or an unknown frame'))
             return read
         place, is_relative = read
         above = self.vehicle.home_altitude if is_relative else 0.0

@@ -714,6 +714,8 @@ def test_gm_8_a_region_of_interest_is_answered_with_its_reason(
     rig = following()
 
     assert rig.result(PILOT, command) is result
+    assert len(of(gimbal_manager.DemandRefused, rig.events)) == (
+        result is not mav.MavResult.ACCEPTED)
 
 
 def test_gm_8_an_altitude_above_home_is_converted() -> None:
@@ -938,7 +940,11 @@ def test_commands_are_rejected_for_now_until_the_manager_is_active() -> None:
 
     assert rig.manager.tracker.state is ManagerState.LISTENING
     assert rig.take(PILOT) is mav.MavResult.TEMPORARILY_REJECTED
+    for command in (pitch_yaw_command(1, 1), region(47.1, 8.0, 0.0)):
+        assert rig.result(PILOT, command) is mav.MavResult.TEMPORARILY_REJECTED
     assert rig.messages(GimbalManagerStatus) == []
+    assert of(gimbal_manager.DemandRefused, rig.events) == [gimbal_manager.DemandRefused(
+        PILOT, 'the manager is not active: listening')] * 2
 
 
 def test_the_manager_follows_a_device_that_is_exchanged() -> None:
