@@ -151,6 +151,8 @@ class EarlierCommand(NamedTuple):
     :param elapsed: s, from the first sending to the end.
     :param last_ack_at: from then on an acknowledgement answers the last try, so that ``elapsed``
         was the round trip of the first; infinity where it was not one.
+    :param is_doubtful: whether acknowledgements with another result than its own may still come:
+        its own, if an earlier command's was taken for it, or a copy of an earlier command's.
     """
 
     command: Command
@@ -159,6 +161,7 @@ class EarlierCommand(NamedTuple):
     tries: int
     elapsed: float
     last_ack_at: float
+    is_doubtful: bool
 
 
 class CommandResult(NamedTuple):
@@ -195,12 +198,12 @@ class CommandResult(NamedTuple):
         Return whether the acknowledgement may belong to the earlier command of this kind.
 
         That is possible if the earlier command got the same result, which may come twice, or none,
-        which may still come. A status must then decide.
+        which may still come, or if its own result is doubtful. A status must then decide.
 
         :param now: when this command was answered.
         """
         return (self.status is CommandStatus.ANSWERED and self.earlier is not None
-                and self.earlier.result in (None, self.result)
+                and (self.earlier.is_doubtful or self.earlier.result in (None, self.result))
                 and now - self.earlier.ended_at <= ACK_LIFETIME)
 
     def describe(self) -> str:
@@ -247,7 +250,7 @@ class RttEstimator:
 
     def add(self, seconds: float, now: float) -> None:
         """Add a sample, s."""
-        self._samples.append((seconds, now >= self._ambiguous_until))
+        self._samples.append((seconds, not self.is_ambiguous(now)))
         bisect.insort(self._sorted, seconds)
         if len(self._samples) > MAX_SAMPLES:
             del self._sorted[bisect.bisect_left(self._sorted, self._samples.pop(0)[0])]
@@ -262,6 +265,10 @@ class RttEstimator:
             return None
         return self._sorted[min(int(share * len(self._sorted)), len(self._sorted) - 1)]
 
+    def is_ambiguous(self, now: float) -> bool:
+        """Return whether acknowledgements may belong to an earlier try or be copies."""
+        return now < self._ambiguous_until
+
     def shortest(self, now: float) -> float:
         """
         Return a time after a command within which no answer to it can come, s.
@@ -272,7 +279,7 @@ class RttEstimator:
         :return: the lower quartile of the last eight unambiguous samples, or the median of all
             samples if there are none; 0 while acknowledgements are not ambiguous.
         """
-        if now >= self._ambiguous_until:
+        if not self.is_ambiguous(now):
             return 0.0
         unambiguous = sorted([seconds for seconds, known in self._samples if known][-8:])
         return unambiguous[len(unambiguous) // 4] if unambiguous else self.quantile(0.5) or 0.0
@@ -600,9 +607,10 @@ class CommandSender:
         if pending.state is CommandState.WAITING:
             pending.done(CommandResult(status), now)
             return
+        earlier = self._earlier.pop(key, None)
         result = CommandResult(
             status, pending.result, pending.tries, now - pending.first_sent, pending.progress,
-            self._earlier.pop(key, None))
+            earlier)
         answered = status is CommandStatus.ANSWERED
         while self._earlier and now > (
                 oldest := next(iter(self._earlier.values()))).ended_at + ACK_LIFETIME:
@@ -611,7 +619,9 @@ class CommandSender:
         between = pending.last_sent - pending.first_sent
         self._earlier[key] = EarlierCommand(
             command, pending.result if answered else None, now, pending.tries, result.elapsed,
-            now + between / 2 if is_measure else math.inf)
+            now + between / 2 if is_measure else math.inf,
+            self.round_trip(command.target).is_ambiguous(now)
+            or earlier is not None and earlier.result is None and result.may_answer_earlier(now))
         if status is CommandStatus.NO_ANSWER:
             self.counters.unanswered += 1
             self.unanswering[command.target] = None

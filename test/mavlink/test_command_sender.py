@@ -387,6 +387,27 @@ def test_result_says_whether_it_may_be_that_of_the_command_before(
     assert run.outcome.may_answer_earlier(rig.now) is ambiguous
 
 
+@pytest.mark.parametrize(('first', 'copies', 'ambiguous'), [
+    # The second command may have ended with the late answer to the first.
+    (None, 0, True),
+    # More copies may come where one came.
+    (DENIED, 1, True), (DENIED, 0, False)])
+def test_result_says_whether_it_may_be_that_of_a_command_before_the_last(
+        first: int | None, copies: int, ambiguous: bool) -> None:
+    rig = Rig()
+    if first is None:
+        rig.sender.cancel(rig.start().command, rig.now)
+    else:
+        rig.start()
+        for _ in range(1 + copies):
+            rig.ack(first)
+    rig.start()
+    rig.ack(ACCEPTED)
+    run = rig.start()
+    rig.ack(DENIED)
+    assert run.outcome.may_answer_earlier(rig.now) is ambiguous
+
+
 # Fields, arguments, texts and counters
 
 @pytest.mark.parametrize(('command', 'as_int', 'message'), [
