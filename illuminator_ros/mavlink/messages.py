@@ -18,7 +18,7 @@ Message classes: the fields of a MAVLink message, and its payload's bytes.
 A class is defined from its fields, as the XML definition lists them; the layout and CRC_EXTRA
 follow from those (MAVLink guide, "Packet Serialization"). The classes here belong to services
 that every component has. A payload defines its own, and names those that it handles. Frames of
-all other messages of the dialect ardupilotmega are checked, but not decoded.
+all other messages of the dialects ardupilotmega and common are checked, but not decoded.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ from typing import Annotated, Any, ClassVar, get_args, get_type_hints, NamedTupl
 
 from fastcrc.crc16 import mcrf4xx
 
-from .crc_extra import DIALECT
+from .crc_extra import COMMON, DIALECT
 
 UInt8 = Annotated[int, 'B']
 UInt16 = Annotated[int, 'H']
@@ -125,7 +125,8 @@ class Message:
 
 M = TypeVar('M', bound=Message)
 # Every message that can be checked, by message id.
-LAYOUTS: dict[int, Layout] = {id_: Layout(*values) for id_, values in DIALECT.items()}
+LAYOUTS: dict[int, Layout] = {
+    id_: Layout(*values) for id_, values in (DIALECT | COMMON).items()}
 
 
 def define(id_: int, name: str, *, extensions: int = 0) -> Callable[[type[M]], type[M]]:

@@ -26,6 +26,7 @@ from pymavlink.dialects.v20 import ardupilotmega, common
 import pytest
 from support.frames import frame_of, only
 from support.messages import EVERY_MESSAGE, INFORMATION, STATUS
+from support.reference_dialect import generated
 
 each_message = pytest.mark.parametrize('message', EVERY_MESSAGE, ids=lambda one: one.name)
 
@@ -79,6 +80,20 @@ def test_a_message_of_another_dialect_is_read_in_place_of_the_one_with_its_id(
 
     frame = only(frame_of(WinchLoad(12.5)))
     assert WinchLoad.decode(frame.payload) == WinchLoad(12.5)
+
+
+@pytest.mark.parametrize(('id_', 'name', 'fields'), [
+    (300, 'PROTOCOL_VERSION', 'uint16_t version, uint16_t min_version, uint16_t max_version, '
+     'uint8_t[8] spec_version_hash, uint8_t[8] library_version_hash'),
+    (410, 'EVENT', 'uint8_t destination_component, uint8_t destination_system, uint32_t id, '
+     'uint32_t event_time_boot_ms, uint16_t sequence, uint8_t log_levels, uint8_t[40] arguments'),
+    (411, 'CURRENT_EVENT_SEQUENCE', 'uint16_t sequence, uint8_t flags'),
+    (436, 'CURRENT_MODE',
+     'uint8_t standard_mode, uint32_t custom_mode, uint32_t intended_custom_mode')])
+def test_frames_of_messages_that_px4_sends_and_pymavlink_lacks_can_be_checked(
+        id_: int, name: str, fields: str) -> None:
+    known = generated({id_: (name, fields)})[id_]
+    assert mav.LAYOUTS[id_] == (known.crc_extra, known.unpacker.size)
 
 
 def test_every_result_has_a_name_of_its_own() -> None:

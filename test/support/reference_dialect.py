@@ -21,6 +21,7 @@ encoder of pymavlink.
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 import contextlib
 import dataclasses
 from functools import cache
@@ -35,7 +36,8 @@ from pymavlink.dialects.v20 import ardupilotmega
 from pymavlink.generator import mavgen
 
 # Message id, name and fields, in the order of common.xml; a bar before the extension fields.
-DEFINITIONS = {
+Definitions = Mapping[int, tuple[str, str]]
+DEFINITIONS: Definitions = {
     396: ('COMPONENT_INFORMATION_BASIC', 'uint32_t time_boot_ms, uint64_t capabilities, '
           'uint32_t time_manufacture_s, char[32] vendor_name, char[32] model_name, '
           'char[24] software_version, char[24] hardware_version, char[32] serial_number'),
@@ -52,15 +54,20 @@ LIGHT = Address(1, 243)
 def reference() -> Any:
     """Return a copy of pymavlink's dialect that has the generated messages, too."""
     dialect = _load(Path(ardupilotmega.__file__))
+    dialect.mavlink_map |= generated(DEFINITIONS)
+    return dialect
+
+
+def generated(messages: Definitions) -> dict[int, Any]:
+    """Return the classes that pymavlink generates from definitions, by message id."""
     with tempfile.TemporaryDirectory() as directory:
         definitions, module = Path(directory, 'definitions.xml'), Path(directory, 'generated.py')
-        definitions.write_text(_xml())
+        definitions.write_text(_xml(messages))
         options = mavgen.Opts(
             str(module), wire_protocol='2.0', language='Python3', validate=False)
         with contextlib.redirect_stdout(io.StringIO()):
             assert mavgen.mavgen(options, [str(definitions)])
-        dialect.mavlink_map |= _load(module).mavlink_map
-    return dialect
+        return dict(_load(module).mavlink_map)
 
 
 def _load(path: Path) -> Any:
@@ -72,7 +79,7 @@ def _load(path: Path) -> Any:
     return loaded
 
 
-def _xml() -> str:
+def _xml(definitions: Definitions) -> str:
     def field(definition: str) -> str:
         return '<extensions/>' if definition == '|' else (
             '<field type="{}" name="{}">-</field>'.format(*definition.split()))
@@ -80,7 +87,7 @@ def _xml() -> str:
     messages = ''.join(
         f'<message id="{id_}" name="{name}"><description>-</description>'
         f'{"".join(map(field, fields.split(", ")))}</message>'
-        for id_, (name, fields) in DEFINITIONS.items())
+        for id_, (name, fields) in definitions.items())
     return (f'<mavlink><version>3</version><dialect>0</dialect>'
             f'<messages>{messages}</messages></mavlink>')
 
