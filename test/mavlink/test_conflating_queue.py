@@ -42,11 +42,11 @@ def pair(number: int) -> tuple[Message, Message]:
 
 def test_a_newer_message_replaces_its_whole_group_and_the_urgent_group_is_first() -> None:
     queue = ConflatingQueue(GROUPS)
-    for message in (*pair(1), *pair(2), position(3)):
+    for message in (*pair(1), *pair(2), position(2), position(3)):
         assert queue.hold(SOURCE, message, 0.0)
 
     assert not queue.hold(SOURCE, heartbeat(18), 0.0)
-    assert queue.dropped == 2
+    assert queue.dropped == 3
     assert [[message for _, message in queue.take(0.0)] for _ in range(2)] == [
         [position(3)], [*pair(2)]]
     assert not queue

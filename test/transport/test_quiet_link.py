@@ -16,10 +16,12 @@
 
 from __future__ import annotations
 
+import math
 import socket
 
 from illuminator_ros.mavlink import component
 from illuminator_ros.mavlink.frame_reader import STALL
+from illuminator_ros.mavlink.link import FAULT_PAUSE
 from illuminator_ros.mavlink.messages import Address
 from illuminator_ros.mavlink.transport.udp import PEER_EXPIRY
 import pytest
@@ -73,6 +75,29 @@ def test_heartbeat_is_sent_once_a_second_while_a_peer_is_heard() -> None:
         link.receive((BEAT, PEER))
         link.run(1.0)
     assert times == pytest.approx([0.0, 1.0, 2.0, 3.0, 4.0, 5.0])
+
+
+class Unlogged(SimulatedLink):
+    """A simulated link that survives faults, as a link does."""
+
+    def _log_fault(self) -> None:
+        pass
+
+
+def test_endpoint_that_always_fails_is_polled_only_after_pauses() -> None:
+    polls: list[float] = []
+
+    class Broken(Talker):
+
+        def poll(self, now: float) -> None:
+            polls.append(now)
+            raise RuntimeError
+
+        def next_deadline(self) -> float:
+            return -math.inf
+
+    Unlogged(Broken(), lambda data, peer: None, now=0.0).run(1.0)
+    assert len(polls) <= 1.0 / FAULT_PAUSE + 2
 
 
 def test_frame_behind_a_false_start_is_received_when_that_is_given_up() -> None:

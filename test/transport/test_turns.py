@@ -234,6 +234,23 @@ def test_frames_of_a_channel_that_a_caller_has_lost_are_not_read(
     assert (link.state().is_open, len(talker.heard)) == (False, heard)
 
 
+def test_data_that_a_caller_has_received_are_not_read_again(
+        link: SimulatedLink, talker: Talker, monkeypatch: pytest.MonkeyPatch) -> None:
+    def read(size: int) -> Any:
+        # A serial port without data reads as one whose device has gone.
+        if not link.socket.inbox:
+            raise OSError('no such device')
+        return link.socket.inbox.popleft()
+
+    monkeypatch.setattr(link.socket, 'recvfrom', read)
+    heard = len(talker.heard)
+    link.meanwhile.append(lambda: link.run_turn(
+        lambda now: None, lambda: len(talker.heard) > heard))
+    link.socket.inbox.append((heartbeat_frame(sequence=1), PEER))
+    link.run(0.001)
+    assert (link.state().is_open, len(talker.heard)) == (True, heard + 1)
+
+
 def test_frames_that_came_while_the_process_was_stopped_precede_the_deadlines(
         link: SimulatedLink, talker: Talker) -> None:
     heard = len(talker.heard)
