@@ -22,7 +22,7 @@ from enum import Enum
 import math
 
 from . import events
-from .commands import Configure
+from .commands import Configure, CONFIRMED
 from .model import (
     Changes,
     checked,
@@ -429,14 +429,31 @@ class ConfigurationManager:
             self._adopt(reported, events.ChangeCause.FIRST_STATUS, now)
             if self._pending:
                 self._pending.due, self._pending.has_ended = min(self._pending.due, now), False
-        elif self._pending and self._pending.reason is not _PendingReason.OVERRIDE:
-            wanted = self._limits.clipped(
-                replace(self.confirmed, **self._pending.values), self._strobe_range)
-            if not unexpected_differences(wanted, reported, status.error_flags, step=True):
-                # The light has kept the values, or another sender has restored them.
-                self._pending = None
-        elif can_follow and not report.shared_address:
+        elif (pending := self._pending) and not report.shared_address and (
+                shown := self._shown_goal(pending, self.confirmed, reported)):
+            # The light has kept the values, another sender has restored them, or our command was
+            # acknowledged too late.
+            self._pending = None
+            self._accept(shown, status)
+            if pending.has_ended:
+                self._restored(True, f'{shown.describe(list(pending.values))}, {CONFIRMED}')
+        elif ((pending is None or pending.reason is _PendingReason.OVERRIDE)
+                and can_follow and not report.shared_address):
             self._follow(status, self.confirmed, reported, switched_at, now)
+
+    def _shown_goal(
+        self, pending: _Pending, confirmed: Configuration, reported: Configuration,
+    ) -> Configuration | None:
+        """
+        Return the configuration with pending values that the light shows, None if it does not.
+
+        Heat and external sync hide values. Overrides are sent once even if the light shows them.
+        """
+        if pending.reason is _PendingReason.OVERRIDE and not pending.has_ended:
+            return None
+        goal = self._limits.clipped(replace(confirmed, **pending.values), self._strobe_range)
+        hidden = [name for name in goal.differences(reported) if name in pending.values]
+        return None if hidden else goal
 
     def _accept(self, goal: Configuration, status: Status | None) -> None:
         """

@@ -443,6 +443,41 @@ def test_overrides_that_fail_otherwise_are_sent_until_they_succeed(
     assert pair.snapshot.discrepancy == ''
 
 
+@pytest.mark.parametrize('latency', [0.3, 0.4, 1.0, 1.5])
+def test_overrides_and_a_restored_configuration_reach_a_light_that_answers_too_late(
+    fake: FakeLight, latency: float,
+) -> None:
+    pair = Pair(fake, there=Faults(latency=latency),
+                on_light=lambda light: light.set_desired({'brightness': 30.0}, START))
+    for _ in range(2):
+        at = pair.now
+        fake.restart(at)
+        pair.run(20.0)
+        assert fake.fields['brightness'] == 30.0
+        assert successes(pair)[-1] is True
+        assert pair.snapshot.discrepancy == ''
+        count = len(sent(pair, since=at))
+        pair.run(20.0)
+        assert len(sent(pair, since=at)) == count
+    # Another sender is followed, and not undone.
+    fake.fields['brightness'] = 5.0
+    pair.run(10.0)
+    assert (confirmed(pair).brightness, fake.fields['brightness']) == (5.0, 5.0)
+    assert successes(pair) == [True, True]
+
+
+def test_an_override_that_the_status_cannot_show_is_sent_until_it_is_acknowledged(
+    fake: FakeLight,
+) -> None:
+    fake.fields['mode'] = 2
+    fake.results[CONFIGURE] = None
+    pair = overriding(fake, brightness=30.0).settle(10.0)
+    assert pair.recorder.restorations == []
+    fake.results[CONFIGURE] = ACCEPTED
+    pair.run(RESTORE_INTERVAL + 1.0)
+    assert successes(pair) == [True]
+
+
 def test_overrides_that_are_accepted_and_not_shown_are_given_up_until_a_restart(
     fake: FakeLight,
 ) -> None:
@@ -522,6 +557,15 @@ def test_after_a_restart_a_light_that_kept_its_configuration_is_sent_nothing(
     fake.restart(agreed.now, **kept)
     agreed.run(10.0)
     assert sent(agreed, since=at) == []
+
+
+def test_after_a_restart_a_light_that_is_dimmed_by_heat_is_sent_its_configuration(
+    fake: FakeLight, agreed: Pair,
+) -> None:
+    at, kept = agreed.now, dict(fake.fields)
+    fake.restart(at, **{**kept, 'brightness': 20.0, 'error_status': 1})
+    agreed.run(10.0)
+    assert sent(agreed, since=at) == [(1, 30, 2, 40)]
 
 
 def test_a_second_restart_while_the_configuration_is_restored_is_noticed(
