@@ -168,6 +168,11 @@ class ConfigurationManager:
         return self._queue.is_confirming
 
     @property
+    def has_values_to_send(self) -> bool:
+        """Whether a command of ours is under way, or values wait."""
+        return self.is_changing or self._setpoint is not None or self._pending is not None
+
+    @property
     def may_send_after_restart(self) -> bool:
         """Whether a light that has restarted may be sent a configuration."""
         return (self._is_limited or self._pending is not None

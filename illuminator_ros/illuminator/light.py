@@ -27,7 +27,13 @@ from .configuration_manager import ConfigurationManager
 from .messages import STATUS_ID
 from .model import Changes, DIMMING_FLAGS, ErrorFlags, Mode, SafetyLimits, Status, StrobeRange
 from .status_tracker import RESTART_PROOF_TIME, StatusTracker, Uptime
-from ..mavlink.command_sender import CommandResult, CommandSender, CommandStatus, format_seconds
+from ..mavlink.command_sender import (
+    Command,
+    CommandResult,
+    CommandSender,
+    CommandStatus,
+    format_seconds,
+)
 from ..mavlink.messages import Address, MavCmd
 from ..payload.arbitration import Cause, HolderChanged
 from ..payload.command_sources import DEFAULT, SourceSettings
@@ -323,6 +329,12 @@ class Light:
                 or self._off_brightness == 0.0
                 and now <= self._configuration.sent_at + configuration_manager.IMPLIED_TIME)
 
+    def _is_known_off(self, now: float) -> bool:
+        """Return whether the light is off, and no command of ours may still switch it on."""
+        return (self.connected and self._enabled is False and not self._is_shared
+                and not self._switching.has(_is_on) and not self._is_own(True, now)
+                and not (self._off_brightness == 0.0 and self._configuration.has_values_to_send))
+
     def _is_silent(self, now: float) -> bool:
         limit = self._settings.off_after_silence
         return bool(limit) and now >= self._requested_at + limit
@@ -369,8 +381,7 @@ class Light:
             self._commands.end_all(
                 now, CommandStatus.NO_ANSWER, self.address, lambda command: (
                     command.command == MavCmd.DO_ILLUMINATOR_CONFIGURE
-                    or command.command == MavCmd.ILLUMINATOR_ON_OFF
-                    and command.params == SWITCHES[True].params))
+                    or _is_on_command(command)))
             self._switching.cancel(
                 message, now, lambda request: request.phase is Phase.WAITING)
             self._configuration.lost(message, now)
@@ -506,7 +517,8 @@ class Light:
             self._switching.cancel(
                 f'{change.before} no longer holds it', now,
                 lambda request: request.phase is Phase.WAITING and _is_on(request))
-            if self._settings.off_on_release:
+            self._commands.stop_resending(now, self.address, _is_on_command)
+            if self._settings.off_on_release and not self._is_known_off(now):
                 self._switch_automatically(_AutomaticSwitch(
                     False, f'on_release: {change.before} no longer holds it', now))
         elif change.cause is not Cause.CLAIM:
@@ -783,6 +795,11 @@ class Light:
 
 def _is_on(request: Request[Status]) -> bool:
     return not request.overtakes
+
+
+def _is_on_command(command: Command) -> bool:
+    return (command.command == MavCmd.ILLUMINATOR_ON_OFF
+            and command.params == SWITCHES[True].params)
 
 
 def _is_off(request: Request[Status]) -> bool:

@@ -523,7 +523,7 @@ class CommandSender:
                 self._end(pending, CommandStatus.ANSWERED if pending.rejected == pending.tries
                           else CommandStatus.OUT_OF_TIME, now)
                 return
-        elif state is CommandState.SENT and now < pending.deadline:
+        elif state is CommandState.SENT and now < min(pending.tries_end, pending.deadline):
             pending.as_int = True
             pending.rejected += 1
             self._transmit(pending, now)
@@ -576,6 +576,14 @@ class CommandSender:
         # End the sent command last, so that no waiting one is sent in its place.
         for pending in reversed(ended):
             self._end(pending, status, now)
+
+    def stop_resending(
+        self, now: float, target: Address, which: Callable[[Command], bool],
+    ) -> None:
+        """Resend no more of some commands to a target, which may still answer them."""
+        for pending in self._pending.get(target, ()):
+            if which(pending.command):
+                pending.tries_end = min(pending.tries_end, now)
 
     def _begin(self, pending: _PendingCommand, now: float) -> None:
         pending.state = CommandState.SENT

@@ -20,7 +20,7 @@ from collections.abc import Callable
 import random
 
 from illuminator_ros.illuminator.client import enable_all
-from illuminator_ros.illuminator.events import DesiredStateFailed, LightHeld
+from illuminator_ros.illuminator.events import AutomaticSwitch, DesiredStateFailed, LightHeld
 from illuminator_ros.illuminator.light import Settings
 from illuminator_ros.illuminator.model import SafetyLimits
 from illuminator_ros.mavlink.messages import MavCmd, MavResult
@@ -180,6 +180,30 @@ def test_an_on_under_way_is_answered_though_its_source_releases_the_light() -> N
     assert shared.pair.wait_for(answer).success
 
 
+@pytest.mark.parametrize('end', [
+    lambda shared: shared.release('operator'),
+    lambda shared: shared.pair.run_until(lambda: not shared.holder)], ids=['release', 'silence'])
+@pytest.mark.parametrize('result', [None, MavResult.TEMPORARILY_REJECTED])
+def test_an_on_is_not_resent_after_the_hold_of_its_source(
+    end: Callable[[Shared], None], result: MavResult | None,
+) -> None:
+    shared = Shared()
+    shared.pair.settle()
+    shared.light.results[ON_OFF] = result
+    # The second one is sent when the first one has ended, just before the hold ends.
+    first, answer = shared.enable('operator', True), shared.enable('operator', True)
+    shared.pair.wait_for(first)
+    shared.pair.run(0.05)
+    end(shared)
+    ended_at = shared.pair.now
+    assert shared.holder == ''
+    assert not shared.pair.wait_for(answer).success
+    shared.pair.run(5.0)
+
+    assert shared.sent(ON_OFF, ended_at + 0.001) == []
+    assert shared.light.fields['enable'] == 0
+
+
 def test_an_off_that_waits_is_sent_though_its_source_releases_the_light() -> None:
     shared = Shared(light=FakeLight(brightness=50.0, enable=1))
     shared.pair.settle()
@@ -191,6 +215,50 @@ def test_an_off_that_waits_is_sent_though_its_source_releases_the_light() -> Non
 
     assert shared.pair.wait_for(second).success
     assert shared.light.fields['enable'] == 0
+
+
+@pytest.mark.parametrize('act', [
+    lambda shared: shared.dim('operator', 20.0),
+    lambda shared: (shared.enable('operator', True), shared.pair.run(1.0),
+                    shared.enable('operator', False))], ids=['never on', 'switched off'])
+def test_the_release_of_a_light_that_is_off_sends_nothing_where_release_is_off(
+    act: Callable[[Shared], object],
+) -> None:
+    shared = Shared(off_on_release=True)
+    shared.pair.settle()
+    act(shared)
+    shared.pair.run(1.0)
+    released_at = shared.pair.now
+    shared.release('operator')
+    shared.pair.run(1.0)
+
+    assert shared.sent(ON_OFF, released_at) == []
+    assert not any(isinstance(one, AutomaticSwitch) for one in shared.pair.recorder.others)
+
+
+@pytest.mark.parametrize(('is_switch', 'act'), [
+    (False, lambda shared: shared.enable('operator', True)),
+    (False, lambda shared: shared.pair.wait_for(shared.enable('operator', True))),
+    (True, lambda shared: shared.dim('operator', 20.0)),
+], ids=['under way', 'not confirmed', 'brightness that is the switch'])
+def test_a_light_that_may_go_on_after_its_release_goes_off_where_release_is_off(
+    is_switch: bool, act: Callable[[Shared], object],
+) -> None:
+    shared = Shared(off_on_release=True)
+    light = shared.light
+    light.brightness_is_switch = is_switch
+    shared.pair.settle()
+    if is_switch:
+        light.fields |= {'enable': 0, 'brightness': 0.0}
+        shared.pair.run(1.0)
+    light.apply_after, light.pushes = 1.2, True
+    act(shared)
+    released_at = shared.pair.now
+    shared.release('operator')
+    shared.pair.run(8.0)
+
+    assert light.fields['enable'] == 0
+    assert 0.0 in shared.sent(ON_OFF, released_at)
 
 
 def test_an_off_for_all_lights_replaces_a_remembered_on_of_a_lost_light() -> None:
