@@ -677,7 +677,7 @@ class Light:
 
         def answered(result: CommandResult, now: float) -> None:
             if not result.accepted:
-                refresh.outcomes.setdefault('ILLUMINATOR_STATUS', result.describe())
+                refresh.outcomes.setdefault('ILLUMINATOR_STATUS', result.describe_failure())
                 self._check_refreshes(now)
 
         self._identity_query.ask(now, identified)

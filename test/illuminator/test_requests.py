@@ -507,7 +507,7 @@ def test_a_refresh_requests_status_and_identity_and_takes_both(
 @pytest.mark.parametrize(('light', 'success', 'status', 'identity'), [
     ({'answers': {STATUS_ID}}, True, 'received', 'acknowledged, but not sent'),
     ({'stream': 0.0, 'results': {REQUEST: mav.MavResult.UNSUPPORTED}}, False,
-     'MAV_RESULT_UNSUPPORTED', 'refused: MAV_RESULT_UNSUPPORTED'),
+     'refused: MAV_RESULT_UNSUPPORTED', 'refused: MAV_RESULT_UNSUPPORTED'),
     ({'stream': 0.0, 'answers': {mav.INFORMATION_ID}}, False, 'nothing came', 'received'),
     (NO_STATUS, False, 'nothing came', 'acknowledged, but not sent'),
     *(({**NO_STATUS, 'results': {REQUEST: result}}, False, '', '')
