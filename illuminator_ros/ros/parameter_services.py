@@ -23,7 +23,7 @@ device's acknowledgement without blocking, and the values of one call are one co
 from __future__ import annotations
 
 from array import array
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from typing import TYPE_CHECKING, TypeVar
 
 from rcl_interfaces import srv
@@ -168,12 +168,12 @@ class ParameterServices:
     ) -> None:
         """Set each parameter separately, but those of the device with one command."""
         reasons = [self._check(message) for message in messages]
-        changes = {message.name: _value(message)
-                   for message, reason in zip(messages, reasons, strict=True)
-                   if message.name in self._device.specs and not reason}
+        changes = self._device_values(
+            message for message, reason in zip(messages, reasons, strict=True) if not reason)
         for index, message in enumerate(messages):
-            if not reasons[index] and message.name not in changes:
-                reasons[index] = self._set_local([message])
+            if not reasons[index]:
+                reasons[index] = (_replacement(message, changes) if message.name in changes
+                                  else self._set_local([message]))
 
         def done(refusal: str) -> None:
             answer([reason or (refusal if message.name in changes else '')
@@ -188,6 +188,9 @@ class ParameterServices:
         """Set all or none. Local ones are set first: they can be rolled back."""
         local = [message for message in messages if message.name not in self._device.specs]
         reason = next(filter(None, map(self._check, messages)), '')
+        changes = {} if reason else self._device_values(messages)
+        reason = reason or next(
+            filter(None, (_replacement(message, changes) for message in messages)), '')
         before = [] if reason else [self._node.get_parameter(one.name) for one in local]
         if not reason and local:
             reason = self._set_local(local)
@@ -200,8 +203,12 @@ class ParameterServices:
         if reason or len(local) == len(messages):
             answer(reason)
         else:
-            self._configure({message.name: _value(message) for message in messages
-                             if message.name in self._device.specs}, now, done)
+            self._configure(changes, now, done)
+
+    def _device_values(self, messages: Iterable[ParameterMessage]) -> Values:
+        """Return the last value of each parameter of the device."""
+        return {message.name: _value(message) for message in messages
+                if message.name in self._device.specs}
 
     def _set_local(self, messages: Messages) -> str:
         result = self._node.set_parameters_atomically(
@@ -231,6 +238,13 @@ class ParameterServices:
 
 def _result(reason: str) -> SetParametersResult:
     return SetParametersResult(successful=not reason, reason=reason)
+
+
+def _replacement(message: ParameterMessage, changes: Values) -> str:
+    """Return that a parameter has another value among the changes, '' if it has not."""
+    name = message.name
+    return (f'{name} has another value later in the request'
+            if name in changes and changes[name] != _value(message) else '')
 
 
 def _value(message: ParameterMessage) -> object:

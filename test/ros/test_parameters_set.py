@@ -95,14 +95,18 @@ def test_request_of_an_unknown_type_or_with_repeated_names_or_empty_is_answered(
     twice = [Parameter(name='brightness', value=ParameterValue(
         type=ParameterType.PARAMETER_DOUBLE, double_value=value)) for value in (10.0, 20.0)]
 
-    listed = parameters.start(
-        SetParameters, 'set_parameters', parameters=[unknown, *twice]).result().results
-    atomic = parameters.start(SetParametersAtomically, 'set_parameters_atomically',
-                              parameters=[unknown]).result().result
+    listed = parameters.start(SetParameters, 'set_parameters', parameters=[
+        unknown, *twice, twice[1]]).result().results
+    atomic, atomic_twice = (
+        parameters.start(SetParametersAtomically, 'set_parameters_atomically',
+                         parameters=values).result().result
+        for values in ([unknown], [*twice, twice[0]]))
 
-    assert [result.successful for result in listed] == [False, True, True]
+    assert [result.successful for result in listed] == [False, False, True, True]
     assert not atomic.successful
     assert '77' in listed[0].reason and listed[0].reason == atomic.reason
+    assert listed[1].reason == 'brightness has another value later in the request'
+    assert atomic_twice.reason == listed[1].reason
     assert parameters.get('brightness', 'strobe_period') == [20.0, 0.0]
     assert light.fake.fields['brightness'] == 20.0
     assert parameters.set() == []
