@@ -620,6 +620,8 @@ class CommandSender:
             status, pending.result, pending.tries, now - pending.first_sent, pending.progress,
             earlier)
         answered = status is CommandStatus.ANSWERED
+        if not answered:
+            self._estimator(command.target).expect_ambiguous(now)
         while self._earlier and now > (
                 oldest := next(iter(self._earlier.values()))).ended_at + ACK_LIFETIME:
             del self._earlier[oldest.command.key]

@@ -26,12 +26,15 @@ from illuminator_ros.illuminator.events import (
     Origin,
     StatusReceived,
 )
+from illuminator_ros.illuminator.light import Settings
 from illuminator_ros.mavlink.command_sender import MAX_SAMPLES
 from illuminator_ros.mavlink.messages import CommandAck, MavCmd, MavResult
+from illuminator_ros.payload.command_sources import SourceSettings
 import pytest
 from support.back_to_back import BRIDGE, Pair
 from support.fake_light import FakeLight, LIGHT, status_message
 from support.faulty_wire import Faults
+from support.records import Answer
 
 ON_OFF, CONFIGURE = MavCmd.ILLUMINATOR_ON_OFF, MavCmd.DO_ILLUMINATOR_CONFIGURE
 
@@ -152,6 +155,27 @@ def test_a_status_that_comes_sooner_than_any_answer_does_not_confirm(fake: FakeL
     fake.send(status_message(fake.uptime_ms(pair.now), **{**fake.fields, 'enable': 1}))
     pair.run(0.1)
     assert not pair.enable(True).success
+
+
+def test_a_status_that_shows_a_cancelled_command_does_not_confirm_the_next_one(
+    fake: FakeLight,
+) -> None:
+    pair = Pair(fake, there=Faults(latency=0.2), settings=Settings(
+        sources=SourceSettings(('safety', 'default')))).settle()
+    for on in (False, True) * 3:
+        assert pair.enable(on).success
+        pair.run(6.0)
+    fake.pushes = True
+    pair.ask_enable(False)
+    pair.run(0.3)
+    # The light has executed it, and a button switches the light on before the status arrives.
+    fake.fields['enable'] = 1
+    fake.pushes, fake.stream = False, 0.0
+    pair.near.wire.faults = Faults(drop=1.0)
+    answer = Answer(pair.now)
+    pair.light.enable(False, pair.now, answer, source='safety')
+    pair.turn()
+    assert not pair.wait_for(answer).success
 
 
 @pytest.mark.parametrize(('before', 'latency'), [(None, 0.2), (0.01, 0.2), (0.24, 0.05)])
