@@ -89,6 +89,7 @@ class _Pending:
     :param attempts: how often the light has accepted them but then reported others.
     :param due: when they are sent next, s.
     :param has_ended: whether a command with them has ended, or none can be sent.
+    :param failure: why the last attempt failed, '' if it did not.
     """
 
     values: Changes
@@ -96,6 +97,7 @@ class _Pending:
     due: float
     attempts: int = 0
     has_ended: bool = False
+    failure: str = ''
 
 
 @dataclass
@@ -119,8 +121,6 @@ class ConfigurationManager:
         and a brightness may be an ON.
     :ivar confirmed: the configuration that the light last accepted from us or, if another sender
         has changed it since, last reported; None before either.
-    :ivar discrepancy: why the light does not have a configuration that it should have, '' if it
-        has.
     :ivar limit_exceeded: how the light exceeds the limits.
     """
 
@@ -130,7 +130,6 @@ class ConfigurationManager:
         must_wait: Callable[[], bool] = lambda: False,
     ) -> None:
         self.confirmed: Configuration | None = None
-        self.discrepancy = ''
         self._target = target
         self._address = target.address
         self._emit = emit
@@ -149,13 +148,21 @@ class ConfigurationManager:
         self._setpoint: float | None = None
         self._pending: _Pending | None = None
         self._sent: _Sent | None = None
-        # A configuration that the light has accepted but does not report.
+        # A configuration that the light has accepted but does not report, and its status then.
         self._unapplied: Configuration | None = None
+        self._shown_instead: Status | None = None
+        # Why that, or values that are pending no more, were not set; '' if they were.
+        self._not_set = ''
         # Whether the effect of the last command is unknown, since it failed or was superseded.
         self._is_unconfirmed = False
         # The last configuration that was requested or reported as changed: small steps away
         # from it add up to a change.
         self._reference: Configuration | None = None
+
+    @property
+    def discrepancy(self) -> str:
+        """Why the light does not have a configuration that it should have, '' if it has."""
+        return self._pending.failure if self._pending and self._pending.failure else self._not_set
 
     @property
     def is_changing(self) -> bool:
@@ -358,8 +365,8 @@ class ConfigurationManager:
                                            if value == getattr(change.configuration, name)])
                     self._accept(change.configuration, status)
                 elif result.contradicted:
-                    self._unapplied = change.configuration
-                    self.discrepancy = result.message
+                    self._unapplied, self._shown_instead = change.configuration, self._status
+                    self._not_set = result.message
             done(result, now)
 
         self._queue.submit(Request(
@@ -427,9 +434,15 @@ class ConfigurationManager:
         can_follow: bool, switched_at: float,
     ) -> None:
         status = report.status
-        if self._unapplied and not unexpected_differences(
-                self._unapplied, reported, status.error_flags, step=True):
-            self._unapplied, self.discrepancy = None, ''
+        if self._unapplied and self._shown_instead:
+            def differs(before: Configuration) -> bool:
+                return bool(unexpected_differences(
+                    before, reported, status.error_flags, step=True))
+
+            # It was applied late, or another sender has replaced it.
+            if (not differs(self._unapplied)
+                    or differs(self._shown_instead.configuration(NOTHING))):
+                self._unapplied, self._not_set = None, ''
         if self.confirmed is None:
             self._adopt(reported, events.ChangeCause.FIRST_STATUS, now)
             if self._pending:
@@ -473,7 +486,7 @@ class ConfigurationManager:
             goal = replace(goal, **{
                 name: getattr(reported, name)
                 for name in goal.differences(reported, step=False) if name not in far})
-        self._unapplied, self.discrepancy = None, ''
+        self._unapplied, self._not_set = None, ''
         self._adopt(goal, events.ChangeCause.REQUEST, 0.0)
 
     def _adopt(self, configuration: Configuration, cause: events.ChangeCause, now: float) -> None:
@@ -602,8 +615,8 @@ class ConfigurationManager:
             # The values stay pending until a status comes; report that once.
             pending.due = math.inf
             pending.has_ended = True
-            self.discrepancy = f'{", ".join(pending.values)} not sent: {error}'
-            self._restored(False, self.discrepancy)
+            pending.failure = f'{", ".join(pending.values)} not sent: {error}'
+            self._restored(False, pending.failure)
             return
         if self.confirmed is None:
             pending.due += FIRST_STATUS_TIMEOUT
@@ -618,14 +631,14 @@ class ConfigurationManager:
 
         def finished(result: Result, now: float) -> None:
             pending.has_ended = True
+            pending.failure = '' if result.success else result.message
             pending.attempts += result.contradicted
             if (result.success or result.permanent
                     or pending.attempts >= MAX_CONTRADICTIONS
                     or pending.attempts and pending.reason in _SENT_ONCE):
                 self._drop_fields(pending.values)
+                self._not_set = pending.failure
                 self._restored(result.success, result.message)
-            if not result.success:
-                self.discrepancy = result.message
 
         self._submit(self._checked(pending.values), now, finished)
 

@@ -22,7 +22,7 @@ from typing import Any
 from illuminator_ros.illuminator.configuration_manager import RESTORE_INTERVAL
 from illuminator_ros.illuminator.events import ChangeCause
 from illuminator_ros.illuminator.light import Settings
-from illuminator_ros.illuminator.model import Configuration, float32, Mode
+from illuminator_ros.illuminator.model import Configuration, float32, Mode, SafetyLimits
 from illuminator_ros.mavlink.messages import CommandAck, MavCmd, MavResult
 from illuminator_ros.payload.request import Result
 import pytest
@@ -257,6 +257,22 @@ def test_small_steps_add_up_to_a_change(fake: FakeLight, strobe: Pair) -> None:
         strobe.run(1.0)
     assert confirmed(strobe).brightness == 78.0
     assert [cause for cause, _ in strobe.recorder.changes].count(ChangeCause.LIGHT) == 2
+
+
+def test_a_discrepancy_ends_when_another_sender_changes_the_light(
+    fake: FakeLight, strobe: Pair,
+) -> None:
+    fake.applies = False
+    assert strobe.configure(brightness=30).contradicted
+    strobe.run(10.0)
+    assert 'shows brightness 80 %' in strobe.snapshot.discrepancy
+    # Heat is not another sender.
+    fake.fields |= {'brightness': 60.0, 'error_status': 1}
+    strobe.run(2.0)
+    assert strobe.snapshot.discrepancy
+    fake.fields |= {'brightness': 40.0, 'error_status': 0}
+    strobe.run(2.0)
+    assert strobe.snapshot.discrepancy == ''
 
 
 # Streams of setpoints
@@ -621,6 +637,19 @@ def test_a_light_that_refuses_the_restored_configuration_is_followed(
     assert successes(agreed)[-1] is False
     assert agreed.snapshot.discrepancy
     assert confirmed(agreed).brightness == 100.0
+
+
+def test_values_within_the_limits_that_a_restart_makes_obsolete_leave_no_discrepancy(
+    fake: FakeLight,
+) -> None:
+    pair = Pair(fake, settings=Settings(
+        restore_configuration=False, limits=SafetyLimits(max_brightness=50.0)))
+    fake.results[CONFIGURE] = None
+    pair.run(5.0)
+    assert 'no acknowledgement' in pair.snapshot.discrepancy
+    fake.restart(pair.now, brightness=20.0)
+    pair.run(2.0)
+    assert pair.snapshot.discrepancy == ''
 
 
 def test_a_light_that_restarts_is_followed_where_restoring_is_switched_off(
