@@ -100,7 +100,7 @@ class DeviceNodes(Generic[K, N]):
     def _serve(self, key: K, request: NodeRequest, node: Node) -> None:
         log = NodeLog(node.get_logger())
         served = self._make(node, log)
-        for warning in ignored_parameters(node, self._host.node):
+        for warning in ignored_parameters(node, self._host.nodes.first):
             log.warning(warning)
         if shared := _shared_names(node, self._host.node):
             log.warning(f'{", ".join(shared)}: {self._host.node.get_fully_qualified_name()} has '
