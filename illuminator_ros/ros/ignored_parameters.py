@@ -112,21 +112,33 @@ def ignored_sections(
     arguments: Sequence[str], names: Sequence[str], may_name: Callable[[str], bool],
 ) -> list[str]:
     """
-    Return a warning for each section of the given parameter files that matches no node.
+    Return a warning for each section of a parameter file, or prefix, that matches no node.
+
+    The prefix of ``-p spot:brightness:=40`` matches only a node ``/spot``, without namespace.
 
     :param names: fully qualified, of the nodes that exist.
     :param may_name: whether a node that is made later may have a name, without namespace.
     """
     namespace = names[0].rpartition('/')[0]
     warnings = []
-    for path, section, _ in _files(arguments):
+    sections = [(f'{path}: the section', section) for path, section, _ in _files(arguments)]
+    prefixes = [(f'-p {rule}: the name', (prefix,)) for rule, prefix in _prefixes(arguments)]
+    for place, section in [*sections, *prefixes]:
         *_, last = section
         later = [f'{namespace}/{last}'] if may_name(last) else []
         pattern = ''.join(_WILDCARDS.get(part, '/' + re.escape(part)) for part in section)
         if not any(re.fullmatch(pattern, name) for name in (*names, *later)):
-            warnings.append(f'{path}: the section {"/".join(section)} matches no node and is '
-                            f'ignored; the name here is {", ".join(names)}')
+            warnings.append(f'{place} {"/".join(section)} matches no node and is ignored; the '
+                            f'name here is {", ".join(names)}')
     return warnings
+
+
+def _prefixes(arguments: Sequence[str]) -> Iterator[tuple[str, str]]:
+    """Return rule and node of each parameter that the command line gives for one node."""
+    for option, rule in zip(arguments, arguments[1:], strict=False):
+        node, colon, _ = rule.partition(':=')[0].partition(':')
+        if option in ('-p', '--param') and colon:
+            yield rule, node
 
 
 def _files(arguments: Sequence[str]) -> Iterator[tuple[str, tuple[str, ...], Set[str]]]:

@@ -100,6 +100,23 @@ def test_section_of_a_parameter_file_that_matches_no_node_is_warned_about(
         'is /illuminator'] * is_ignored
 
 
+@pytest.mark.parametrize(('node', 'namespace', 'is_ignored'), [
+    ('illuminator', '', False), ('illuminator_1_244', '', False), ('spot', '', True),
+    ('illuminator', '/boat', True)])
+def test_parameter_on_the_command_line_for_a_node_that_does_not_exist_is_warned_about(
+    node: str, namespace: str, is_ignored: bool,
+) -> None:
+    rule, name = f'{node}:max_brightness:=30.0', f'{namespace}/illuminator'
+
+    warnings = ignored_sections(
+        ['--ros-args', '-p', 'connection_url:=udpin://127.0.0.1:1', '-p', rule], [name],
+        {'illuminator_1_244'}.__contains__)
+
+    assert warnings == [
+        f'-p {rule}: the name {node} matches no node and is ignored; the name here is {name}'
+    ] * is_ignored
+
+
 @pytest.mark.parametrize(('name', 'ends'), [
     ('max_brightnes', True), ('max_brightness_level', False),
     ('illuminator.max_brightness', True), ('lamp.max_brightness', False)])
