@@ -147,6 +147,13 @@ def test_remote_that_cannot_be_sent_to_costs_a_frame_or_without_a_way_the_channe
     assert ours.dropped == (not is_loss)
 
 
+def test_broadcast_address_of_a_url_that_does_not_broadcast_is_an_error_with_the_remedy(
+        channel: Open) -> None:
+    ours = channel('udpout://127.255.255.255:9').channel
+    with pytest.raises(ChannelLost, match=r'a broadcast address needs udp-b://'):
+        ours.send([b'frame'], ours.peers(0.0))
+
+
 def test_datagram_before_the_loss_of_the_channel_is_read(
         channel: Open, fail: Callable[[int], None]) -> None:
     coming = iter(channel(ANY_PORT).channel.receive(None))

@@ -41,6 +41,10 @@ MAX_DATAGRAM = 1400
 RECEIVE_BUFFER = 4 * 1024 * 1024
 # The buffers of the kernel or the network device are full.
 NO_ROOM = {errno.ENOBUFS, errno.ENOMEM}
+# Why a remote cannot be sent to, where the system's own text has no remedy.
+REASONS = {
+    errno.EACCES: 'Permission denied: a broadcast address needs udp-b://, udp-pb:// or udpbcast:',
+}
 
 
 class UdpChannel(Channel):
@@ -193,7 +197,8 @@ class UdpChannel(Channel):
                 if error.errno in NO_ROOM:
                     continue
                 if peer == self._remote:
-                    raise ChannelLost(error.errno, error.strerror) from None
+                    reason = REASONS.get(error.errno or 0, error.strerror)
+                    raise ChannelLost(error.errno, reason) from None
                 # The link survives the loss of a learnt peer.
                 self._peers.pop(peer, None)
         return failures
