@@ -615,10 +615,9 @@ class CommandSender:
         if pending.state is CommandState.WAITING:
             pending.done(CommandResult(status), now)
             return
-        earlier = self._earlier.pop(key, None)
         result = CommandResult(
             status, pending.result, pending.tries, now - pending.first_sent, pending.progress,
-            earlier)
+            self._earlier.pop(key, None))
         answered = status is CommandStatus.ANSWERED
         if not answered:
             self._estimator(command.target).expect_ambiguous(now)
@@ -630,8 +629,7 @@ class CommandSender:
         self._earlier[key] = EarlierCommand(
             command, pending.result if answered else None, now, pending.tries, result.elapsed,
             now + between / 2 if is_measure else math.inf,
-            self.round_trip(command.target).is_ambiguous(now)
-            or earlier is not None and earlier.result is None and result.may_answer_earlier(now))
+            self.round_trip(command.target).is_ambiguous(now))
         if status is CommandStatus.NO_ANSWER:
             self.counters.unanswered += 1
             self.unanswering[command.target] = None
