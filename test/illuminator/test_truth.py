@@ -220,6 +220,22 @@ def test_a_late_copy_of_a_refusal_does_not_refuse_the_next_command(
     assert faked.wait_for(answer).success
 
 
+@pytest.mark.parametrize(('before', 'text'), [
+    (False, 'on not confirmed: MAV_RESULT_DENIED, which may belong to an earlier command'),
+    # Each try of the same request may be refused.
+    (True, 'refused: MAV_RESULT_DENIED')])
+def test_a_refusal_that_may_answer_another_request_is_reported_as_doubtful(
+    fake: FakeLight, faked: Pair, before: bool, text: str,
+) -> None:
+    fake.results[ON_OFF] = None
+    assert not faked.enable(before).success
+    answer = faked.ask_enable(True)
+    fake.send(CommandAck(ON_OFF, MavResult.DENIED, 0, 0, *BRIDGE))
+    result = faked.wait_for(answer)
+    assert not result.success
+    assert result.message.startswith(text)
+
+
 # Events
 
 def test_each_switch_is_one_event_with_its_origin(fake: FakeLight, faked: Pair) -> None:
