@@ -570,7 +570,7 @@ class Link:
             self._connector.start()
             self._connecting = True
         except RuntimeError as error:
-            self._status.failed(f'{error}; trying again')
+            self._status.failed(str(error))
             self._connect_at = now + THREAD_RETRY_INTERVAL
 
     def _connector_reports(self, outcome: Channel | str | None, now: float) -> None:

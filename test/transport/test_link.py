@@ -234,13 +234,17 @@ def test_connector_whose_thread_cannot_be_started_is_tried_again(
             raise RuntimeError("can't start new thread")
         genuine(thread)
 
+    monkeypatch.setattr(threading.Thread, 'start', start)
     with listening_socket() as server:
-        link = run(LiveLink(f'tcp://127.0.0.1:{server.getsockname()[1]}'))
+        url = f'tcp://127.0.0.1:{server.getsockname()[1]}'
+        link = run(LiveLink(url))
+        assert str(link.wait_lost()) == (
+            f"link not open: {url}: can't start new thread; trying again")
         with server.accept()[0] as connection:
             connection.sendall(heartbeat_frame())
             link.endpoint.wait_heard()
-            monkeypatch.setattr(threading.Thread, 'start', start)
-        link.wait_lost()
+            failures.clear()
+        link.wait_lost(2)
         failures.wait_for(lambda name: True, count=2)
         server.accept()[0].close()
 
