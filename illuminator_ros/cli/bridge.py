@@ -27,11 +27,13 @@ import sys
 from typing import NamedTuple, TYPE_CHECKING
 
 from .entry_point import (
+    CANNOT_CREATE,
     log_directory_refusal,
     one_line,
     parameter_file_refusal,
     print_output,
     run_program,
+    start_failure,
     wrong_arguments,
 )
 from .payloads import DEFAULT_PAYLOAD, PAYLOADS
@@ -192,9 +194,11 @@ def _serve(
         # rcutils colours its lines on a terminal only, and stderr is the pipe of a queue here.
         if termination.is_terminal:
             os.environ.setdefault('RCUTILS_COLORIZED_OUTPUT', '1')
+        failed = wrong_arguments(executable.name)
         try:
             rclpy.init(
                 args=[executable.name, *arguments], signal_handler_options=SignalHandlerOptions.NO)
+            failed = CANNOT_CREATE
             node = PayloadNode(executable.payload)
             # Other participants discover the node while these modules are imported.
             from ..ros.bridge import Bridge
@@ -202,29 +206,20 @@ def _serve(
             executable.load()
         except Exception as error:
             # rclpy has an exception for each kind of wrong argument.
-            return executable.refuse(_start_failure(error, wrong_arguments(executable.name)))
+            return executable.refuse(start_failure(error, failed))
         try:
             bridge = Bridge(node, arguments, executable.payloads, executable.payload, url)
         except ParameterError as error:
             return executable.refuse(f'parameter {error}')
         except Exception as error:
             # For example, two topics may have the same name.
-            return executable.refuse(_start_failure(error, 'cannot create the node'))
+            return executable.refuse(start_failure(error, failed))
     # The existing objects stay: a garbage collection that visits them would only delay answers.
     gc.freeze()
     termination.calls(bridge.end)
     bridge.run()
     rclpy.try_shutdown()
     return 0
-
-
-def _start_failure(error: Exception, failed: str) -> str:
-    if isinstance(error, ModuleNotFoundError):
-        raise error
-    # The middleware has no special exception for a lack of descriptors or threads.
-    if isinstance(error, OSError | ImportError) or type(error) is RuntimeError:
-        failed = 'cannot start'
-    return f'{failed}: {error}'
 
 
 def _use_profile() -> None:

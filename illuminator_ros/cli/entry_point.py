@@ -36,6 +36,10 @@ _REMEDIES = {
 }
 
 
+# The beginning of an error, once the arguments have been parsed.
+CANNOT_CREATE = 'cannot create the node'
+
+
 def run_program(
     name: str, run: Callable[[Termination], int], more: Iterable[signal.Signals] = (),
 ) -> int:
@@ -106,6 +110,20 @@ def discard_output() -> None:
 def wrong_arguments(name: str) -> str:
     """Return a prefix for an error of rcl, which does not explain the syntax of arguments."""
     return f'wrong ROS arguments, see {name} --help'
+
+
+def start_failure(error: Exception, failed: str) -> str:
+    """
+    Return why ROS cannot be started.
+
+    :param failed: the beginning where the system does not lack anything.
+    """
+    if isinstance(error, ModuleNotFoundError):
+        raise error
+    # The middleware has no special exception for a lack of descriptors or threads.
+    if isinstance(error, OSError | ImportError) or type(error) is RuntimeError:
+        failed = 'cannot start'
+    return f'{failed}: {error}'
 
 
 def log_directory_refusal() -> str:

@@ -133,14 +133,17 @@ def test_reason_is_printed_if_ros_itself_ends_the_start() -> None:
     assert "'rmw_missing_cpp'" in program.log
 
 
-@pytest.mark.parametrize('descriptors', [8, 14, 18, 20])
-def test_too_few_descriptors_end_the_start_without_a_traceback(descriptors: int) -> None:
-    bridge = Program(
-        'sh', '-c', f'ulimit -n {descriptors}; exec {sys.executable} -m {BRIDGE}')
+@pytest.mark.parametrize(('name', 'descriptors'), [
+    *(('bridge', number) for number in (8, 14, 18, 20)), ('monitor', 14)])
+def test_too_few_descriptors_end_the_start_without_a_traceback(
+    name: str, descriptors: int,
+) -> None:
+    program = Program(
+        'sh', '-c', f'ulimit -n {descriptors}; exec {sys.executable} -m illuminator_ros.{name}')
 
-    assert bridge.wait() == 2
-    assert bridge.count('bridge: cannot start: ') == 1
-    assert 'Traceback' not in bridge.log
+    assert program.wait() == 2
+    assert program.count(f'{name}: cannot start: ') == 1
+    assert 'Traceback' not in program.log
 
 
 NO_THREADS = """

@@ -98,7 +98,8 @@ def test_help_names_every_parameter_option_and_form_of_url() -> None:
         ('-r ~/enable:=/x -r ~/refresh:=/x', 'cannot create the node: '),
         ('-r ~/enabled:=/x -r ~/mode:=/x', 'cannot create the node: '),
         ('--banana', "wrong ROS arguments, see bridge --help: ['--banana']"),
-        ('-p use_sim_time:=maybe', "Trying to set parameter 'use_sim_time' to 'maybe'"))),
+        ('-p use_sim_time:=maybe',
+         "cannot create the node: Trying to set parameter 'use_sim_time' to 'maybe'"))),
     ('rededge', 'udpin:nowhere', "connection URL 'udpin:nowhere'"),
     *(('rededge', f'--ros-args -p {arguments}', text) for arguments, text in (
         ('mavlink_version:=2', 'parameter mavlink_version: 2, but rededge needs 1'),

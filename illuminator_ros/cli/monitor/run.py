@@ -38,10 +38,12 @@ from .model import DiscoveredLights, Light
 from .ros_graph import Graph
 from .view import plain, screen, ViewState
 from ..entry_point import (
+    CANNOT_CREATE,
     log_directory_refusal,
     one_line,
     parameter_file_refusal,
     print_output,
+    start_failure,
     wrong_arguments,
 )
 from ..options import option, Parser
@@ -113,6 +115,7 @@ def parser() -> argparse.ArgumentParser:
 def run(args: list[str] | None, termination: Termination) -> int:
     """Run the monitor; see the text of ``--help``."""
     arguments = sys.argv[1:] if args is None else args
+    failed = wrong_arguments('monitor')
     try:
         # rcl reads the files as soon as it parses the arguments.
         refusal = parameter_file_refusal(arguments)
@@ -123,6 +126,7 @@ def run(args: list[str] | None, termination: Termination) -> int:
             return 2
         termination.calls(lambda: None)
         rclpy.init(args=['monitor', *arguments], signal_handler_options=SignalHandlerOptions.NO)
+        failed = CANNOT_CREATE
         # Several monitors may run, and they do not need /rosout.
         node = Node(f'illuminator_monitor_{uuid.uuid4().hex[:8]}', enable_rosout=False,
                     start_parameter_services=False)
@@ -130,7 +134,7 @@ def run(args: list[str] | None, termination: Termination) -> int:
         return int(end.code or 0)
     except Exception as error:
         # rclpy has an exception for each kind of wrong argument.
-        print(f'monitor: {wrong_arguments("monitor")}: {one_line(error)}', file=sys.stderr)
+        print(f'monitor: {one_line(start_failure(error, failed))}', file=sys.stderr)
         return 2
     monitor = Monitor(node)
     console = Console(highlight=False)
