@@ -168,6 +168,13 @@ def test_all_off_goes_to_each_light_that_is_not_gone(desk: Desk) -> None:
     assert desk.asked == [('/a', False), ('/c', False)]
 
 
+def test_all_off_acts_while_the_help_is_shown(desk: Desk) -> None:
+    desk.press('?', 'a')
+
+    assert desk.asked == [('/a', False), ('/b', False), ('/c', False)]
+    assert not desk.bindings.show_help
+
+
 def test_each_key_of_the_help_has_one_meaning_and_an_effect(desk: Desk) -> None:
     assert len(KEYS) == len(set(KEYS))
     for key in KEYS:

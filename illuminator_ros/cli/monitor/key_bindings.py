@@ -205,14 +205,16 @@ class KeyBindings:
             self.end()
         elif meaning is Command.STOP:
             self.stop = True
+        elif meaning is Command.ALL_OFF:
+            # The help names this key, so it must act there, too.
+            self.show_help = False
+            for light in lights:
+                if light.state(now) is not State.GONE:
+                    self._submit(light.name, switch_off)
         elif self.show_help or meaning is Command.HELP:
             self.show_help = not self.show_help
         elif meaning is Command.CLEAR:
             self._clear_gone()
-        elif meaning is Command.ALL_OFF:
-            for light in lights:
-                if light.state(now) is not State.GONE:
-                    self._submit(light.name, switch_off)
         elif self.selected is None or meaning is None:
             return
         elif isinstance(meaning, Command):
