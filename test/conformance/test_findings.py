@@ -149,6 +149,35 @@ def test_a_light_that_stops_sending_fails_and_later_checks_are_skipped() -> None
     assert run.result('thermal-flags').detail == 'the light has stopped sending'
 
 
+def test_a_light_that_receives_nothing_fails_within_five_minutes(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    run = Run()
+    monkeypatch.setattr(run.lights, 'receive', lambda *args: None)
+    begun = run.link.now
+
+    run.finish()
+
+    assert run.link.now - begun < 300.0
+    assert {'status-request', 'on', 'acknowledged'} < run.failed
+    assert run.result('on').detail == 'MAV_CMD_ILLUMINATOR_ON_OFF 1: no acknowledgement'
+
+
+def test_a_light_that_has_acknowledged_a_command_is_sent_each_attempt(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    run = Run()
+    with monkeypatch.context() as context:
+        context.setattr(run.lights, 'receive', lambda *args: None)
+        run.link.run_until(lambda: run.session.transactions.total == 5, within=100.0)
+    run.link.run_until(lambda: any(one.acks for one in run.session.transactions), within=10.0)
+    monkeypatch.setattr(run.lights, 'receive', lambda *args: None)
+    run.finish()
+
+    assert [len(one.sent) for one in run.session.transactions][3:5] == [4, 1]
+    assert len(run.session.transactions[-1].sent) == 4
+
+
 LIE = 'MAV_RESULT_ACCEPTED, but then the status differs in '
 ARDUSUB = properties({'profile': 'ardusub'}, PROFILES['ardusub'].properties.address)
 

@@ -58,6 +58,9 @@ REJECTION_PAUSE = 0.3
 DISCOVERY_INTERVAL = 1.0
 
 ATTEMPTS = 4
+# After so many commands without any acknowledgement each is sent once, and its answer awaited for
+# MESSAGE_TIMEOUT: with a device that receives nothing a run would take 40 minutes.
+UNANSWERED = 4
 REJECTIONS = 12
 # The most entries that are kept of each record, and acknowledgements of one command.
 MAX_ENTRIES = 10_000
@@ -537,14 +540,17 @@ class Session(Endpoint):
         :param source: the address that sends it, None for the session's.
         :raises DeviceLost: if the device has stopped sending.
         """
+        is_deaf = len(self.transactions) >= UNANSWERED and not any(
+            one.acks for one in self.transactions)
+        attempts, timeout = (1, MESSAGE_TIMEOUT) if is_deaf else (ATTEMPTS, ACK_TIMEOUT)
         for _ in range(REJECTIONS):
             # Separate requirements cover COMMAND_INT and other addresses.
             one = self._begin(
                 command, params, expected=not as_int and target is None and source is None)
-            for attempt in range(ATTEMPTS):
+            for attempt in range(attempts):
                 self._send(one, target or self.device, confirmation + attempt, as_int=as_int,
                            source=source)
-                if await self._answered(one):
+                if await self._answered(one, timeout):
                     break
                 self.check_presence()
             if one.result != MavResult.TEMPORARILY_REJECTED:
@@ -602,9 +608,9 @@ class Session(Endpoint):
         before = len(one.acks)
         return await self.runner.until(lambda: len(one.acks) > before, timeout)
 
-    async def _answered(self, one: Transaction) -> bool:
+    async def _answered(self, one: Transaction, timeout: float) -> bool:
         """Wait for the result of an attempt, longer while progress is reported."""
-        timeout, until = ACK_TIMEOUT, self.now + PROGRESS_LIMIT
+        until = self.now + PROGRESS_LIMIT
         while not one.finals and self.now < until:
             if not await self._acknowledged(one, timeout):
                 return False
