@@ -27,6 +27,7 @@ from .model import (
     Changes,
     checked,
     Configuration,
+    DIMMING_FLAGS,
     FIELDS,
     InvalidValue,
     NOTHING,
@@ -448,7 +449,7 @@ class ConfigurationManager:
             if self._pending:
                 self._pending.due, self._pending.has_ended = min(self._pending.due, now), False
         elif (pending := self._pending) and not report.shared_address and (
-                shown := self._shown_goal(pending, self.confirmed, reported)):
+                shown := self._shown_goal(pending, self.confirmed, reported, status)):
             # The light has kept the values, another sender has restored them, or our command was
             # acknowledged too late.
             self._pending = None
@@ -460,18 +461,20 @@ class ConfigurationManager:
             self._follow(status, self.confirmed, reported, switched_at, now)
 
     def _shown_goal(
-        self, pending: _Pending, confirmed: Configuration, reported: Configuration,
+        self, pending: _Pending, confirmed: Configuration, reported: Configuration, status: Status,
     ) -> Configuration | None:
         """
         Return the configuration with pending values that the light shows, None if it does not.
 
-        Heat and external sync hide values. Overrides are sent once even if the light shows them.
+        Heat hides the brightness. Overrides are sent once even if the light shows them.
         """
         if pending.reason is _PendingReason.OVERRIDE and not pending.has_ended:
             return None
         goal = self._limits.clipped(replace(confirmed, **pending.values), self._strobe_range)
-        hidden = [name for name in goal.differences(reported) if name in pending.values]
-        return None if hidden else goal
+        not_shown = goal.differences(reported)
+        if status.error_flags & DIMMING_FLAGS:
+            not_shown.append('brightness')
+        return None if any(name in pending.values for name in not_shown) else goal
 
     def _accept(self, goal: Configuration, status: Status | None) -> None:
         """

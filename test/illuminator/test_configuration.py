@@ -575,11 +575,12 @@ def test_after_a_restart_a_light_that_kept_its_configuration_is_sent_nothing(
     assert sent(agreed, since=at) == []
 
 
+@pytest.mark.parametrize('brightness', [20.0, 30.0], ids=['less', 'equal by chance'])
 def test_after_a_restart_a_light_that_is_dimmed_by_heat_is_sent_its_configuration(
-    fake: FakeLight, agreed: Pair,
+    fake: FakeLight, agreed: Pair, brightness: float,
 ) -> None:
     at, kept = agreed.now, dict(fake.fields)
-    fake.restart(at, **{**kept, 'brightness': 20.0, 'error_status': 1})
+    fake.restart(at, **{**kept, 'brightness': brightness, 'error_status': 1})
     agreed.run(10.0)
     assert sent(agreed, since=at) == [(1, 30, 2, 40)]
 
