@@ -53,6 +53,8 @@ from ..payload.request import (
 CONFIGURE_LIMIT = 0.78
 # s between tries of overrides and restored configurations that got no answer.
 RESTORE_INTERVAL = 2.0
+# s for each try after the first one: no ON waits for it, and the line may be slow.
+RETRY_LIMIT = 1.5
 # Attempts before giving up on a light that accepts a configuration but does not apply it.
 MAX_CONTRADICTIONS = 3
 # s to wait for the first status before a complete set of overrides is sent without one.
@@ -338,6 +340,7 @@ class ConfigurationManager:
 
     def _submit(
         self, values: Changes, now: float, done: Done, *, is_stream: bool = False,
+        limit: float = CONFIGURE_LIMIT,
     ) -> None:
         try:
             self._goal(values)
@@ -371,7 +374,7 @@ class ConfigurationManager:
             done(result, now)
 
         self._queue.submit(Request(
-            self._target, prepare, finished, now=now, deadline=now + CONFIGURE_LIMIT,
+            self._target, prepare, finished, now=now, deadline=now + limit,
             is_stream=is_stream), now)
 
     # Reports
@@ -611,7 +614,8 @@ class ConfigurationManager:
         self._emit(events.ConfigurationRestored(self._address, success, message))
 
     def _send_pending(self, pending: _Pending, now: float) -> None:
-        pending.due = now + RESTORE_INTERVAL
+        limit = RETRY_LIMIT if pending.has_ended else CONFIGURE_LIMIT
+        pending.due = now + RESTORE_INTERVAL + limit - CONFIGURE_LIMIT
         try:
             self._goal(pending.values)
         except InvalidValue as error:
@@ -643,7 +647,7 @@ class ConfigurationManager:
                 self._not_set = pending.failure
                 self._restored(result.success, result.message)
 
-        self._submit(self._checked(pending.values), now, finished)
+        self._submit(self._checked(pending.values), now, finished, limit=limit)
 
     def next_deadline(self, *, connected: bool) -> float:
         """Return when :meth:`poll` has something to do."""

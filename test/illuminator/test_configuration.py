@@ -482,6 +482,26 @@ def test_overrides_and_a_restored_configuration_reach_a_light_that_answers_too_l
     assert successes(pair) == [True, True]
 
 
+@pytest.mark.parametrize('latency', [0.3, 0.4, 0.6, 1.5])
+@pytest.mark.parametrize(('result', 'text'), [
+    (DENIED, 'refused: MAV_RESULT_DENIED'), (ACCEPTED, 'shows brightness 100 %')])
+def test_overrides_that_a_light_does_not_take_and_answers_late_are_given_up(
+    fake: FakeLight, latency: float, result: MavResult, text: str,
+) -> None:
+    fake.results[CONFIGURE] = result
+    fake.applies = False
+    pair = Pair(fake, there=Faults(latency=latency),
+                on_light=lambda light: light.set_desired({'brightness': 30.0}, START))
+    pair.run(60.0)
+    (success, message), = pair.recorder.restorations
+    assert not success
+    assert text in message
+    assert pair.snapshot.discrepancy == message
+    count = len(sent(pair))
+    pair.run(60.0)
+    assert len(sent(pair)) == count
+
+
 def test_an_override_that_the_status_cannot_show_is_sent_until_it_is_acknowledged(
     fake: FakeLight,
 ) -> None:
