@@ -126,6 +126,18 @@ def test_off_after_silence_is_repeated_until_the_light_shows_it() -> None:
     assert any(one.failure for one in pair.recorder.others if isinstance(one, AutomaticSwitch))
 
 
+def test_a_light_without_status_that_may_have_executed_an_on_goes_off_after_silence() -> None:
+    light = FakeLight(stream=0.0)
+    light.answers.clear()
+    pair = silenced(light)
+    light.results[ON_OFF] = None
+    assert not pair.enable(True).success
+    silent_at = pair.now
+    pair.run(SILENCE + 2.0)
+
+    assert {command.param1 for command in pair.commands(ON_OFF, since=silent_at)} == {0.0}
+
+
 @pytest.mark.parametrize('results', [
     [None], [MavResult.TEMPORARILY_REJECTED], [MavResult.IN_PROGRESS, MavResult.ACCEPTED]],
     ids=['lost', 'rejected', 'in progress'])
@@ -428,6 +440,16 @@ def learned(light: FakeLight, settings: Settings | None = None) -> Pair:
         assert pair.enable(on).success
         pair.run(5.0)
     return pair
+
+
+def test_a_brightness_of_a_light_that_is_on_is_undone_where_that_is_the_switch() -> None:
+    light = FakeLight(brightness=50.0)
+    pair = learned(light, Settings(reassert=True))
+    agreed = light.fields['brightness']
+    light.fields['brightness'] = 90.0
+    pair.run(5.0)
+
+    assert (light.fields['enable'], light.fields['brightness']) == (1, agreed)
 
 
 def test_a_configuration_that_is_restored_is_not_sent_after_an_off_where_brightness_is_the_switch(

@@ -514,6 +514,17 @@ def test_an_override_that_the_status_cannot_show_is_sent_until_it_is_acknowledge
     assert successes(pair) == [True]
 
 
+def test_another_sender_is_followed_while_overrides_get_no_answer(fake: FakeLight) -> None:
+    fake.results[CONFIGURE] = None
+    pair = overriding(fake, brightness=30.0).settle(5.0)
+    fake.fields['strobe_period'] = 2.0
+    pair.run(5.0)
+    assert confirmed(pair).strobe_period == 2.0
+    fake.results[CONFIGURE] = ACCEPTED
+    pair.run(5.0)
+    assert (fake.fields['brightness'], fake.fields['strobe_period']) == (30.0, 2.0)
+
+
 def test_overrides_that_are_accepted_and_not_shown_are_given_up_until_a_restart(
     fake: FakeLight,
 ) -> None:
