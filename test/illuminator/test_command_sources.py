@@ -261,6 +261,20 @@ def test_a_light_that_may_go_on_after_its_release_goes_off_where_release_is_off(
     assert 0.0 in shared.sent(ON_OFF, released_at)
 
 
+def test_an_off_at_a_release_is_repeated_though_a_source_that_dims_takes_the_light() -> None:
+    shared = Shared(off_on_release=True, timeout=60.0)
+    shared.pair.settle()
+    shared.pair.wait_for(shared.enable('operator', True))
+    shared.light.results[ON_OFF] = MavResult.FAILED
+    shared.release('operator')
+    shared.pair.run(0.5)
+    shared.dim('autonomy', 20.0)
+    shared.light.results.clear()
+    shared.pair.run(3.0)
+
+    assert (shared.holder, shared.light.fields['enable']) == ('autonomy', 0)
+
+
 def test_an_off_for_all_lights_replaces_a_remembered_on_of_a_lost_light() -> None:
     shared = Shared(timeout=60.0)
     shared.enable('default', True)
