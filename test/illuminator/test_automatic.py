@@ -18,6 +18,7 @@ from collections.abc import Callable
 import math
 from typing import Any
 
+from illuminator_ros.illuminator.configuration_manager import LATE_TIME
 from illuminator_ros.illuminator.events import AutomaticSwitch, ChangedByOther
 from illuminator_ros.illuminator.light import Settings
 from illuminator_ros.illuminator.model import SafetyLimits
@@ -315,6 +316,20 @@ def test_an_off_by_another_sender_is_not_undone_after_a_loss(switched_off: str) 
     pair.run(10.0)
     pair.open()
     pair.run(5.0)
+    light.fields['enable'] = 0
+    pair.run(5.0)
+
+    assert light.fields['enable'] == 0
+
+
+def test_an_off_by_another_sender_is_not_undone_after_an_off_that_failed() -> None:
+    light, pair = reasserting()
+    assert pair.enable(True).success
+    light.results[ON_OFF] = None
+    assert not pair.enable(False).success
+    light.results.clear()
+    # The bridge takes a change to off for the effect of its own OFF meanwhile.
+    pair.run(LATE_TIME + 1.0)
     light.fields['enable'] = 0
     pair.run(5.0)
 

@@ -442,6 +442,9 @@ def test_overrides_that_are_refused_are_reported_once_and_not_sent_again(
     assert not success
     assert result.name in message
     assert result.name in pair.snapshot.discrepancy
+    fake.results.clear()
+    assert pair.configure(brightness=40).success
+    assert pair.snapshot.discrepancy == ''
 
 
 @pytest.mark.parametrize('result', [
@@ -512,6 +515,15 @@ def test_an_override_that_the_status_cannot_show_is_sent_until_it_is_acknowledge
     fake.results[CONFIGURE] = ACCEPTED
     pair.run(RESTORE_INTERVAL + 1.0)
     assert successes(pair) == [True]
+
+
+def test_an_off_does_not_replace_overrides_that_wait(fake: FakeLight) -> None:
+    fake.results[CONFIGURE] = None
+    pair = overriding(fake, brightness=30.0).settle()
+    assert pair.enable(False).success
+    fake.results[CONFIGURE] = ACCEPTED
+    pair.run(5.0)
+    assert fake.fields['brightness'] == 30.0
 
 
 def test_another_sender_is_followed_while_overrides_get_no_answer(fake: FakeLight) -> None:
