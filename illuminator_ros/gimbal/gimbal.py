@@ -485,12 +485,12 @@ class Gimbal:
         def ended(result: request.Result, now: float) -> None:
             if result.refused:
                 primary = self._control.primary if self._control else None
-                if primary and not self.in_control:
+                if primary and not self.in_control and result.permanent:
                     advice = f'{primary} has control and must release it first'
                 else:
+                    who = 'this node' if self.in_control else primary or 'no component'
                     advice = self.unreachable(now) or (
-                        f'{"this node" if self.in_control else "no component"} has control: the '
-                        'log of the manager may have the reason')
+                        f'{who} has control: the log of the manager may have the reason')
                 answer = result.message.removeprefix('refused: ')
                 result = result._replace(
                     message=f'manager {manager} refused "{goal}": {answer}; {advice}')
@@ -639,6 +639,7 @@ class Gimbal:
         def ended(result: CommandResult, now: float) -> None:
             explained(request.Result(
                 result.accepted, str(result), refused=result.refused,
+                permanent=result.refused and result.result in request.PERMANENT_RESULTS,
                 superseded=result.status is CommandStatus.CANCELLED), now)
 
         self._commands.start(command, now, ended, deadline=now + REQUEST_LIMIT)

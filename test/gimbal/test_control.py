@@ -99,6 +99,14 @@ def test_release_without_control_sends_nothing() -> None:
     assert commands(rig, CONFIGURE) == []
 
 
+def test_temporary_refusal_is_not_explained_by_the_component_that_has_control() -> None:
+    manager = FakeManager(primary=OTHER, results={CONFIGURE: mav.MavResult.TEMPORARILY_REJECTED})
+    rig = Rig(manager).run(3.0)
+
+    assert asked(rig, Gimbal.take_control)[1].endswith(
+        '; 1/195 has control: the log of the manager may have the reason')
+
+
 @pytest.mark.parametrize('is_restarted', [False, True])
 def test_gm_16_control_that_an_earlier_status_showed_is_asked_of_the_manager_again(
         is_restarted: bool) -> None:
