@@ -518,6 +518,17 @@ def test_gm_9_the_offsets_of_a_player_do_not_shift_its_setpoints_in_primary_cont
     assert euler(rig.points(GUEST, 0.2, 0.1)[0]) == (0.0, 0.2, 0.1)
 
 
+def test_gm_16_a_rate_ends_when_a_secondary_player_with_offsets_gets_primary_control() -> None:
+    rig = in_control()
+    rig.give(GUEST, configure(-1, -1, *GUEST))
+    rig.points(GUEST, 0.1, 0.1)
+    rig.give(PILOT, pitch_yaw(pitch_rate=0.0, yaw_rate=0.1))
+
+    rig.give(PILOT, configure(*GUEST))
+
+    assert (last(rig).angular_velocity_y, last(rig).angular_velocity_z) == (0.0, 0.0)
+
+
 def test_gm_9_a_change_of_the_secondary_player_does_not_end_the_rate_of_the_primary_one() -> None:
     rig = in_control()
     rig.give(PILOT, pitch_yaw(pitch_rate=0.0, yaw_rate=0.1))
