@@ -380,6 +380,9 @@ class GimbalManager(Payload):
     def _control_changed(self, changes: Sequence[RoleHolderChanged], now: float) -> None:
         for change in changes:
             if change.role is Role.SECONDARY:
+                if self.control.primary.holder is None:
+                    # The gimbal stays where it points, as below.
+                    self._turn(now, self._offsets)
                 self._offsets = STILL
             else:
                 # The gimbal stays where it points until the next player sends a setpoint.

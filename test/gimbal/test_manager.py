@@ -518,6 +518,22 @@ def test_gm_9_the_offsets_of_a_player_do_not_shift_its_setpoints_in_primary_cont
     assert euler(rig.points(GUEST, 0.2, 0.1)[0]) == (0.0, 0.2, 0.1)
 
 
+@pytest.mark.parametrize('primary', [PILOT, None])
+def test_gm_16_offsets_end_with_secondary_control_only_where_a_player_has_primary_control(
+        primary: mav.Address | None) -> None:
+    rig = in_control()
+    rig.points(PILOT, 0.2, 0.1)
+    rig.give(GUEST, configure(-1, -1, *GUEST))
+    rig.points(GUEST, 0.1, 0.1)
+    if primary is None:
+        rig.give(PILOT, configure(-3, -3))
+
+    rig.give(GUEST, configure(-3, -3, -3, -3))
+    rig.run(1.0)
+
+    assert euler(last(rig)) == ((0.0, 0.2, 0.1) if primary else (0.0, 0.3, 0.2))
+
+
 def test_gm_16_a_rate_ends_when_a_secondary_player_with_offsets_gets_primary_control() -> None:
     rig = in_control()
     rig.give(GUEST, configure(-1, -1, *GUEST))
