@@ -137,11 +137,10 @@ class GimbalModel:
 
         :param reported: the flags that the device reports now, None if it reports none.
         """
-        if not self.capabilities:
-            return True
         if reported is not None and names_frame(reported):
             return bool(reported & MountFlags.ACCEPTS_YAW_IN_EARTH_FRAME)
-        return bool(self.capabilities & Capabilities.SUPPORTS_YAW_IN_EARTH_FRAME)
+        return not self.capabilities or bool(
+            self.capabilities & Capabilities.SUPPORTS_YAW_IN_EARTH_FRAME)
 
 
 class Demand(NamedTuple):

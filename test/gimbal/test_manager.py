@@ -411,6 +411,18 @@ def test_gm_2_a_yaw_from_north_is_converted_for_a_device_without_north(
         gimbal_manager.ReferenceLost('heading')]
 
 
+def test_gm_2_a_yaw_from_north_is_converted_as_the_status_says_without_information() -> None:
+    rig = in_control(
+        device=information(FULL & ~Capabilities.SUPPORTS_YAW_IN_EARTH_FRAME), lost=(0, math.inf))
+    rig.heading = 1.0
+    rig.report()
+
+    [sent] = of(GimbalDeviceSetAttitude,
+                rig.give(PILOT, pitch_yaw(0.1, 1.2, flags=F.YAW_IN_EARTH_FRAME)))
+
+    assert (euler(sent), F(sent.flags)) == ((0.0, 0.1, 0.2), F.YAW_IN_VEHICLE_FRAME)
+
+
 def test_gm_2_an_axis_without_an_angle_keeps_its_direction_in_another_yaw_frame() -> None:
     rig = in_control()
     rig.heading = 1.0
