@@ -228,9 +228,13 @@ def test_place_that_waits_is_not_sent_after_the_region_of_interest_is_cleared(
           served_gimbals(port, manager, link=SlowLink)):
         with time_passes():
             own_ros.subscribe(Bool, '/gimbal/in_control').wait_value(True)
+            # The first use of a topic or a service takes longer than the wait for an answer.
+            places = own_ros.publisher(NavSatFix, '/gimbal/cmd/roi', '/gimbal')
+            assert trigger(own_ros, 'clear_roi').success
+            own_ros.synchronize('/gimbal')
         manager.answers = False
         for latitude in (47.0, 47.1):
-            publish(own_ros, 'cmd/roi', NavSatFix(latitude=latitude, longitude=8.5))
+            places.publish(NavSatFix(latitude=latitude, longitude=8.5))
             own_ros.synchronize('/gimbal')
         eventually(lambda: [one for one in manager.commands if isinstance(one, CommandInt)])
         manager.answers = True
