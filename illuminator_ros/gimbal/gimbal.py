@@ -224,6 +224,8 @@ class Gimbal:
         self._control: Control | None = None
         self._last_control: Control | None = None
         self._may_take = settings.auto_take_control
+        # Whether a request for control was neither refused nor confirmed.
+        self._may_have_control = False
         self._releasing = False
         self._identity: events.DeviceIdentity | None = None
         self._device_ranges: Ranges | None = None
@@ -431,8 +433,9 @@ class Gimbal:
 
     @property
     def has_any_control(self) -> bool:
-        """Whether this component has primary or secondary control, and the manager is heard."""
-        return self._control is not None and self._control.includes(self._commands.address)
+        """Whether this component has primary or secondary control, as far as it is known."""
+        return self._may_have_control or (
+            self._control is not None and self._control.includes(self._commands.address))
 
     @property
     def enforces_control(self) -> bool:
@@ -461,6 +464,10 @@ class Gimbal:
 
     def _configure(self, take: bool, now: float, done: request.Done) -> None:
         def ended(result: request.Result, now: float) -> None:
+            if result.success:
+                self._may_have_control = False
+            elif take and not result.refused:
+                self._may_have_control = True
             if result.success and take and not self.enforces_control:
                 result = result._replace(
                     message=f'{result.message}; ArduPilot also obeys components without control')

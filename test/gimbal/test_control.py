@@ -107,6 +107,20 @@ def test_temporary_refusal_is_not_explained_by_the_component_that_has_control() 
         '; 1/195 has control: the log of the manager may have the reason')
 
 
+def test_gm_16_release_after_an_unconfirmed_take_is_asked_of_the_manager() -> None:
+    rig = Rig(FakeManager()).run(3.0)
+    manager = rig.managers[0]
+    manager.reports = False
+    assert not asked(rig, Gimbal.take_control)[0]
+    assert (manager.primary, rig.gimbal.has_any_control) == (OURS, True)
+
+    manager.reports = True
+    success, message = asked(rig, Gimbal.release_control)
+
+    assert success, message
+    assert (manager.primary, rig.gimbal.has_any_control) == (NONE, False)
+
+
 @pytest.mark.parametrize('is_restarted', [False, True])
 def test_gm_16_control_that_an_earlier_status_showed_is_asked_of_the_manager_again(
         is_restarted: bool) -> None:
