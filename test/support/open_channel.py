@@ -78,18 +78,23 @@ Open = Callable[[str | Url], OpenChannel]
 def bound_socket(
     host: str = '127.0.0.1', kind: socket.SocketKind = socket.SOCK_DGRAM, port: int = 0,
 ) -> socket.socket:
-    """Return a socket on a free port, whose calls block for a limited time."""
+    """
+    Return a socket whose calls block for a limited time.
+
+    :param port: 0 for a port that is reserved for these tests: peers of an earlier test may still
+        send to a port of the system's choice.
+    """
     host = host.strip('[]')
     one = socket.socket(socket.AF_INET6 if ':' in host else socket.AF_INET, kind)
     one.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, int(kind == socket.SOCK_STREAM))
     one.settimeout(PATIENCE)
-    one.bind((host, port))
+    one.bind((host, port or free_port(kind, host)))
     return one
 
 
 def listening_socket(host: str = '127.0.0.1', port: int = 0) -> socket.socket:
-    """Return a TCP socket that listens, on a port that is reserved for these tests."""
-    one = bound_socket(host, socket.SOCK_STREAM, port or free_port(socket.SOCK_STREAM, host))
+    """Return a TCP socket that listens; the parameters are those of :func:`bound_socket`."""
+    one = bound_socket(host, socket.SOCK_STREAM, port)
     one.listen()
     return one
 
