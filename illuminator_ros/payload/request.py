@@ -297,8 +297,6 @@ class Request(Generic[S]):
         self._repeats: int | None = None
         self._was_repeated = False
         self._outcome: command_sender.CommandResult | None = None
-        # Whether the acknowledgement may be that of another request, on a line that has had such.
-        self._is_doubtful = False
         self._before: S | None = None
         self._has_status = False
         self._acknowledged_at = self._confirm_until = self._ask_at = math.inf
@@ -349,10 +347,6 @@ class Request(Generic[S]):
         if self.phase is Phase.FINISHED:
             return
         self._outcome = outcome
-        earlier = outcome.earlier
-        self._is_doubtful = (
-            earlier is not None and earlier.is_doubtful
-            and earlier.command.params != self._sent.params and outcome.may_answer_earlier(now))
         accepted = outcome.accepted
         if outcome.status is command_sender.CommandStatus.CANCELLED:
             self.replace(now)
@@ -464,7 +458,10 @@ class Request(Generic[S]):
                       'earlier command', now)
         else:
             text = answer.describe_failure()
-            if self._is_doubtful:
+            earlier = answer.earlier
+            # No status has decided whose acknowledgement it is.
+            if (self.phase is Phase.CONFIRMING and earlier and earlier.is_doubtful
+                    and earlier.command.params != self._sent.params):
                 text = (f'{self._sent.goal} not confirmed: {answer.describe()}, which may belong '
                         'to an earlier command')
             self._end(text, now, refused=answer.refused,
