@@ -20,7 +20,6 @@ import pytest
 from rclpy.qos import QoSProfile, ReliabilityPolicy
 from std_msgs.msg import Bool, Float32
 from support.light import CONFIGURE, eventually, MavResult, ON_OFF, params, ServedLight
-from support.processes import Program
 from support.ros import Parameters, Ros, running_bridge
 
 ENABLE, BRIGHTNESS = '/illuminator/cmd/enable', '/illuminator/cmd/brightness'
@@ -44,18 +43,19 @@ def test_newest_enable_message_wins_while_the_light_is_being_switched(
 @pytest.mark.parametrize(('topic', 'type_', 'value', 'command'), [
     ('enable', Bool, True, ON_OFF), ('brightness', Float32, 44.0, CONFIGURE)])
 def test_refusal_is_logged_and_parameters_keep_their_values(
-    ros: Ros, light: ServedLight, bridge: Program, parameters: Parameters, topic: str,
-    type_: type, value: object, command: int,
+    own_ros: Ros, port: int, topic: str, type_: type, value: object, command: int,
 ) -> None:
-    light.fake.results[command] = MavResult.DENIED
-    before = parameters.get('brightness')
+    # No answer to an earlier command can be taken for the refusal.
+    with running_bridge(own_ros.domain, port) as bridge, ServedLight(port) as light:
+        parameters = Parameters(own_ros)
+        parameters.wait(mode='internal_control')
+        light.fake.results[command] = MavResult.DENIED
+        before = parameters.get('brightness')
 
-    ros.publish(type_, f'/illuminator/cmd/{topic}', value)
+        own_ros.publish(type_, f'/illuminator/cmd/{topic}', value)
 
-    # It may be doubtful whose refusal it is, since a test before has held answers back.
-    eventually(lambda: any(f'~/cmd/{topic}: ' in line and 'MAV_RESULT_DENIED' in line
-                           for line in bridge.lines))
-    assert parameters.get('brightness') == before
+        bridge.wait_for(f'~/cmd/{topic}: refused: MAV_RESULT_DENIED')
+        assert parameters.get('brightness') == before
 
 
 def test_brightness_message_keeps_the_other_fields_and_moves_the_parameter(
