@@ -37,7 +37,6 @@ from .entry_point import (
     wrong_arguments,
 )
 from .payloads import DEFAULT_PAYLOAD, PAYLOADS
-from .postponed_imports import postponed_imports
 from .termination import Termination
 from ..payload.payload_type import PayloadType
 
@@ -177,43 +176,42 @@ def _serve(
 ) -> int:
     import gc
 
-    with postponed_imports():
-        import rclpy
-        from rclpy.signals import SignalHandlerOptions
+    import rclpy
+    from rclpy.signals import SignalHandlerOptions
 
-        from ..ros.payload_node import MAX_NODE_NAME, PayloadNode
+    from ..ros.payload_node import MAX_NODE_NAME, PayloadNode
 
-        # Not before: the import exits at once if the selected middleware is not installed, and a
-        # queue would lose the reason.
-        termination.queue_output(2)
-        # From here on the process must leave the ROS graph in order, so a signal acts later.
-        termination.calls(lambda: None)
-        if refusal := _long_name_refusal(arguments, MAX_NODE_NAME) or log_directory_refusal():
-            return executable.refuse(refusal)
-        _use_profile()
-        # rcutils colours its lines on a terminal only, and stderr is the pipe of a queue here.
-        if termination.is_terminal:
-            os.environ.setdefault('RCUTILS_COLORIZED_OUTPUT', '1')
-        failed = wrong_arguments(executable.name)
-        try:
-            rclpy.init(
-                args=[executable.name, *arguments], signal_handler_options=SignalHandlerOptions.NO)
-            failed = CANNOT_CREATE
-            node = PayloadNode(executable.payload)
-            # Other participants discover the node while these modules are imported.
-            from ..ros.bridge import Bridge
-            from ..ros.parameters import ParameterError
-            executable.load()
-        except Exception as error:
-            # rclpy has an exception for each kind of wrong argument.
-            return executable.refuse(start_failure(error, failed))
-        try:
-            bridge = Bridge(node, arguments, executable.payloads, executable.payload, url)
-        except ParameterError as error:
-            return executable.refuse(f'parameter {error}')
-        except Exception as error:
-            # For example, two topics may have the same name.
-            return executable.refuse(start_failure(error, failed))
+    # Not before: the import exits at once if the selected middleware is not installed, and a
+    # queue would lose the reason.
+    termination.queue_output(2)
+    # From here on the process must leave the ROS graph in order, so a signal acts later.
+    termination.calls(lambda: None)
+    if refusal := _long_name_refusal(arguments, MAX_NODE_NAME) or log_directory_refusal():
+        return executable.refuse(refusal)
+    _use_profile()
+    # rcutils colours its lines on a terminal only, and stderr is the pipe of a queue here.
+    if termination.is_terminal:
+        os.environ.setdefault('RCUTILS_COLORIZED_OUTPUT', '1')
+    failed = wrong_arguments(executable.name)
+    try:
+        rclpy.init(
+            args=[executable.name, *arguments], signal_handler_options=SignalHandlerOptions.NO)
+        failed = CANNOT_CREATE
+        node = PayloadNode(executable.payload, enable_logger_service=True)
+        # Other participants discover the node while these modules are imported.
+        from ..ros.bridge import Bridge
+        from ..ros.parameters import ParameterError
+        executable.load()
+    except Exception as error:
+        # rclpy has an exception for each kind of wrong argument.
+        return executable.refuse(start_failure(error, failed))
+    try:
+        bridge = Bridge(node, arguments, executable.payloads, executable.payload, url)
+    except ParameterError as error:
+        return executable.refuse(f'parameter {error}')
+    except Exception as error:
+        # For example, two topics may have the same name.
+        return executable.refuse(start_failure(error, failed))
     # The existing objects stay: a garbage collection that visits them would only delay answers.
     gc.freeze()
     termination.calls(bridge.end)

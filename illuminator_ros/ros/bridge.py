@@ -32,7 +32,6 @@ from .diagnostics_publisher import DiagnosticsPublisher
 from .executor import NodeExecutor
 from .graph import unheard_publishers
 from .ignored_parameters import ignored_sections, overruled_parameters, unknown_parameters
-from .logger_services import LoggerServices
 from .node_manager import NodeManager, without_node_name
 from .parameters import (
     declare_link_parameters,
@@ -86,7 +85,7 @@ class Bridge:
     ) -> None:
         self.node = node
         self.log = NodeLog(node.get_logger())
-        frame_log = LogForwarder(self.log)
+        frame_log = self._frame_log = LogForwarder(self.log)
         kinds = [_load(name, types) for name in declare_payloads(node, payload)]
         _refuse_same_names(node, kinds)
         parameters = _link_parameters(node, kinds, url)
@@ -115,7 +114,6 @@ class Bridge:
         self._diagnostics = DiagnosticsPublisher(
             node, self.link, self._component, url=parameters.connection_url,
             period=parameters.diagnostics_period)
-        LoggerServices(node, frame_log)
         self._executor = NodeExecutor(node.context, self.log)
         self._executor.add_node(node)
         self._own_nodes = [node, *(
@@ -249,6 +247,8 @@ class Bridge:
                 self._diagnostics.poll(self._tick / 2)
                 for log in self._logs:
                     log.flush()
+                # A service of rclpy sets the levels of loggers.
+                self._frame_log.adjust()
                 if self.link.clock() >= graph_due:
                     graph_due = self.link.clock() + GRAPH_INTERVAL
                     shared = self._check_names(shared)

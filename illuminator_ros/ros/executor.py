@@ -41,7 +41,6 @@ from rclpy.service import Service
 from rclpy.subscription import Subscription
 
 from .answer_queue import AnswerQueue, MAX_SPREAD
-from .processor import yield_processor
 from .throttled_log import NodeLog
 
 # s between checks for calls while rclpy's own loop runs.
@@ -261,12 +260,9 @@ class NodeExecutor(SingleThreadedExecutor):
 
 
 def _send(service: Service, header: _rclpy.rmw_service_info_t, response: object) -> None:
-    try:
+    # The node of a forgotten device may be gone.
+    with contextlib.suppress(InvalidHandle):
         service.send_response(response, header)
-    except InvalidHandle:
-        # The node of a forgotten device may be gone.
-        return
-    yield_processor()
 
 
 class _Entities:

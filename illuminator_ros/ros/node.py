@@ -25,7 +25,6 @@ from typing import Any, Generic, NamedTuple, TYPE_CHECKING, TypeVar
 from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 
-from .cdr import deserializer, serializer
 from .executor import A, DeferredService, Q, Respond, Take
 from .link_call import LinkCalls, MAX_PENDING
 from .throttled_log import NodeLog
@@ -61,7 +60,8 @@ class Publication(NamedTuple):
     """
 
     name: str
-    type: type[object]  # noqa: A003
+    # Untyped: constructors of messages have no types.
+    type: type[Any]  # noqa: A003
     qos: QoSProfile | None = None
 
 
@@ -99,11 +99,10 @@ class CommandTopic(Generic[T]):
     """
     A topic ``~/name`` that the node subscribes to.
 
-    :param type: the message's class, without sequences.
-    :param take: called in a turn of the link with a value and the time (s); of values that come
+    :param type: the message's class.
+    :param take: called in the link's thread with a value and the time (s); of values that come
         faster than the link takes them only the newest.
-    :param read: returns the value of a message, in any thread; a ValueError is logged. The message
-        has the fields of ``type`` only, and tuples for arrays.
+    :param read: returns the value of a message, in any thread; a ValueError is logged.
     :param qos: :data:`SWITCH_QOS` for single messages; :data:`COMMAND_QOS` where it is None.
     """
 
@@ -128,7 +127,10 @@ class NodeInterface:
         publications: Iterable[Publication] = (), services: Iterable[AnyService] = (),
         commands: Iterable[AnyCommand] = (),
     ) -> None:
-        self._topics = {one.name: _Topic(node, one) for one in publications}
+        self._publishers = {
+            one.name: node.create_publisher(one.type, f'~/{one.name}', one.qos or STATE_QOS)
+            for one in publications}
+        self._types = {one.name: one.type for one in publications}
         for service in services:
             calls = LinkCalls(link, log, service.limit)
             node.create_service(
@@ -138,19 +140,16 @@ class NodeInterface:
         for command in commands:
             node.create_subscription(
                 command.type, f'~/{command.name}', _Newest(link, log, command).offer,
-                command.qos or COMMAND_QOS, raw=True)
+                command.qos or COMMAND_QOS)
 
     def publish(self, name: str, value: object) -> None:
         """
         Publish a value; callable from any thread, but only from one at a time.
 
-        :param value: ``data`` for a type of std_msgs, else the message or its serialized bytes.
+        :param value: the message, or ``data`` of a message of std_msgs.
         """
-        self._topics[name].publish(value)
-
-    def publisher(self, name: str) -> Callable[[object], None]:
-        """Return :meth:`publish` for one topic."""
-        return self._topics[name].publish
+        type_ = self._types[name]
+        self._publishers[name].publish(value if isinstance(value, type_) else type_(data=value))
 
     def publish_to_subscribers(self, name: str, make: Callable[[], object]) -> None:
         """
@@ -158,39 +157,8 @@ class NodeInterface:
 
         :param make: returns the value, see :meth:`publish`.
         """
-        topic = self._topics[name]
-        if topic.is_subscribed():
-            topic.publish(make())
-
-
-class _Topic:
-    """
-    A published topic.
-
-    A state that has not changed is not published again while its topic has no subscriber: a later
-    subscriber gets the last message in any case. Counting the subscriptions takes a quarter of the
-    time of publishing.
-    """
-
-    def __init__(self, node: Node, publication: Publication) -> None:
-        qos = publication.qos or STATE_QOS
-        publisher = node.create_publisher(publication.type, f'~/{publication.name}', qos)
-        self._publish = publisher.publish
-        self._count_subscriptions = publisher.get_subscription_count
-        self._serialize = serializer(publication.type)
-        self._keeps_last = qos.durability is DurabilityPolicy.TRANSIENT_LOCAL
-        self._last: object = None
-
-    def publish(self, value: object) -> None:
-        message = self._serialize(value)
-        if message == self._last and not self._count_subscriptions():
-            return
-        self._publish(message)
-        if self._keeps_last:
-            self._last = message
-
-    def is_subscribed(self) -> bool:
-        return bool(self._count_subscriptions())
+        if self._publishers[name].get_subscription_count():
+            self.publish(name, make())
 
 
 def _taker(service: RequestService[Q, A], calls: LinkCalls) -> Take[Q, A]:
@@ -213,13 +181,12 @@ class _Newest(Generic[T]):
         self._link = link
         self._log = log
         self._command = command
-        self._deserialize = deserializer(command.type)
         self._waiting: list[T] = []
         self._lock = threading.Lock()
 
-    def offer(self, data: bytes) -> None:
+    def offer(self, message: Any) -> None:
         try:
-            value = self._command.read(self._deserialize(data))
+            value = self._command.read(message)
         except ValueError as error:
             self._log.warning(f'~/{self._command.name}: ignored: {error}', self._command.name)
             return

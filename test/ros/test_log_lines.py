@@ -21,6 +21,8 @@ from typing import Any
 from illuminator_ros.mavlink.messages import ComponentInformationBasic, heartbeat
 from illuminator_ros.ros.throttled_log import BURST, PERIOD
 import pytest
+from rcl_interfaces.msg import LoggerLevel
+from rcl_interfaces.srv import SetLoggerLevels
 from std_msgs.msg import Bool, Float64
 from std_srvs.srv import Trigger
 from support.fake_light import status_message
@@ -28,7 +30,7 @@ from support.frames import heartbeat_frame
 from support.light import Address, CONFIGURE, ON_OFF, ServedLight
 from support.processes import ended
 from support.ros import Parameters, Ros, running_bridge, start_bridge
-from support.slow import CLOCK, pass_time_until
+from support.slow import CLOCK, pass_time_until, time_passes
 from support.waiting import eventually, stopwatch
 
 AUTOPILOT = 2
@@ -106,6 +108,20 @@ def test_switch_is_logged_with_its_way_if_it_changes_the_light(own_ros: Ros, por
         bridge.wait_for('light 1/243 was switched off by topic')
         assert bridge.count('was switched') == 2
         assert bridge.count('light 1/243 was switched on by service') == 1
+
+
+def test_frames_are_logged_once_a_service_has_set_the_level_of_the_node(
+    own_ros: Ros, port: int,
+) -> None:
+    with running_bridge(own_ros.domain, port) as bridge, ServedLight(port):
+        bridge.wait_for('light 1/243 connected')
+        assert not bridge.count('received from')
+        levels = [LoggerLevel(name='illuminator', level=LoggerLevel.LOG_LEVEL_DEBUG)]
+        answer = own_ros.call(SetLoggerLevels, '/illuminator/set_logger_levels',
+                              SetLoggerLevels.Request(levels=levels))
+        assert answer.results[0].successful
+        with time_passes():
+            bridge.wait_for('received from 1/243: ILLUMINATOR_STATUS')
 
 
 def test_frames_at_debug_level_are_logged_by_the_node_of_their_light_and_no_other(

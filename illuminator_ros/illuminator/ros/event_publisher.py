@@ -27,11 +27,9 @@ from std_msgs.msg import Bool, Float32, Float64, String, UInt32
 from .diagnostics import FlagLog
 from .. import events, model
 from ...payload.command_sources import DEFAULT, describe
-from ...ros.cdr import temperature
 from ...ros.diagnostics import ERROR, WARN
 from ...ros.node import NodeInterface, Publication, STREAM_QOS
 from ...ros.parameters import DeviceParameters
-from ...ros.processor import yield_processor
 from ...ros.throttled_log import NodeLog
 
 # One value of each status, by topic. ``enabled`` is first, since callers wait for it.
@@ -70,9 +68,6 @@ class EventPublisher:
     ) -> None:
         self._clock = node.get_clock()
         self._interface = interface
-        self._status_topics = tuple(
-            (read, interface.publisher(name)) for name, (_, read) in STATUS_TOPICS.items())
-        self._publish_enabled = self._status_topics[0][1]
         self._parameters = parameters
         self._log = log
         self._frame_id = frame_id
@@ -155,17 +150,15 @@ class EventPublisher:
 
     def _status_received(self, event: events.StatusReceived) -> None:
         status = event.status
-        for read, publish in self._status_topics:
+        for name, (_, read) in STATUS_TOPICS.items():
             # An implausible value is None.
             if (value := read(status)) is not None:
-                publish(value)
-            if publish is self._publish_enabled:
-                yield_processor()
-        celsius = event.temperature
-        if celsius is not None:
-            self._interface.publish_to_subscribers('temperature', lambda: temperature(
-                celsius, self._clock.now().nanoseconds, self._frame_id))
-        yield_processor()
+                self._interface.publish(name, value)
+        if event.temperature is not None:
+            message = Temperature(temperature=event.temperature)
+            message.header.stamp = self._clock.now().to_msg()
+            message.header.frame_id = self._frame_id
+            self._interface.publish('temperature', message)
         condition = (status.error_flags, status.invalid, status.strobe_range)
         if condition != self._condition:
             self._condition = condition

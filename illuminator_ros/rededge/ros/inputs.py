@@ -66,8 +66,7 @@ class StampReader:
     def read(self, header: Header) -> Stamp:
         """Return the stamp of a message that was received just now."""
         simulated = self._clock.ros_time_is_active
-        # Otherwise ROS time is the system time; rclpy takes 50 times as long to read it.
-        now = self._clock.now().nanoseconds if simulated else time.time_ns()
+        now = self._clock.now().nanoseconds
         if not simulated:
             offset = now / 1e9 - time.monotonic()
             if self._offset is not None and abs(offset - self._offset) > JUMP:
@@ -94,7 +93,7 @@ def orientation_and_rates(message: Imu) -> tuple[Quaternion | None, Vector]:
 
 
 def subscriptions(node: Node, link: Link, feeder: Feeder) -> Iterable[AnyCommand]:
-    """Return the subscribed topics, which the feeder takes in turns of the link."""
+    """Return the subscribed topics, which the feeder takes in the link's thread."""
     reader = StampReader(node, lambda: link.call(lambda now: feeder.clock_jumped()))
 
     def topic(
