@@ -195,7 +195,7 @@ class _Setpoint:
 
 class Gimbal:
     """
-    One gimbal device, for a component that may control it; in turns of the link.
+    One gimbal device, for a component that may control it; in the link's thread.
 
     The first manager that is heard is used. Every change needs primary control, which
     GIMBAL_MANAGER_STATUS must show.

@@ -83,7 +83,7 @@ class Endpoint(MessageHandler):
     """
     The handler of all messages of a link.
 
-    A :class:`~.link.Link` calls it only in its turns, and sends the messages in ``outgoing``.
+    A :class:`~.link.Link` calls it only in its thread, and sends the messages in ``outgoing``.
 
     :ivar inspect: called with the frame and the class of a message before that is received.
     :ivar outgoing: messages to send, each with the address that sends it.

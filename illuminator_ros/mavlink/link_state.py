@@ -146,7 +146,7 @@ class LinkStatus:
     """
     The state of a link, and the events that must be reported.
 
-    :param label: the name of the link while there is no transport.
+    :ivar label: the name of the link while there is no transport.
     :ivar since: when it was opened or lost, s.
     :ivar reason: why it is not open, '' where it is.
     :ivar openings: how often it was opened.
@@ -157,7 +157,7 @@ class LinkStatus:
         self.since = now
         self.reason = 'not opened yet'
         self.openings = 0
-        self._label = label
+        self.label = label
         self._reasons: set[str] = set()
         self._unreported = 0
         self._allowed = float(MAX_EVENTS)
@@ -186,7 +186,7 @@ class LinkStatus:
         # After the first opening only losses and openings are reported.
         if reason not in self._reasons and len(self._reasons) < MAX_REASONS and not self.openings:
             self._reasons.add(reason)
-            self._report(LinkEvent(False, self._label, reason))
+            self._report(LinkEvent(False, self.label, reason))
 
     def _report(self, event: LinkEvent) -> None:
         self._events.append(event)

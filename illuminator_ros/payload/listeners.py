@@ -26,7 +26,7 @@ _log = logging.getLogger(__name__)
 
 
 class Listeners(Generic[E]):
-    """The listeners to the events of one source; all are called in turns of the link."""
+    """The listeners to the events of one source; all are called in the link's thread."""
 
     def __init__(self) -> None:
         self._listeners: list[Callable[[E], None]] = []

@@ -80,7 +80,7 @@ class RedEdgeClient(Payload):
             settings.feeder, commands.send, lambda: self.camera.target, self.events.emit)
 
     def snapshot(self, now: float) -> ClientSnapshot:
-        """Return camera and inputs at this moment; call it in a turn of the link."""
+        """Return camera and inputs at this moment; call it in the link's thread."""
         return ClientSnapshot(self.camera.snapshot(now), self.feeder.snapshot(now))
 
     def link_opened(self, now: float) -> None:

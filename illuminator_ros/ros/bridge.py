@@ -243,7 +243,7 @@ class Bridge:
         while not self._ended.is_set():
             try:
                 more = self._nodes.work()
-                self.link.run_turn(self._poll)
+                self.link.call(self._poll)
                 self._diagnostics.poll(self._tick / 2)
                 for log in self._logs:
                     log.flush()

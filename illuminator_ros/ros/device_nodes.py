@@ -50,7 +50,7 @@ N = TypeVar('N', bound=DeviceNode)
 
 class DeviceNodes(Generic[K, N]):
     """
-    Gives devices their nodes; for turns of the link.
+    Gives devices their nodes; for the link's thread.
 
     :param kind: a noun for a device, such as ``light``.
     :param make: gives the node of a further device its interface; in the thread that makes nodes.

@@ -15,7 +15,7 @@
 """
 /diagnostics (REP 107): findings, statuses, and the status of the link.
 
-Snapshots are made in turns of the link; everything else is a pure function of them. Keys have
+Snapshots are made in the link's thread; everything else is a pure function of them. Keys have
 their unit, and a numeric value is a plain number, so that it can be plotted. Times are s on the
 link's clock.
 """
@@ -108,7 +108,7 @@ class LinkDiagnostics:
 
 
 def link_diagnostics(link: Link, component: Component, url: str, now: float) -> LinkDiagnostics:
-    """Return a snapshot of the link; call it in a turn of the link."""
+    """Return a snapshot of the link; call it in the link's thread."""
     state = link.snapshot(now)
     traffic, decoding, signing = state.traffic, state.decoding, state.signing
     commands = component.commands

@@ -29,10 +29,10 @@ from .node import STREAM_QOS
 from ..mavlink.component import Component
 from ..mavlink.link import Link
 
-# Longest wait for a turn of the link, s.
+# Longest wait for the link's thread, s.
 SNAPSHOT_TIMEOUT = 1.0
 
-# Makes reports of a snapshot that was taken in a turn of the link; a pure function.
+# Makes reports of a snapshot that was taken in the link's thread; a pure function.
 MakeReports = Callable[[LinkDiagnostics], Sequence[Report]]
 
 
@@ -42,7 +42,7 @@ class DiagnosticsSource:
     The reports of one node.
 
     :param node: its name with its namespace.
-    :param take_snapshot: takes a snapshot, in a turn of the link, given the time (s).
+    :param take_snapshot: takes a snapshot, in the link's thread, given the time (s).
     """
 
     node: str
@@ -81,7 +81,7 @@ class DiagnosticsPublisher:
             self._sources.pop(source, None)
 
     def snapshot(self, now: float) -> LinkDiagnostics:
-        """Return a snapshot of the link; call it in a turn of the link."""
+        """Return a snapshot of the link; call it in the link's thread."""
         return link_diagnostics(self._link, self._component, self._url, now)
 
     def poll(self, tolerance: float) -> None:
@@ -94,7 +94,7 @@ class DiagnosticsPublisher:
             sources = list(self._sources)
         taken: queue.SimpleQueue[tuple[float, LinkDiagnostics, list[MakeReports]]] = (
             queue.SimpleQueue())
-        self._link.run_turn(lambda now: taken.put((
+        self._link.call(lambda now: taken.put((
             now, self.snapshot(now), [source.take_snapshot(now) for source in sources])))
         try:
             now, link, snapshots = taken.get(timeout=SNAPSHOT_TIMEOUT)

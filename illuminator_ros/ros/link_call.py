@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Bringing requests from ROS callbacks into turns of the link."""
+"""Requests of ROS callbacks to the link, and their answers."""
 
 from __future__ import annotations
 
@@ -21,21 +21,21 @@ import threading
 from typing import Any, TypeVar
 
 from .throttled_log import NodeLog
-from ..mavlink.link import CALLER_WAIT, Link
+from ..mavlink.link import Link
 
 T = TypeVar('T')
 
 # Requests of one kind that may wait for their answers.
 MAX_PENDING = 64
 
-# Called in a turn of the link with the time, s, and with the function that it must call once with
+# Called in the link's thread with the time, s, and with the function that it must call once with
 # its answer, then or later.
 LinkRequest = Callable[[float, Callable[[T], None]], None]
 
 
 class LinkCalls:
     """
-    Requests of one kind, for turns of the link.
+    Requests of one kind, for the link's thread.
 
     :param limit: how many may wait for their answers; one more is refused at once.
     """
@@ -47,28 +47,21 @@ class LinkCalls:
         # The refusal of each request that waits, by the function that ends it. Untyped: the
         # answers of requests have different types.
         self._waiting: dict[Callable[[Any], None], Callable[[str], Any]] = {}
-        # Whether the last answer came soon enough for the caller to wait for the next one.
-        self._is_quick = False
         self._lock = threading.Lock()
 
     def ask(
         self, request: LinkRequest[T], answer: Callable[[T], None], refusal: Callable[[str], T],
     ) -> None:
         """
-        Start a request, and wait for its answer for :data:`~..mavlink.link.CALLER_WAIT` at most.
-
-        It waits only if the last answer came within that time, and no other request waits.
+        Start a request.
 
         :param answer: called once with the answer, in any thread.
         :param refusal: returns the answer for a reason why the request cannot be executed.
         """
-        asked_at = self._link.clock()
-
         def end(value: T) -> None:
             with self._lock:
                 if self._waiting.pop(end, None) is None:
                     return
-                self._is_quick = self._link.clock() <= asked_at + CALLER_WAIT
             answer(value)
 
         def run(now: float) -> None:
@@ -80,14 +73,13 @@ class LinkCalls:
                 end(refusal(reason))
 
         with self._lock:
-            waits = self._is_quick and not self._waiting
             busy = len(self._waiting) >= self._limit
             if not busy:
                 self._waiting[end] = refusal
         if busy:
             answer(refusal(f'busy: {self._limit} requests wait for an answer already'))
             return
-        self._link.run_turn(run, (lambda: end not in self._waiting) if waits else None)
+        self._link.call(run)
 
     def refuse_waiting(self, reason: str) -> None:
         """Answer the requests that wait with a refusal; callable in any thread."""

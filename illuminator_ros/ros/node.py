@@ -71,7 +71,7 @@ class RequestService(Generic[Q, A]):
     A service ``~/name``.
 
     :param type: the service's class; its response has ``success`` and ``message``.
-    :param start: called in a turn of the link with the request, the time (s), and the function
+    :param start: called in the link's thread with the request, the time (s), and the function
         that it must call once with success and message, then or later.
     :param limit: requests that may wait for their answers; one more is answered at once.
     """
@@ -175,7 +175,7 @@ def _taker(service: RequestService[Q, A], calls: LinkCalls) -> Take[Q, A]:
 
 
 class _Newest(Generic[T]):
-    """Hands the newest value of a topic to a turn of the link."""
+    """Hands the newest value of a topic to the link."""
 
     def __init__(self, link: Link, log: NodeLog, command: CommandTopic[T]) -> None:
         self._link = link
@@ -194,7 +194,7 @@ class _Newest(Generic[T]):
             called = bool(self._waiting)
             self._waiting[:] = [value]
         if not called:
-            self._link.run_turn(self._deliver)
+            self._link.call(self._deliver)
 
     def _deliver(self, now: float) -> None:
         with self._lock:

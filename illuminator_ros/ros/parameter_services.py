@@ -53,7 +53,7 @@ QUEUE_DEPTH = 100
 # s, in addition to the 0.78 s that a light may take: a set is answered within 0.9 s.
 ANSWER_SPREAD = 0.1
 
-# Sets values in the device, in a turn of the link, given the time (s); calls its last argument
+# Sets values in the device, in the link's thread, given the time (s); calls its last argument
 # once with '' or why the values were not set.
 Configure = Callable[[Values, float, Callable[[str], None]], None]
 # Raises ValueError where the device cannot take a value of a parameter, given its name.
@@ -161,7 +161,7 @@ class ParameterServices:
         self._calls.ask(
             lambda now, done: self._set_all(messages, now, done), answer, str)
 
-    # In turns of the link
+    # In the link thread
 
     def _set_each(
         self, messages: Messages, now: float, answer: Callable[[list[str]], None],

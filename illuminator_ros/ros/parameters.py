@@ -264,7 +264,7 @@ def given_parameters(node: Node) -> Mapping[str, Parameter]:
 
 class DeviceParameters:
     """
-    Parameters of a node that show a device; for turns of the link.
+    Parameters of a node that show a device; for the link's thread.
 
     They have no value until the device reports one, and only :meth:`show` sets them.
 

@@ -56,7 +56,7 @@ class Host(NamedTuple):
 
 
 class ServedPayload:
-    """A payload that is served. All but :meth:`close` runs in turns of the link."""
+    """A payload that is served. All but :meth:`close` runs in the link's thread."""
 
     def poll(self, now: float) -> None:
         """Do what is due; called a few times a second."""

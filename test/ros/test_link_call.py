@@ -12,53 +12,36 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Requests of ROS callbacks to the link: which of them wait for their answers."""
+"""Requests of ROS callbacks to the link: each is answered once, and too many are refused."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
 from typing import Any
 
-from illuminator_ros.mavlink.link import CALLER_WAIT
-from illuminator_ros.ros.link_call import LinkCalls
+from illuminator_ros.ros.link_call import LinkCalls, MAX_PENDING
 import pytest
 
 
 class CallerLink:
     """
-    A link whose turns are those of callers.
+    A link that calls functions at once, and answers requests when it is told to.
 
-    :ivar now: s.
-    :ivar waited: whether each caller waited.
-    :ivar is_done: of the last caller, None if it did not wait.
     :ivar answered: the answers that callers got.
     """
 
     def __init__(self) -> None:
-        self.now = 0.0
-        self.waited: list[bool] = []
-        self.is_done: Callable[[], bool] | None = None
         self.answered: list[str] = []
         self._answers: list[Callable[[str], None]] = []
 
-    def clock(self) -> float:
-        return self.now
-
-    def run_turn(
-        self, function: Callable[[float], None], is_done: Callable[[], bool] | None = None,
-    ) -> None:
-        function(self.now)
-        self.is_done = is_done
-        self.waited.append(is_done is not None)
+    def call(self, function: Callable[[float], None]) -> None:
+        function(0.0)
 
     def ask(self, calls: LinkCalls) -> None:
-        def start(now: float, answer: Callable[[str], None]) -> None:
-            self._answers.append(answer)
+        calls.ask(lambda now, answer: self._answers.append(answer), self.answered.append,
+                  'refused: {}'.format)
 
-        calls.ask(start, self.answered.append, 'refused: {}'.format)
-
-    def answer(self, after: float) -> None:
-        self.now += after
+    def answer(self) -> None:
         self._answers.pop(0)('done')
 
 
@@ -73,42 +56,23 @@ def calls(link: CallerLink) -> LinkCalls:
     return LinkCalls(anything, anything)
 
 
-@pytest.mark.parametrize(('after', 'waits'), [
-    (0.0, True), (0.9 * CALLER_WAIT, True), (1.1 * CALLER_WAIT, False), (1.0, False)])
-def test_caller_waits_where_the_last_answer_came_soon(
-        link: CallerLink, calls: LinkCalls, after: float, waits: bool) -> None:
-    link.ask(calls)
-    link.answer(after)
-    link.ask(calls)
-    assert link.waited == [False, waits]
-
-
-def test_caller_does_not_wait_while_another_request_has_no_answer(
+def test_request_beyond_the_limit_is_refused_at_once_until_another_is_answered(
         link: CallerLink, calls: LinkCalls) -> None:
-    link.ask(calls)
-    link.answer(0.0)
-    for _ in range(3):
+    for _ in range(MAX_PENDING + 1):
         link.ask(calls)
-    assert link.waited == [False, True, False, False]
-
-
-def test_caller_that_waits_is_done_when_the_answer_has_come(
-        link: CallerLink, calls: LinkCalls) -> None:
+    assert link.answered == [
+        f'refused: busy: {MAX_PENDING} requests wait for an answer already']
+    link.answer()
     link.ask(calls)
-    link.answer(0.0)
-    link.ask(calls)
-    assert link.is_done is not None
-    assert not link.is_done()
-    link.answer(0.0)
-    assert link.is_done()
+    assert link.answered[1:] == ['done']
 
 
 def test_each_request_that_waits_is_refused_at_the_end_and_answered_once(
         link: CallerLink, calls: LinkCalls) -> None:
     for _ in range(3):
         link.ask(calls)
-    link.answer(0.0)
+    link.answer()
     calls.refuse_waiting('the end')
-    link.answer(0.0)
+    link.answer()
     calls.refuse_waiting('the end')
     assert link.answered == ['done', 'refused: the end', 'refused: the end']

@@ -48,9 +48,8 @@ class Talker(Endpoint):
     A peer that sends heartbeats and keeps received messages.
 
     :ivar heard: source and message, in order.
-    :ivar receivers: the thread that each of them came in.
     :ivar announcements: when the link was opened or a new peer was heard, s.
-    :ivar turns: the number of turns of the link's thread.
+    :ivar turns: the number of waits of the link's thread.
     """
 
     messages = tuple(HANDLED.values())
@@ -59,7 +58,6 @@ class Talker(Endpoint):
         super().__init__()
         self.heartbeat = HeartbeatTimer(BRIDGE, 18, self.outgoing)
         self.heard: Log[tuple[Address, Any]] = Log()
-        self.receivers: Log[threading.Thread] = Log()
         self.announcements: Log[float] = Log()
         self.turns = 0
 
@@ -71,7 +69,6 @@ class Talker(Endpoint):
         self.heartbeat.stop()
 
     def receive(self, source: Address, message: Message, now: float) -> None:
-        self.receivers.append(threading.current_thread())
         self.heard.append((source, message))
 
     def poll(self, now: float) -> None:
@@ -151,7 +148,7 @@ class LiveLink(EndpointLink[Talker]):
         super().__init__(url, endpoint or Talker(), **options)
 
     def send(self, *messages: Message) -> None:
-        """Send messages, in one turn of the thread."""
+        """Send messages, in one call of the thread."""
         self.ask(lambda now: self.endpoint.outgoing.extend((BRIDGE, one) for one in messages))
 
 

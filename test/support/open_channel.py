@@ -34,7 +34,7 @@ class OpenChannel:
     def __init__(self, channel: Channel) -> None:
         self.channel = channel
         self.selector = selectors.DefaultSelector()
-        channel.register(self.selector)
+        channel.register(self.selector, self._ready)
 
     def receive(self, count: int = 1) -> list[tuple[Any, bytes]]:
         """Wait for pieces of data and return them with their origins."""
@@ -54,6 +54,9 @@ class OpenChannel:
             if events & selectors.EVENT_READ:
                 found += self.channel.receive(key.fileobj)
         return found
+
+    def _ready(self, handle: object, events: int) -> None:
+        raise AssertionError('the channel calls nothing itself')
 
     def receive_bytes(self, size: int) -> bytes:
         """Wait for ``size`` bytes from any peer, and return them."""

@@ -18,7 +18,7 @@ from __future__ import annotations
 
 from collections import deque
 from collections.abc import Callable
-import contextlib
+import math
 import selectors
 from typing import Any
 
@@ -98,7 +98,7 @@ class SimulatedLink(Link):
 
     :param take: called with each sent datagram and its peer.
     :ivar now: s.
-    :ivar meanwhile: called once each when the link waits, as other threads would.
+    :ivar meanwhile: called once each while the link waits.
     """
 
     def __init__(
@@ -111,15 +111,16 @@ class SimulatedLink(Link):
         super().__init__(URL, endpoint, label='simulated', clock=lambda: self.now,
                          wall_clock=lambda: 1.7e9 + self.now, signing=signing,
                          mavlink_version=mavlink_version, selector=_Selector(self))
-        self._connecting = True
-        self._writer.sequences = _FromZero()
+        self._line._connect_at = math.inf
+        self._line._sender._writer.sequences = _FromZero()
+        self._faults.log = self.log_fault  # type: ignore[method-assign]
         self.socket = _Socket(take)
         self.udp = UdpChannel(URL)
         self.udp._socket.close()
         self.udp._socket = self.socket  # type: ignore[assignment]
-        self._opened(self.udp, now)
+        self._line.opened(self.udp, now)
 
-    def _log_fault(self) -> None:
+    def log_fault(self) -> None:
         raise  # noqa: PLE0704 - it is called while an exception is handled
 
     def receive(self, *datagrams: Datagram) -> None:
@@ -127,13 +128,13 @@ class SimulatedLink(Link):
         self.socket.inbox.extend(datagrams)
         self.until = self.now
         while self.socket.inbox:
-            self._run_once()
+            self._thread.run_once()
 
     def ask(self, function: Callable[[float], Any]) -> None:
         """Call a function as other threads do."""
         self.call(function)
         self.until = self.now
-        self._run_once()
+        self._thread.run_once()
 
     def run(self, seconds: float) -> None:
         """Let time pass."""
@@ -141,15 +142,9 @@ class SimulatedLink(Link):
         idle = 0
         while self.now < self.until:
             before = self.now
-            self._run_once()
+            self._thread.run_once()
             idle = idle + 1 if self.now == before and not self.socket.inbox else 0
             assert idle < MAX_IDLE_TURNS, f'the thread would spin at {self.now}'
-
-    def is_woken(self) -> bool:
-        """Return whether the thread was woken since this was asked last."""
-        with contextlib.suppress(BlockingIOError):
-            return bool(self._wake_out.recv(4096))
-        return False
 
     def state(self) -> LinkSnapshot:
         """Return the link at this moment."""

@@ -208,7 +208,4 @@ class SlowLink(Link):
     """A link that uses the slow clock."""
 
     def __init__(self, *arguments: Any, **named: Any) -> None:
-        super().__init__(*arguments, clock=CLOCK, **named)
-        self._selector.close()
-        self._selector = _SlowSelector()
-        self._selector.register(self._wake_out, selectors.EVENT_READ)
+        super().__init__(*arguments, clock=CLOCK, selector=_SlowSelector(), **named)

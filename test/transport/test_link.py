@@ -25,10 +25,11 @@ import threading
 from typing import Any
 
 from illuminator_ros.mavlink import connector as connector_module
-from illuminator_ros.mavlink import link as link_module
+from illuminator_ros.mavlink import fault_log, line
 from illuminator_ros.mavlink.frame import Decoder
-from illuminator_ros.mavlink.link import Link, LinkThreadError
+from illuminator_ros.mavlink.link import Link
 from illuminator_ros.mavlink.link_state import LinkEvent
+from illuminator_ros.mavlink.link_thread import LinkThreadError
 from illuminator_ros.mavlink.messages import CommandLong
 from illuminator_ros.mavlink.signing import Signing, SigningMode
 from illuminator_ros.mavlink.signing_files import TimestampStore
@@ -122,7 +123,7 @@ class Faulty(Talker):
 def faults(monkeypatch: pytest.MonkeyPatch,
            caplog: pytest.LogCaptureFixture) -> Callable[[], list[str]]:
     """Return a function that returns all logged faults; each is logged."""
-    monkeypatch.setattr(link_module, 'FAULT_LOG_INTERVAL', 0.0)
+    monkeypatch.setattr(fault_log, 'FAULT_LOG_INTERVAL', 0.0)
 
     def logged() -> list[str]:
         assert all(record.levelno == logging.ERROR for record in caplog.records)
@@ -182,8 +183,8 @@ def test_lasting_fault_pauses_the_thread_and_does_not_fill_the_log(
         run: Run, caplog: pytest.LogCaptureFixture, monkeypatch: pytest.MonkeyPatch,
         method: str) -> None:
     endpoint = Faulty(method, math.inf, -math.inf)
-    monkeypatch.setattr(link_module, 'FAULT_PAUSE', 0.001)
-    monkeypatch.setattr(link_module, 'FAULT_LOG_INTERVAL', 60.0)
+    monkeypatch.setattr(fault_log, 'FAULT_PAUSE', 0.001)
+    monkeypatch.setattr(fault_log, 'FAULT_LOG_INTERVAL', 60.0)
     run(LiveLink(URL, endpoint))
     endpoint.failures.wait_for(lambda one: True, count=50)
     assert len(caplog.records) == 1
@@ -225,7 +226,7 @@ def test_fault_while_opening_is_logged_and_tried_again(
 def test_connector_whose_thread_cannot_be_started_is_tried_again(
         run: Run, monkeypatch: pytest.MonkeyPatch) -> None:
     # Threads fail to start, as with a limit on the number of processes.
-    monkeypatch.setattr(link_module, 'THREAD_RETRY_INTERVAL', 0.01)
+    monkeypatch.setattr(line, 'THREAD_RETRY_INTERVAL', 0.01)
     genuine, failures = threading.Thread.start, Log[str]()
 
     def start(thread: threading.Thread) -> None:

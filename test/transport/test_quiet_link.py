@@ -20,8 +20,8 @@ import math
 import socket
 
 from illuminator_ros.mavlink import component
+from illuminator_ros.mavlink.fault_log import FAULT_PAUSE
 from illuminator_ros.mavlink.frame_reader import STALL
-from illuminator_ros.mavlink.link import FAULT_PAUSE
 from illuminator_ros.mavlink.messages import Address
 from illuminator_ros.mavlink.transport.udp import PEER_EXPIRY
 import pytest
@@ -80,7 +80,7 @@ def test_heartbeat_is_sent_once_a_second_while_a_peer_is_heard() -> None:
 class Unlogged(SimulatedLink):
     """A simulated link that survives faults, as a link does."""
 
-    def _log_fault(self) -> None:
+    def log_fault(self) -> None:
         pass
 
 
@@ -107,6 +107,23 @@ def test_frame_behind_a_false_start_is_received_when_that_is_given_up() -> None:
     assert len(endpoint.heard) == 1
     link.run(0.02)
     assert len(endpoint.heard) == 2
+
+
+def test_frames_that_came_while_the_process_was_stopped_precede_the_deadlines() -> None:
+    link, endpoint = simulated()
+    heard_at_poll: list[int] = []
+
+    def stop() -> None:
+        link.now = link.until = link.now + 10.0
+        link.socket.inbox.append((BEAT, PEER))
+
+    endpoint.poll = lambda now: heard_at_poll.append(  # type: ignore[method-assign]
+        len(endpoint.heard))
+    link.run(0.01)
+    heard_at_poll.clear()
+    link.meanwhile.append(stop)
+    link.run(0.01)
+    assert heard_at_poll == [1]
 
 
 def test_foreign_frames_keep_a_peer_and_are_counted() -> None:

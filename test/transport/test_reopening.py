@@ -22,9 +22,8 @@ from pathlib import Path
 import socket
 
 from illuminator_ros.illuminator.light import Settings
-from illuminator_ros.mavlink import component, link_state
+from illuminator_ros.mavlink import component, line, link_state
 from illuminator_ros.mavlink import connector as connector_module
-from illuminator_ros.mavlink import link as link_module
 from illuminator_ros.mavlink.connector import FIRST_PAUSE
 from illuminator_ros.mavlink.transport.udp import MAX_PEERS, PEER_EXPIRY
 from illuminator_ros.payload import request
@@ -82,7 +81,7 @@ def server() -> Iterator[Server]:
 @pytest.fixture
 def _unproven_without_frame(monkeypatch: pytest.MonkeyPatch) -> None:
     """Prevent that a channel is proved by staying open."""
-    monkeypatch.setattr(link_module, 'PROOF_TIME', 3600.0)
+    monkeypatch.setattr(line, 'PROOF_TIME', 3600.0)
 
 
 @pytest.fixture
@@ -158,7 +157,7 @@ def test_server_that_drops_connections_is_asked_more_rarely_and_open_once_it_sen
 def test_link_that_has_worked_is_reopened_at_once_and_one_that_only_answered_after_a_pause(
         run: live_link.Run, server: Server, pauses: Log[float], monkeypatch: pytest.MonkeyPatch,
         proof_time: float, pause: float) -> None:
-    monkeypatch.setattr(link_module, 'PROOF_TIME', proof_time)
+    monkeypatch.setattr(line, 'PROOF_TIME', proof_time)
     server.listen()
     link = run(live_link.LiveLink(server.url))
     for count in (1, 2, 3):
@@ -203,7 +202,7 @@ def cycle(link: live_link.LiveLink, come: Callable[[], None], go: Callable[[], N
 @pytest.fixture
 def _many_events(monkeypatch: pytest.MonkeyPatch, pauses: Log[float]) -> None:
     monkeypatch.setattr(link_state, 'MAX_EVENTS', 10 * CYCLES)
-    monkeypatch.setattr(link_module, 'PROOF_TIME', 0.0)
+    monkeypatch.setattr(line, 'PROOF_TIME', 0.0)
 
 
 def test_200_restarts_of_a_tcp_server_leak_nothing(

@@ -46,8 +46,9 @@ from ..options import (
 )
 from ..payloads import DEFAULT_PAYLOAD, PAYLOADS
 from ..termination import SIGNALS
-from ...mavlink.link import Link, LinkThreadError
+from ...mavlink.link import Link
 from ...mavlink.link_state import LinkEvent, LinkSnapshot
+from ...mavlink.link_thread import LinkThreadError
 from ...mavlink.messages import Address
 from ...mavlink.signing import Signing
 from ...mavlink.signing_files import TimestampStore
@@ -266,7 +267,7 @@ class Conformance:
                 self._write_line(self._texts.get(timeout=0.1))
 
     def _link_state(self) -> LinkSnapshot:
-        # The checks run in turns of the link.
+        # The checks run in the link's thread.
         return self._link.snapshot(self._link.clock())
 
     def _link_event(self, event: LinkEvent) -> None:

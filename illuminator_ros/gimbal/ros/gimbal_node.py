@@ -68,7 +68,7 @@ REQUESTS: dict[str, Callable[[Gimbal, float, request.Done], None]] = {
 
 class GimbalNode:
     """
-    Serves one gimbal with a node; all methods are for turns of the link.
+    Serves one gimbal with a node; all methods are for the link's thread.
 
     :ivar key: of the gimbal, None while there is none.
     """

@@ -60,7 +60,7 @@ def settings(values: Values) -> GimbalSettings:
 
 class Gimbals(ServedPayload):
     """
-    Gives each gimbal on the link a node; for turns of the link.
+    Gives each gimbal on the link a node; for the link's thread.
 
     :param why_none: returns a reason in this process why there is no gimbal, '' if there is none.
     :raises ParameterError: if a parameter is wrong.

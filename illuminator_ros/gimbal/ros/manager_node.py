@@ -110,7 +110,7 @@ def manager_settings(values: Values, ros: Address) -> gimbal_manager.ManagerSett
 
 class ManagerNode(ServedPayload):
     """
-    Serves a manager with one node, in turns of the link.
+    Serves a manager with one node, in the link's thread.
 
     :raises ParameterError: if a parameter is wrong.
     """

@@ -104,7 +104,7 @@ class Beam:
 
 class BeamPublisher:
     """
-    Publishes the beam of one light, in turns of the link.
+    Publishes the beam of one light, in the link's thread.
 
     :param direction: returns the rotation of a gimbal, given its gimbal device id, relative to
         the vehicle; None if it is not known.

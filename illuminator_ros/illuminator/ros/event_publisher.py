@@ -56,7 +56,7 @@ _SEVERITIES = {ERROR: logging.ERROR, WARN: logging.WARNING}
 
 class EventPublisher:
     """
-    Publishes the events of one light, in a turn of the link.
+    Publishes the events of one light, in the link's thread.
 
     :param interface: has :data:`PUBLICATIONS`.
     :param check_diagnostics: called if a level may have changed.

@@ -54,7 +54,7 @@ class LightNode:
     """
     Serves one light with a node: topics, services, parameters, diagnostics.
 
-    All methods but :meth:`close` are for turns of the link.
+    All methods but :meth:`close` are for the link's thread.
 
     :param services: and ``commands``, of the node in addition to those of its light.
     :ivar address: of the light, None while there is none.

@@ -44,7 +44,7 @@ NAMES_DELAY = 10.0
 
 class Lights(ServedPayload):
     """
-    Gives each light on the link a node. All methods but :meth:`close` are for turns of the link.
+    Gives each light on the link a node. All methods but :meth:`close` are for the link's thread.
 
     :raises ParameterError: if a parameter is wrong.
     """

@@ -18,7 +18,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections import deque
-from collections.abc import Hashable, Iterator, Sequence
+from collections.abc import Callable, Hashable, Iterator, Sequence
 import contextlib
 import math
 import os
@@ -30,6 +30,8 @@ from ..url import HostPort
 
 # The origin of received bytes, to which an answer can be sent.
 Peer = Hashable
+# Takes a registered handle that is ready, and its events.
+Serve = Callable[[object, int], None]
 
 # Bytes that wait for a slow line. Whole frames beyond that are dropped, the oldest first: a
 # command that has waited longer than its time-out has been sent again.
@@ -37,7 +39,7 @@ MAX_QUEUED = 16 * 1024
 # Bytes of one read from a stream. As many as a terminal of Linux holds: a full one stops a fast
 # sender, such as a USB device, and must be read again at once.
 READ_SIZE = 4095
-# Reads in one turn of the link: 20 ms bring more than one takes at 5,000 frames a second.
+# Reads in one pass of the link: 20 ms bring more than one takes at 5,000 frames a second.
 MAX_READS = 2
 
 
@@ -66,8 +68,8 @@ class Channel(ABC):
         return False
 
     @abstractmethod
-    def register(self, selector: selectors.BaseSelector) -> None:
-        """Register its descriptors with the selector."""
+    def register(self, selector: selectors.BaseSelector, serve: Serve) -> None:
+        """Register its descriptors with the selector, with ``serve`` as data."""
 
     @abstractmethod
     def receive(self, handle: object) -> Iterator[tuple[Peer, bytes]]:
@@ -168,10 +170,10 @@ class StreamChannel(Channel):
         """See :attr:`Channel.is_waiting`."""
         return bool(self._queue)
 
-    def register(self, selector: selectors.BaseSelector) -> None:
+    def register(self, selector: selectors.BaseSelector, serve: Serve) -> None:
         """See :meth:`Channel.register`."""
         self._selector = selector
-        selector.register(self._file, selectors.EVENT_READ)
+        selector.register(self._file, selectors.EVENT_READ, serve)
 
     def receive(self, handle: object) -> Iterator[tuple[Peer, bytes]]:
         """See :meth:`Channel.receive`."""
@@ -210,8 +212,9 @@ class StreamChannel(Channel):
         except OSError as error:
             raise ChannelLost(error.errno, error.strerror) from None
         events = selectors.EVENT_READ | (selectors.EVENT_WRITE if self._queue else 0)
-        if self._selector.get_key(self._file).events != events:
-            self._selector.modify(self._file, events)
+        key = self._selector.get_key(self._file)
+        if key.events != events:
+            self._selector.modify(self._file, events, key.data)
 
     def writable(self, handle: object) -> None:
         """See :meth:`Channel.writable`."""

@@ -21,7 +21,7 @@ import selectors
 import socket
 import threading
 
-from .base import Channel, Peer
+from .base import Channel, Peer, Serve
 from ..url import MemoryUrl
 
 _hub: dict[str, list[_MemoryChannel]] = {}
@@ -45,8 +45,8 @@ class _MemoryChannel(Channel):
         self._entrance.setblocking(False)
         self.name = f'memory {hub_name}'
 
-    def register(self, selector: selectors.BaseSelector) -> None:
-        selector.register(self._inbox, selectors.EVENT_READ)
+    def register(self, selector: selectors.BaseSelector, serve: Serve) -> None:
+        selector.register(self._inbox, selectors.EVENT_READ, serve)
 
     def receive(self, handle: object) -> Iterator[tuple[Peer, bytes]]:
         try:

@@ -22,7 +22,7 @@ import math
 import selectors
 import socket
 
-from .base import Channel, ChannelLost, MAX_QUEUED, Peer, resolve, StreamChannel
+from .base import Channel, ChannelLost, MAX_QUEUED, Peer, resolve, Serve, StreamChannel
 from ..url import HostPort
 
 # s for all addresses of a name together; the link must return within 1 s of the other side.
@@ -114,10 +114,10 @@ class TcpServer(Channel):
         self._now = -math.inf
         self.name = f'tcp server {HostPort(*self._listener.getsockname()[:2])}'
 
-    def register(self, selector: selectors.BaseSelector) -> None:
+    def register(self, selector: selectors.BaseSelector, serve: Serve) -> None:
         """See :meth:`Channel.register`."""
-        self._selector = selector
-        selector.register(self._listener, selectors.EVENT_READ)
+        self._selector, self._serve = selector, serve
+        selector.register(self._listener, selectors.EVENT_READ, serve)
 
     def receive(self, handle: object) -> Iterator[tuple[Peer, bytes]]:
         """See :meth:`Channel.receive`."""
@@ -150,7 +150,7 @@ class TcpServer(Channel):
         except OSError:
             connection.close()
             return
-        client.register(self._selector)
+        client.register(self._selector, self._serve)
         self._clients[connection], self._heard[connection] = client, -math.inf
 
     def _drop(self, peer: Peer) -> None:

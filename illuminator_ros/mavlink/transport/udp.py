@@ -24,7 +24,7 @@ import itertools
 import selectors
 import socket
 
-from .base import Channel, ChannelLost, Peer, resolve, SocketName
+from .base import Channel, ChannelLost, Peer, resolve, Serve, SocketName
 from ..url import HostPort, UdpUrl
 
 # Peers that a listening socket sends to. A new peer never replaces a live one.
@@ -83,9 +83,9 @@ class UdpChannel(Channel):
         self.name = 'udp ' + ' to '.join(filter(None, (
             str(HostPort(*self._socket.getsockname()[:2])), str(url.remote or ''))))
 
-    def register(self, selector: selectors.BaseSelector) -> None:
+    def register(self, selector: selectors.BaseSelector, serve: Serve) -> None:
         """See :meth:`Channel.register`."""
-        selector.register(self._socket, selectors.EVENT_READ)
+        selector.register(self._socket, selectors.EVENT_READ, serve)
 
     def receive(self, handle: object) -> Iterator[tuple[Peer, bytes]]:
         """See :meth:`Channel.receive`."""

@@ -80,7 +80,7 @@ MOUNT_PARAMETERS = tuple(
 
 class CameraNode(ServedPayload):
     """
-    Serves the camera of a link; in turns of the link, except the constructor.
+    Serves the camera of a link; in the link's thread, except the constructor.
 
     :raises ParameterError: if a parameter is wrong.
     """

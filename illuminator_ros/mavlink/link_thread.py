@@ -1,0 +1,157 @@
+# Copyright 2026 The illuminator_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""The thread that owns a link: one selector, the calls of other threads, and deadlines."""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Callable
+import contextlib
+import select
+import selectors
+import socket
+import threading
+
+from . import fault_log
+from .fault_log import FaultLog
+
+# s; the longest wait.
+MAX_WAIT = 10.0
+
+
+class LinkThreadError(RuntimeError):
+    """The thread of a link cannot be started; the message names the link and says why."""
+
+
+class LinkThread:
+    """
+    Waits for descriptors, calls and deadlines, and handles each in this thread.
+
+    :param label: names the link in errors.
+    :param work: called after each wait; returns when it must be called again, s.
+    :param finish: called at the end.
+    :param clock: s, monotonic.
+    :ivar selector: the ``data`` of its keys is a function, called with the object that is ready
+        and its events.
+    """
+
+    def __init__(
+        self, label: str, work: Callable[[], float], finish: Callable[[], None],
+        faults: FaultLog, clock: Callable[[], float],
+        selector: selectors.BaseSelector | None = None,
+    ) -> None:
+        self.selector = selector or selectors.DefaultSelector()
+        self._label = label
+        self._work = work
+        self._finish = finish
+        self._faults = faults
+        self._clock = clock
+        self._due = 0.0
+        self._calls: deque[Callable[[float], None]] = deque()
+        self._wake_out, self._wake_in = socket.socketpair()
+        self._wake_out.setblocking(False)
+        self._wake_in.setblocking(False)
+        self.selector.register(self._wake_out, selectors.EVENT_READ, self._woken)
+        self._calls_only = select.poll()
+        self._calls_only.register(self._wake_out, select.POLLIN)
+        self._stopping = threading.Event()
+        self._starting = threading.Lock()
+        self._thread = threading.Thread(target=self._run, name='mavlink-link', daemon=True)
+
+    # From any thread
+
+    def start(self) -> None:
+        """
+        Start the thread.
+
+        :raises LinkThreadError: if that fails; it may be tried again.
+        """
+        with self._starting:
+            if not self._stopping.is_set():
+                try:
+                    self._thread.start()
+                except RuntimeError as error:
+                    raise LinkThreadError(f'{self._label}: {error} for the link') from None
+
+    def stop(self, timeout: float) -> None:
+        """
+        End the thread; it cannot be started again.
+
+        :param timeout: how long to wait for the thread, s.
+        """
+        with self._starting:
+            self._stopping.set()
+            if self._thread.ident is None:
+                self._release()
+        self._wake()
+        if self._thread.is_alive() and threading.current_thread() is not self._thread:
+            self._thread.join(timeout)
+
+    def is_running(self) -> bool:
+        """Return whether the thread runs."""
+        return self._thread.is_alive()
+
+    def call(self, function: Callable[[float], None]) -> None:
+        """Have ``function(now)`` called in this thread, unless the thread has ended."""
+        self._calls.append(function)
+        self._wake()
+
+    def _wake(self) -> None:
+        # A full buffer has woken the thread already; a closed one has no thread to wake.
+        with contextlib.suppress(OSError):
+            self._wake_in.send(b'\0')
+
+    # In this thread
+
+    def pause(self, seconds: float) -> None:
+        """Wait for calls only, if that takes 1 ms at least: poll() cannot wait for less."""
+        if seconds >= 0.001:
+            self._calls_only.poll(1000 * seconds)
+
+    def run_once(self) -> None:
+        """Wait once, and handle everything that is ready or due."""
+        wait = max(self._due - self._clock(), self._faults.pause)
+        self._faults.pause = 0.0
+        # A stop of the process (SIGSTOP, docker pause) interrupts the wait, which then finds
+        # nothing. Frames that came meanwhile precede the deadlines that have passed.
+        ready = self.selector.select(min(wait, MAX_WAIT)) or self.selector.select(0)
+        for key, events in ready:
+            key.data(key.fileobj, events)
+        self._run_calls()
+        self._due = self._work()
+
+    def _woken(self, handle: object, events: int) -> None:
+        with contextlib.suppress(BlockingIOError):
+            self._wake_out.recv(4096)
+
+    def _run_calls(self) -> None:
+        for _ in range(len(self._calls)):
+            self._faults.call(self._calls.popleft(), self._clock())
+
+    def _run(self) -> None:
+        while not self._stopping.is_set():
+            try:
+                self.run_once()
+            except Exception:
+                self._faults.log()
+                self._stopping.wait(fault_log.FAULT_PAUSE)
+        self._run_calls()
+        self._faults.call(self._finish)
+        self._release()
+
+    def _release(self) -> None:
+        self.selector.close()
+        self._wake_out.close()
+        self._wake_in.close()
