@@ -304,9 +304,6 @@ class CommandState(Enum):
     the next report of progress. WAITING was not sent, since another of its kind was.
     """
 
-    # Enum.__hash__ is a call in Python for each lookup in the table of transitions.
-    __hash__ = object.__hash__
-
     WAITING = 'waiting'
     SENT = 'sent'
     BACKOFF = 'backoff'

@@ -24,7 +24,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-import functools
 import re
 import struct
 from typing import cast, NamedTuple
@@ -66,11 +65,6 @@ class Frame(NamedTuple):
     payload: bytes
     signature: bytes | None = None
     signed_part: bytes = b''
-
-
-# The constructors of named tuples are functions in Python, which take twice the time.
-_frame = functools.partial(tuple.__new__, Frame)
-_address = functools.partial(tuple.__new__, Address)
 
 
 @dataclass(slots=True)
@@ -243,8 +237,8 @@ class Decoder:
                     or mcrf4xx(data[start + 1:end] + crc_extra) != data[end] | data[end + 1] << 8):
                 break
             if foreign_extra is None:
-                frames.append(_frame((2, sequence, _address((system, component)), id_,
-                                      data[start + HEADER_V2:end], None, b'')))
+                frames.append(Frame(2, sequence, Address(system, component), id_,
+                                    data[start + HEADER_V2:end]))
                 source = None
             else:
                 if source != (system, component):

@@ -231,9 +231,6 @@ class Phase(Enum):
     WAITING was not sent; CONFIRMING was acknowledged, and waits for the status.
     """
 
-    # Enum.__hash__ is a call in Python; a lookup in the table of transitions makes two.
-    __hash__ = object.__hash__
-
     WAITING = 'waiting'
     SENT = 'sent'
     CONFIRMING = 'confirming'
@@ -242,8 +239,6 @@ class Phase(Enum):
 
 class Step(Enum):
     """An event that moves a request to another phase."""
-
-    __hash__ = object.__hash__
 
     SEND = 'send'
     ACKNOWLEDGED = 'acknowledged'
