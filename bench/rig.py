@@ -28,7 +28,7 @@ import socket
 import sys
 import threading
 import time
-from typing import TYPE_CHECKING, TypeVar
+from typing import Any, TYPE_CHECKING, TypeVar
 
 from rclpy.qos import QoSProfile
 from std_srvs.srv import SetBool
@@ -38,12 +38,9 @@ from support.spun import SpunNode
 if TYPE_CHECKING:
     from rclpy.client import Client as RosClient
     from rclpy.task import Future
-    from rclpy.type_support import ServiceType
 
 Amount = TypeVar('Amount')
 Message = TypeVar('Message')
-Request = TypeVar('Request')
-Response = TypeVar('Response')
 
 __all__ = ['Program', 'ROOT', 'start_interpreter']
 
@@ -151,7 +148,7 @@ class Client(SpunNode):
 
     def __init__(self, domain: int) -> None:
         super().__init__(f'bench_{next(_numbers)}', domain)
-        self._clients: dict[str, RosClient[SetBool.Request, SetBool.Response]] = {}
+        self._clients: dict[str, RosClient] = {}
 
     def __enter__(self) -> Client:
         return self
@@ -159,13 +156,13 @@ class Client(SpunNode):
     def __exit__(self, *error: object) -> None:
         self.close()
 
-    def client(self, service: str) -> RosClient[SetBool.Request, SetBool.Response]:
+    def client(self, service: str) -> RosClient:
         """Return the client of a SetBool service, whether the service exists or not."""
         if service not in self._clients:
             self._clients[service] = self.node.create_client(SetBool, service)
         return self._clients[service]
 
-    def start(self, service: str, on: bool) -> Future[SetBool.Response]:
+    def start(self, service: str, on: bool) -> Future:
         """Call a SetBool service without waiting."""
         return self.client(service).call_async(SetBool.Request(data=on))
 
@@ -176,8 +173,8 @@ class Client(SpunNode):
         return _timed(self.client(service), SetBool.Request(data=on), patience)
 
     def request(
-        self, type_: type[ServiceType[Request, Response]], service: str, request: Request,
-    ) -> tuple[float, Response | None]:
+        self, type_: type[Any], service: str, request: object,
+    ) -> tuple[float, Any]:
         """Call a service of any type once; return as :meth:`call` does."""
         client = self.node.create_client(type_, service)
         try:
@@ -210,8 +207,8 @@ class Client(SpunNode):
 
 
 def _timed(
-    client: RosClient[Request, Response], request: Request, patience: float,
-) -> tuple[float, Response | None]:
+    client: RosClient, request: object, patience: float,
+) -> tuple[float, Any]:
     answered = threading.Event()
     began = time.perf_counter()
     future = client.call_async(request)

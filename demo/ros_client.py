@@ -20,7 +20,7 @@ from collections.abc import Callable
 import functools
 import math
 import threading
-from typing import TYPE_CHECKING, TypeVar
+from typing import Any, TypeVar
 
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from geometry_msgs.msg import Vector3Stamped
@@ -33,12 +33,7 @@ from rclpy.qos import DurabilityPolicy, qos_profile_sensor_data, QoSProfile
 from std_msgs.msg import Bool, Float32
 from std_srvs.srv import SetBool, Trigger
 
-if TYPE_CHECKING:
-    from rclpy.type_support import ServiceType
-
 Result = TypeVar('Result')
-Request = TypeVar('Request')
-Response = TypeVar('Response')
 
 STATE_QOS = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 
@@ -112,8 +107,7 @@ class RosClient:
         """Return the last diagnostic status of the lamp, None before the first."""
         return self._lamp
 
-    def call(self, type_: type[ServiceType[Request, Response]], service: str, request: Request,
-             timeout: float = 10.0) -> Response:
+    def call(self, type_: type[Any], service: str, request: object, timeout: float = 10.0) -> Any:
         """
         Call a service.
 
@@ -153,7 +147,7 @@ class RosClient:
         """Return the value of a floating-point parameter."""
         response = self.call(GetParameters, '/illuminator/get_parameters',
                              GetParameters.Request(names=[name]))
-        return response.values[0].double_value
+        return float(response.values[0].double_value)
 
     def take_control(self) -> Trigger.Response:
         """Call ``take_control`` of the gimbal."""

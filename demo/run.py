@@ -79,7 +79,7 @@ class Demo:
         if not answer.success:
             raise Failed(answer.message)
         self.ros.wait(f'/illuminator/enabled {on}', lambda: self.ros.topic('enabled') is on)
-        return answer.message
+        return str(answer.message)
 
     def discover(self) -> str:
         """Wait for the light."""
@@ -154,7 +154,7 @@ class Demo:
         answer = self.ros.take_control()
         if not answer.success:
             raise Failed(answer.message)
-        return answer.message
+        return str(answer.message)
 
     def turn(self) -> str:
         """Turn the gimbal, and wait until its attitude confirms it."""

@@ -25,7 +25,7 @@ import reprlib
 from std_srvs.srv import Trigger
 
 from .diagnostics import Value
-from .node import Answer, AnyService, RequestService
+from .node import Answer, RequestService
 from .parameters import ParameterError, ParameterSpec, Values
 from ..payload.command_sources import DEFAULT, SourceSettings
 
@@ -67,7 +67,7 @@ def prefixes(sources: SourceSettings | None) -> dict[str, str]:
 
 def release_services(
     sources: SourceSettings | None, release: Callable[[str, float, Answer], None],
-) -> tuple[AnyService, ...]:
+) -> tuple[RequestService, ...]:
     """
     Return the service of each source that gives a device back.
 

@@ -29,7 +29,7 @@ import functools
 import math
 import threading
 import time
-from typing import Generic, TypeVar
+from typing import Any
 
 from rclpy.context import Context
 from rclpy.exceptions import InvalidHandle
@@ -48,15 +48,13 @@ FALLBACK_PERIOD = 0.1
 # The answer to requests that wait at the end.
 ENDED = 'the bridge ended first; the device may have executed the request'
 
-Q = TypeVar('Q')
-A = TypeVar('A')
-# Sends a response; callable from any thread.
-Respond = Callable[[A], None]
+# Sends a response; callable from any thread. Untyped: messages of ROS have no types.
+Respond = Callable[[Any], None]
 # Takes a request and the function that sends the response.
-Take = Callable[[Q, Respond[A]], None]
+Take = Callable[[Any, Respond], None]
 
 
-class DeferredService(Generic[Q, A]):
+class DeferredService:
     """
     The callback of a service that answers later; only a :class:`NodeExecutor` calls it.
 
@@ -67,14 +65,14 @@ class DeferredService(Generic[Q, A]):
     """
 
     def __init__(
-        self, take: Take[Q, A], refuse_waiting: Callable[[str], None] = lambda reason: None,
+        self, take: Take, refuse_waiting: Callable[[str], None] = lambda reason: None,
         spread: float = MAX_SPREAD,
     ) -> None:
         self.take = take
         self.refuse_waiting = refuse_waiting
         self.answers = AnswerQueue(spread)
 
-    def __call__(self, request: Q, response: A) -> A:
+    def __call__(self, request: object, response: object) -> object:
         """Fail: another executor cannot wait for the answer."""
         raise TypeError('a deferred service needs a NodeExecutor')
 
@@ -191,31 +189,32 @@ class NodeExecutor(SingleThreadedExecutor):
     def _take_service(self, service: Service) -> object:
         """See rclpy's Executor, whose loop calls it."""
         if not isinstance(service.callback, DeferredService):
-            return super()._take_service(service)  # type: ignore[misc]
+            return super()._take_service(service)  # type: ignore[no-untyped-call]
         with service.handle:
             self._serve(service)
         return None
 
     def _serve(self, service: Service) -> None:
         """Take a request; the caller protects the handle of its service from destruction."""
-        request, header = service.handle.service_take_request(service.srv_type.Request)
+        type_: Any = service.srv_type
+        request, header = service.handle.service_take_request(type_.Request)
         if header is None:
             return
-        callback = service.callback
+        callback: Any = service.callback
         if isinstance(callback, DeferredService):
             callback.answers.note_request()
             take = callback.take
             respond = functools.partial(self._respond, service, header, callback.answers)
         else:
             def take(request: object, respond: Callable[[object], None]) -> None:
-                respond(callback(request, service.srv_type.Response()))
+                respond(callback(request, type_.Response()))
 
             respond = functools.partial(_send, service, header)
         try:
             take(request, respond)
         except Exception:
             # The client gets an answer after internal errors, too.
-            respond(service.srv_type.Response())
+            respond(type_.Response())
             raise
 
     def _respond(

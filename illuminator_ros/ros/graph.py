@@ -17,6 +17,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from typing import Any
 
 from rclpy.node import Node
 from rclpy.qos import ReliabilityPolicy
@@ -25,7 +26,7 @@ from rclpy.qos import ReliabilityPolicy
 UNKNOWN_NAME = '_NODE_NAME_UNKNOWN_'
 
 
-def type_name(type_: type[object]) -> str:
+def type_name(type_: Any) -> str:
     """Return the name of a message type in the graph."""
     return f'{type_.__module__.partition(".")[0]}/msg/{type_.__name__}'
 

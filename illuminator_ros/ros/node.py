@@ -20,18 +20,15 @@ from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 import math
 import threading
-from typing import Any, Generic, NamedTuple, TYPE_CHECKING, TypeVar
+from typing import Any, Generic, NamedTuple, TypeVar
 
 from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 
-from .executor import A, DeferredService, Q, Respond, Take
+from .executor import DeferredService, Respond, Take
 from .link_call import LinkCalls, MAX_PENDING
 from .throttled_log import NodeLog
 from ..mavlink.link import Link
-
-if TYPE_CHECKING:
-    from rclpy.type_support import ServiceType  # A name of typings/ only.
 
 T = TypeVar('T')
 # Takes success and a message.
@@ -60,13 +57,13 @@ class Publication(NamedTuple):
     """
 
     name: str
-    # Untyped: constructors of messages have no types.
+    # Untyped: messages of ROS have no types.
     type: type[Any]  # noqa: A003
     qos: QoSProfile | None = None
 
 
 @dataclass(frozen=True)
-class RequestService(Generic[Q, A]):
+class RequestService:
     """
     A service ``~/name``.
 
@@ -77,8 +74,9 @@ class RequestService(Generic[Q, A]):
     """
 
     name: str
-    type: type[ServiceType[Q, A]]  # noqa: A003
-    start: Callable[[Q, float, Answer], None]
+    # Untyped: messages of ROS have no types.
+    type: type[Any]  # noqa: A003
+    start: Callable[[Any, float, Answer], None]
     limit: int = MAX_PENDING
 
 
@@ -114,8 +112,7 @@ class CommandTopic(Generic[T]):
     qos: QoSProfile | None = None
 
 
-# Of any type of request, and of any type of value.
-AnyService = RequestService[Any, Any]
+# Of any type of value.
 AnyCommand = CommandTopic[Any]
 
 
@@ -124,7 +121,7 @@ class NodeInterface:
 
     def __init__(
         self, node: Node, link: Link, log: NodeLog, *,
-        publications: Iterable[Publication] = (), services: Iterable[AnyService] = (),
+        publications: Iterable[Publication] = (), services: Iterable[RequestService] = (),
         commands: Iterable[AnyCommand] = (),
     ) -> None:
         self._publishers = {
@@ -161,11 +158,11 @@ class NodeInterface:
             self.publish(name, make())
 
 
-def _taker(service: RequestService[Q, A], calls: LinkCalls) -> Take[Q, A]:
-    response: Callable[..., A] = service.type.Response
+def _taker(service: RequestService, calls: LinkCalls) -> Take:
+    response = service.type.Response
 
-    def take(request: Q, respond: Respond[A]) -> None:
-        def start(now: float, answer: Callable[[A], None]) -> None:
+    def take(request: Any, respond: Respond) -> None:
+        def start(now: float, answer: Respond) -> None:
             service.start(request, now, lambda success, message: answer(
                 response(success=success, message=message)))
 

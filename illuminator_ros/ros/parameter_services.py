@@ -24,7 +24,7 @@ from __future__ import annotations
 
 from array import array
 from collections.abc import Callable, Iterable, Sequence
-from typing import TYPE_CHECKING, TypeVar
+from typing import Any, TypeVar
 
 from rcl_interfaces import srv
 from rcl_interfaces.msg import ListParametersResult, ParameterValue, SetParametersResult
@@ -34,14 +34,11 @@ from rclpy.node import Node
 from rclpy.parameter import Parameter
 from rclpy.qos import qos_profile_services_default, QoSProfile
 
-from .executor import A, DeferredService, Q, Respond, Take
+from .executor import DeferredService, Respond, Take
 from .link_call import LinkCalls
 from .parameters import DeviceParameters, Values
 from .throttled_log import NodeLog
 from ..mavlink.link import Link
-
-if TYPE_CHECKING:
-    from rclpy.type_support import ServiceType  # A name of typings/ only.
 
 T = TypeVar('T')
 Messages = Sequence[ParameterMessage]
@@ -83,7 +80,7 @@ class ParameterServices:
         qos = QoSProfile(depth=QUEUE_DEPTH,
                          reliability=qos_profile_services_default.reliability)
 
-        def serve(type_: type[ServiceType[Q, A]], name: str, take: Take[Q, A]) -> None:
+        def serve(type_: type[Any], name: str, take: Take) -> None:
             node.create_service(
                 type_, f'~/{name}',
                 DeferredService(take, self._calls.refuse_waiting, ANSWER_SPREAD), qos_profile=qos)
@@ -124,7 +121,7 @@ class ParameterServices:
             return ParameterValue()
 
     def _list(
-        self, request: srv.ListParameters.Request, respond: Respond[srv.ListParameters.Response],
+        self, request: srv.ListParameters.Request, respond: Respond,
     ) -> None:
         """Leave out unset parameters, so that the output of ``ros2 param dump`` can be loaded."""
         result = ListParametersResult()
@@ -137,7 +134,7 @@ class ParameterServices:
         respond(srv.ListParameters.Response(result=result))
 
     def _set(
-        self, request: srv.SetParameters.Request, respond: Respond[srv.SetParameters.Response],
+        self, request: srv.SetParameters.Request, respond: Respond,
     ) -> None:
         messages = list(request.parameters) if self._is_short(request.parameters) else []
 
@@ -149,7 +146,7 @@ class ParameterServices:
 
     def _set_atomically(
         self, request: srv.SetParametersAtomically.Request,
-        respond: Respond[srv.SetParametersAtomically.Response],
+        respond: Respond,
     ) -> None:
         def answer(reason: str) -> None:
             respond(srv.SetParametersAtomically.Response(result=_result(reason)))

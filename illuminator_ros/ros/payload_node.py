@@ -18,7 +18,6 @@ from __future__ import annotations
 
 from typing import Any
 
-from rcl_interfaces.msg import ParameterEvent
 from rclpy.event_handler import PublisherEventCallbacks, SubscriptionEventCallbacks
 from rclpy.node import Node
 from rclpy.parameter import Parameter
@@ -45,7 +44,7 @@ class PayloadNode(Node):
 
     # Untyped: rclpy's own signatures are long, and differ between its versions.
     def __init__(self, name: str, *, first: PayloadNode | None = None, **options: Any) -> None:
-        self._events: Publisher[ParameterEvent] | None = first._events if first else None
+        self._events: Publisher | None = first._events if first else None
         if first:
             options |= {
                 'context': first.context, 'use_global_arguments': False, 'parameter_overrides': [

@@ -104,7 +104,7 @@ class NodeLog:
     @property
     def debugs(self) -> bool:
         """Whether lines for debugging are shown."""
-        return self._logger.is_enabled_for(LoggingSeverity.DEBUG)
+        return bool(self._logger.is_enabled_for(LoggingSeverity.DEBUG))
 
     def _admit(self, severity: int, text: str, name: str) -> str | None:
         """Return the text to add to the line, None if the line must be left out."""

@@ -57,11 +57,11 @@ def settings() -> dict[str, object]:
 
 
 def shown(marker: Marker) -> bool:
-    return marker.action == Marker.ADD and marker.color.a > 0
+    return bool(marker.action == Marker.ADD and marker.color.a > 0)
 
 
 def gone(marker: Marker) -> bool:
-    return marker.action == Marker.DELETE
+    return bool(marker.action == Marker.DELETE)
 
 
 def test_beam_is_a_cone_along_x_that_is_deleted_while_the_light_is_off_or_lost(

@@ -84,7 +84,7 @@ def found(status: DiagnosticStatus) -> tuple[bytes, str]:
 
 
 def value(status: DiagnosticStatus, key: str) -> str:
-    return {entry.key: entry.value for entry in status.values}[key]
+    return str({entry.key: entry.value for entry in status.values}[key])
 
 
 @pytest.mark.parametrize(('fields', 'level', 'text'), [

@@ -157,7 +157,7 @@ def test_requests_fail_at_once_and_say_why_while_the_link_is_not_open(
 
 
 EXECUTOR = 'executor'
-MakeClient = Callable[[str], 'Client[Trigger.Request, Trigger.Response]']
+MakeClient = Callable[[str], Client]
 
 
 @pytest.fixture
@@ -182,7 +182,7 @@ def clients(ros: Ros) -> Iterator[MakeClient]:
     """Yield a function that makes a client of a service of the node, which keeps all answers."""
     made = []
 
-    def make(name: str) -> Client[Trigger.Request, Trigger.Response]:
+    def make(name: str) -> Client:
         made.append(ros.node.create_client(
             Trigger, f'/served/{name}', qos_profile=QoSProfile(depth=100)))
         eventually(made[-1].service_is_ready)
@@ -193,11 +193,11 @@ def clients(ros: Ros) -> Iterator[MakeClient]:
         ros.node.destroy_client(client)
 
 
-def serve_later(node: Node) -> Log[Respond[Trigger.Response]]:
+def serve_later(node: Node) -> Log[Respond]:
     """Add the service ``~/slow``; return the functions that answer its requests."""
-    waiting: Log[Respond[Trigger.Response]] = Log()
+    waiting: Log[Respond] = Log()
 
-    def take(request: Trigger.Request, respond: Respond[Trigger.Response]) -> None:
+    def take(request: Trigger.Request, respond: Respond) -> None:
         waiting.append(respond)
 
     def refuse_waiting(reason: str) -> None:
@@ -210,10 +210,7 @@ def serve_later(node: Node) -> Log[Respond[Trigger.Response]]:
     return waiting
 
 
-def call(
-    client: Client[Trigger.Request, Trigger.Response], waiting: Log[Respond[Trigger.Response]],
-    count: int,
-) -> list[Call]:
+def call(client: Client, waiting: Log[Respond], count: int) -> list[Call]:
     """Call a service until that many requests wait for their answers."""
     calls = [Call(client.call_async(Trigger.Request())) for _ in range(count)]
     waiting.wait_for(lambda one: True, count=count)

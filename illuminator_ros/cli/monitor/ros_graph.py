@@ -87,7 +87,7 @@ def lights_among(
 
 class _Pending(NamedTuple):
     request: Request
-    future: Future[Any]
+    future: Future
     deadline: float
 
 

@@ -63,7 +63,7 @@ class LightNode:
 
     def __init__(
         self, node: Node, host: Host, log: NodeLog, client: IlluminatorClient,
-        geometry: BeamGeometry, *, services: tuple[ros_node.AnyService, ...] = (),
+        geometry: BeamGeometry, *, services: tuple[ros_node.RequestService, ...] = (),
         commands: tuple[ros_node.AnyCommand, ...] = (),
     ) -> None:
         self.name = node.get_name()
@@ -163,7 +163,7 @@ class LightNode:
 
     # Sources
 
-    def _enable_service(self, source: str, prefix: str) -> ros_node.AnyService:
+    def _enable_service(self, source: str, prefix: str) -> ros_node.RequestService:
         def enable(request: SetBool.Request, now: float, answer: ros_node.Answer) -> None:
             if light := self._light_or_refusal(now, answer):
                 light.enable(

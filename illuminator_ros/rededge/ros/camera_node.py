@@ -19,6 +19,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 import functools
 import logging
+from typing import Any
 
 from builtin_interfaces.msg import Time
 from geometry_msgs.msg import QuaternionStamped
@@ -88,7 +89,8 @@ class CameraNode(ServedPayload):
     def __init__(self, client: RedEdgeClient, host: Host) -> None:
         self._client = client
         self._host = host
-        self._clock = host.node.get_clock()
+        # Untyped: rclpy types it as a Clock, which lacks ``ros_time_is_active``.
+        self._clock: Any = host.node.get_clock()
         self._started = host.link.clock()
         self._geoid_is_known = GEOID_SEPARATION.name in given_parameters(host.node)
         self._mount_topic = host.node.resolve_topic_name(f'~/{Input.MOUNT.value}')

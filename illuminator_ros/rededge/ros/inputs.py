@@ -50,7 +50,8 @@ class StampReader:
     """
 
     def __init__(self, node: Node, jumped: Callable[[], None]) -> None:
-        self._clock = node.get_clock()
+        # Untyped: rclpy types it as a Clock, which lacks ``ros_time_is_active``.
+        self._clock: Any = node.get_clock()
         self._jumped = jumped
         # The system time minus the time of a steady clock, s.
         self._offset: float | None = None
