@@ -62,6 +62,7 @@ class Range(NamedTuple):
 
 # The ranges of roll, of pitch, and of yaw relative to the vehicle.
 Ranges: TypeAlias = tuple[Range, Range, Range]
+UNLIMITED: Ranges = (Range(), Range(), Range())
 
 
 def read_ranges(message: GimbalManagerInformation | GimbalDeviceInformation) -> Ranges:

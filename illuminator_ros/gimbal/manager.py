@@ -27,7 +27,7 @@ import math
 import random
 from typing import TypeAlias
 
-from .axes import AT_LIMIT, LEVEL, Range, range_fields, Ranges
+from .axes import AT_LIMIT, LEVEL, range_fields, Ranges, UNLIMITED
 from .manager_control import ControlArbiter, ControlSettings, Role, RoleHolderChanged
 from .manager_setpoint import (
     AnySetpoint,
@@ -120,7 +120,7 @@ class ManagerSettings:
     control: ControlSettings = field(default_factory=ControlSettings)
     device_id: int = 0
     nudge_limit: float = math.radians(10)
-    ranges: Ranges = (Range(), Range(), Range())
+    ranges: Ranges = UNLIMITED
 
 
 @dataclass(frozen=True)

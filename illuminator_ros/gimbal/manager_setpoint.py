@@ -26,7 +26,7 @@ from dataclasses import dataclass
 import math
 from typing import NamedTuple
 
-from .axes import HAS_AXIS, LEVEL, Range, Ranges, read_ranges
+from .axes import HAS_AXIS, LEVEL, Range, Ranges, read_ranges, UNLIMITED
 from .messages import (
     ABSOLUTE_FRAMES,
     Capabilities,
@@ -88,7 +88,7 @@ class GimbalModel:
     """
 
     capabilities: Capabilities = Capabilities(0)
-    ranges: Ranges = (Range(), Range(), Range())
+    ranges: Ranges = UNLIMITED
 
     @classmethod
     def from_information(cls, message: GimbalDeviceInformation) -> GimbalModel:
@@ -185,11 +185,15 @@ class Demand(NamedTuple):
         """
         Return a demand with the yaw frame that its flags name.
 
-        :raises ValueError: if the flags name both frames, or a value is infinite.
+        :raises ValueError: if the flags name both frames, an angle is beyond half a turn, or a
+            rate is infinite.
         """
-        values = *angles, *rates
-        if math.inf in values or -math.inf in values:
-            raise ValueError('an angle or a rate is infinite')
+        # The definitions of the angles have no larger values. So a larger one is an error, and to
+        # subtract turns from it would turn the gimbal to a pose that no player has requested.
+        if any(abs(angle) > math.pi + _TOLERANCE for angle in angles):
+            raise ValueError('an angle is beyond 180 degrees')
+        if any(map(math.isinf, rates)):
+            raise ValueError('a rate is infinite')
         if attitude is None and not math.isnan(sum(angles)):
             attitude = _from_angles(angles)
         return cls(flags, yaw_frame(flags), angles, rates, attitude)
@@ -197,15 +201,19 @@ class Demand(NamedTuple):
     @classmethod
     def from_attitude(
         cls, message: GimbalManagerSetAttitude | GimbalDeviceSetAttitude,
+        ranges: Ranges = UNLIMITED,
     ) -> Demand:
         """
         Read GIMBAL_MANAGER_SET_ATTITUDE or GIMBAL_DEVICE_SET_ATTITUDE.
 
         :raises ValueError: if the quaternion is not a rotation; also see :meth:`_checked`.
         """
-        return cls._checked(message.flags, UNSET_VECTOR, (
+        attitude, angles = _attitude(message.q), UNSET_VECTOR
+        if attitude is not None and (beyond := _beyond_vertical(attitude.euler(), ranges)):
+            attitude, angles = None, beyond
+        return cls._checked(message.flags, angles, (
             message.angular_velocity_x, message.angular_velocity_y, message.angular_velocity_z),
-            _attitude(message.q))
+            attitude)
 
     @classmethod
     def from_pitch_yaw(
@@ -252,7 +260,7 @@ def read_demand(message: AnySetpoint, ranges: Ranges) -> Demand:
     :raises ValueError: if it is not valid.
     """
     if isinstance(message, GimbalManagerSetAttitude):
-        return Demand.from_attitude(message)
+        return Demand.from_attitude(message, ranges)
     if isinstance(message, GimbalManagerSetManualControl):
         return Demand.from_manual_control(message, ranges)
     return Demand.from_pitch_yaw(
@@ -261,6 +269,23 @@ def read_demand(message: AnySetpoint, ranges: Ranges) -> Demand:
 
 def _attitude(q: Components) -> Quaternion | None:
     return None if all(map(math.isnan, q)) else Quaternion(*q).normalized()
+
+
+def _beyond_vertical(angles: Vector, ranges: Ranges) -> Vector | None:
+    """
+    Return the angles of an attitude with a pitch beyond a right angle.
+
+    The same attitude has a pitch within a right angle, with roll and yaw turned by half a turn. To
+    clip these would turn the gimbal to another pose.
+
+    :return: None unless roll and pitch are nearer to their ranges than with the other pitch.
+    """
+    roll, pitch, yaw = angles
+    beyond = math.remainder(roll + math.pi, math.tau), math.copysign(math.pi, pitch) - pitch
+    within, distance = (
+        sum(abs(range_.clip(angle) - angle) for angle, range_ in zip(pair, ranges, strict=False))
+        for pair in ((roll, pitch), beyond))
+    return None if within <= distance else (*beyond, math.remainder(yaw + math.pi, math.tau))
 
 
 class Setpoint(NamedTuple):

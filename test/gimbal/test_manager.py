@@ -16,10 +16,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 import math
+import operator
 from typing import Any
 
+from hypothesis import assume, example, given
+from hypothesis import strategies as st
 from illuminator_ros.gimbal import manager as gimbal_manager
 from illuminator_ros.gimbal.axes import Range
 from illuminator_ros.gimbal.manager_control import ControlSettings, Role, RoleHolderChanged
@@ -358,7 +362,9 @@ def test_each_kind_of_setpoint_reaches_the_device(case: str) -> None:
     GimbalManagerSetAttitude(*OURS, 0, 0, UNSET_QUATERNION, math.inf, NAN, NAN),
     pitch_yaw(math.inf, 0.0), pitch_yaw(yaw_rate=-math.inf), pitch_yaw(0.0, 0.0, flags=32 | 64),
     GimbalManagerSetManualControl(*OURS, 0, 0, 1.5, 0.0, NAN, NAN),
-    pitch_yaw_command(math.inf, 0.0), pitch_yaw_command(0.0, 0.0, flags=96)], ids=repr)
+    pitch_yaw_command(math.inf, 0.0), pitch_yaw_command(0.0, 0.0, flags=96),
+    pitch_yaw_command(0.0, 0.0, math.inf), pitch_yaw_command(-400.0, 0.0),
+    pitch_yaw_command(NAN, 180.1), pitch_yaw(NAN, -3.15), pitch_yaw(4.0, NAN)], ids=repr)
 def test_an_invalid_setpoint_is_refused_and_named(message: Any) -> None:
     rig = in_control()
 
@@ -646,6 +652,56 @@ def test_gm_4_a_pitch_beyond_a_right_angle_is_clipped_whatever_the_device_report
     [clipped] = of(gimbal_manager.SetpointClipped, rig.events)[-1].clipped
     assert (clipped.axis, round(math.degrees(clipped.requested)), clipped.limit) == (
         'pitch', -110, -math.pi / 2)
+
+
+def by_message(pitch: float, yaw: float) -> mav.Message:
+    return pitch_yaw(pitch, yaw)
+
+
+def by_command(pitch: float, yaw: float) -> mav.Message:
+    return pitch_yaw_command(math.degrees(pitch), math.degrees(yaw))
+
+
+def by_quaternion(pitch: float, yaw: float) -> mav.Message:
+    q = Quaternion.from_euler(0.0, pitch, yaw)
+    return GimbalManagerSetAttitude(*OURS, 0, 0, q, NAN, NAN, NAN)
+
+
+@pytest.mark.parametrize('message', [by_message, by_command, by_quaternion])
+def test_angles_beyond_half_a_turn_are_refused_and_others_are_clipped_on_their_axis_alone(
+        message: Callable[[float, float], mav.Message]) -> None:
+    rig = in_control()
+    ends = st.floats(0.6, 2.0), st.floats(0.6, 1.5), st.floats(0.0, 3.0), st.floats(0.0, 3.0)
+    within, beyond = st.floats(-math.pi, math.pi), st.floats(math.pi + 1e-4, 10.0)
+    angle = within if message is by_quaternion else within | beyond | beyond.map(operator.neg)
+
+    @given(angle, angle, st.tuples(*ends))
+    @example(-1.9, 0.5, (1.5, 1.0, 2.0, 2.0))
+    def check(pitch: float, yaw: float, ends: tuple[float, float, float, float]) -> None:
+        down, up, left, right = ends
+        rig.give(DEVICE, information(
+            pitch_min=-down, pitch_max=up, yaw_min=-left, yaw_max=right))
+        # So that no axis is at a stop before.
+        rig.points(PILOT, 0.0, 0.0)
+
+        sent = rig.give(PILOT, message(pitch, yaw))
+
+        accepted = abs(pitch) <= math.pi and abs(yaw) <= math.pi
+        assert [ack.result for ack in of(mav.CommandAck, sent)] == [
+            mav.MavResult.ACCEPTED if accepted else mav.MavResult.DENIED
+        ] * (message is by_command)
+        setpoints = of(GimbalDeviceSetAttitude, sent)
+        assert len(setpoints) == accepted
+        limited = max(-min(down, math.pi / 2), min(up, pitch))
+        # A yaw between the stops ends at the nearer one.
+        gap = math.remainder(yaw - (right - left) / 2, math.tau)
+        assume(abs(abs(gap) - math.pi) > 1e-3)
+        turned = (right - left) / 2 + max(-(left + right) / 2, min((left + right) / 2, gap))
+        for setpoint in setpoints:
+            assert Quaternion(*setpoint.q).angle_to(
+                Quaternion.from_euler(0.0, limited, turned)) < 1e-4
+
+    check()
 
 
 def test_gm_5_an_axis_that_the_device_lacks_is_not_turned() -> None:

@@ -21,7 +21,7 @@ from typing import Any
 
 from hypothesis import assume, example, given
 from hypothesis import strategies as st
-from illuminator_ros.gimbal.axes import Range
+from illuminator_ros.gimbal.axes import Range, UNLIMITED
 from illuminator_ros.gimbal.manager_setpoint import (
     clip,
     Clipped,
@@ -47,7 +47,6 @@ ATTITUDES = st.tuples(ANGLES, PITCHES, ANGLES)
 SMALL = st.floats(-0.3, 0.3)
 RANGES = st.tuples(*(st.tuples(st.floats(-3, 0), st.floats(0, 3)).map(lambda ends: Range(*ends))
                      for _ in range(3)))
-UNLIMITED = Range(), Range(), Range()
 
 
 def made_of(angles: Vector, turning: Vector = STILL) -> Setpoint:
