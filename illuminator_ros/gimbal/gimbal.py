@@ -482,11 +482,12 @@ class Gimbal:
             ended(request.Result(True, f'not in control: {self._control}'), now)
         else:
             change = Configure(self._commands.address, self.key.device_id, take)
+            wish = 'take control' if take else 'release control'
             manager.requests.submit(_request(
-                manager.target, change, now, self._explained(change.goal, ended)), now)
+                manager.target, change, now, self._explained(wish, ended)), now)
 
-    def _explained(self, goal: str, done: request.Done) -> request.Done:
-        """Return a callback that adds the manager, the goal and the control to a refusal."""
+    def _explained(self, wish: str, done: request.Done) -> request.Done:
+        """Return a callback that adds the manager, the wish and the control to a refusal."""
         manager = self._manager
 
         def ended(result: request.Result, now: float) -> None:
@@ -498,9 +499,11 @@ class Gimbal:
                     who = 'this node' if self.in_control else primary or 'no component'
                     advice = self.unreachable(now) or (
                         f'{who} has control: the log of the manager may have the reason')
-                answer = result.message.removeprefix('refused: ')
-                result = result._replace(
-                    message=f'manager {manager} refused "{goal}": {answer}; {advice}')
+                # The answer to an earlier command, as it may be, is no refusal of this one.
+                _, is_refusal, answer = result.message.partition('refused: ')
+                text = (f'manager {manager} refused "{wish}": {answer}' if is_refusal
+                        else result.message)
+                result = result._replace(message=f'{text}; {advice}')
             done(result, now)
 
         return ended
@@ -554,26 +557,27 @@ class Gimbal:
     def set_neutral(self, now: float, done: request.Done) -> None:
         """Turn the gimbal to its neutral position."""
         flags = setpoint_flags(YawFrame.VEHICLE) | MountFlags.NEUTRAL
-        self._set_flag(MountFlags.NEUTRAL, flags, Capabilities.HAS_NEUTRAL, 'neutral position',
-                       now, done)
+        self._set_flag(MountFlags.NEUTRAL, flags, Capabilities.HAS_NEUTRAL,
+                       'turn to neutral', 'neutral position', now, done)
 
     def retract(self, now: float, done: request.Done) -> None:
         """Turn the gimbal to its retracted position."""
         flags = setpoint_flags(YawFrame.VEHICLE) | MountFlags.RETRACT
-        self._set_flag(MountFlags.RETRACT, flags, Capabilities.HAS_RETRACT, 'retracted', now,
-                       done)
+        self._set_flag(MountFlags.RETRACT, flags, Capabilities.HAS_RETRACT,
+                       'retract', 'retracted', now, done)
 
     def set_yaw_lock(self, lock: bool, now: float, done: request.Done) -> None:
         """Hold the yaw against the earth, or let it follow the vehicle (GM-3)."""
-        frame = YawFrame.EARTH if lock else YawFrame.VEHICLE
-        self._set_flag(
-            MountFlags.YAW_LOCK, setpoint_flags(frame),
-            Capabilities.HAS_YAW_LOCK if lock else Capabilities(0),
-            'yaw locked' if lock else 'yaw follows the vehicle', now, done)
+        if lock:
+            self._set_flag(MountFlags.YAW_LOCK, setpoint_flags(YawFrame.EARTH),
+                           Capabilities.HAS_YAW_LOCK, 'lock yaw', 'yaw locked', now, done)
+        else:
+            self._set_flag(MountFlags.YAW_LOCK, setpoint_flags(YawFrame.VEHICLE),
+                           Capabilities(0), 'unlock yaw', 'yaw follows the vehicle', now, done)
 
     def _set_flag(
-        self, flag: MountFlags, flags: MountFlags, needed: Capabilities, goal: str, now: float,
-        done: request.Done,
+        self, flag: MountFlags, flags: MountFlags, needed: Capabilities, wish: str, goal: str,
+        now: float, done: request.Done,
     ) -> None:
         self._begin(now)
         missing = self._missing(needed)
@@ -591,7 +595,7 @@ class Gimbal:
 
         manager.flag_requests.submit(_request(
             manager.flag_target, SetFlags(flags, flag, self.key.device_id, goal), now,
-            self._explained(goal, ended)), now)
+            self._explained(wish, ended)), now)
 
     def _capabilities(self) -> Capabilities | None:
         manager = self._active
@@ -629,7 +633,7 @@ class Gimbal:
             'point at no place', None, now, done)
 
     def _command(
-        self, command: Command, goal: str, place: _Setpoint | None, now: float,
+        self, command: Command, wish: str, place: _Setpoint | None, now: float,
         done: request.Done,
     ) -> None:
         """
@@ -641,11 +645,12 @@ class Gimbal:
         if reason := self.unavailable(now):
             done(request.Result(False, reason), now)
             return
-        explained = self._explained(goal, self._suspend(place, now, done))
+        explained = self._explained(wish, self._suspend(place, now, done))
 
         def ended(result: CommandResult, now: float) -> None:
             explained(request.Result(
-                result.accepted, str(result), refused=result.refused,
+                result.accepted, f'{result.describe_failure()} ({result.timing()})',
+                refused=result.refused,
                 permanent=result.refused and result.result in request.PERMANENT_RESULTS,
                 superseded=result.status is CommandStatus.CANCELLED), now)
 
@@ -891,16 +896,9 @@ class Gimbal:
 def _request(
     target: request.Target, change: request.Change[S], now: float, done: request.Done,
 ) -> request.Request[S]:
-    def ended(
-        result: request.Result, change: request.Change[S] | None, status: S | None, now: float,
-    ) -> None:
-        if result.success and status is None:
-            result = request.Result(
-                False, f'{result.message}; no success without {target.status_name}')
-        done(result, now)
-
     return request.Request(
-        target, lambda now: change, ended, now=now, deadline=now + REQUEST_LIMIT)
+        target, lambda now: change, lambda result, change, status, now: done(result, now),
+        now=now, deadline=now + REQUEST_LIMIT, needs_status=True)
 
 
 def _no_status(manager: Address, status_at: float, now: float) -> str:

@@ -95,20 +95,29 @@ class Configure(NamedTuple):
             self.configuration, status.configuration(self.configuration), status.error_flags,
             step=True)
 
-    def shown_by(self, status: Status) -> bool:
+    def _hidden(self, status: Status) -> list[str]:
+        """Return those of the fields that must change whose value a status does not show."""
+        different = self.configuration.differences(status.configuration(self.configuration))
+        return [name for name in self.names
+                if name in different or getattr(status, name) is None]
+
+    def shown_by(self, status: Status) -> bool | None:
         """See :class:`~..payload.request.Change`."""
-        return not self._missing(status)
+        if self._missing(status):
+            return False
+        return None if self._hidden(status) else True
 
     def evidence(self, status: Status) -> str:
         """See :class:`~..payload.request.Change`."""
-        reported = status.configuration(self.configuration)
-        hidden = [name for name in self.configuration.differences(reported)
-                  if name in self.names]
+        hidden = self._hidden(status)
         if not hidden:
             return CONFIRMED
         if status.error_flags & DIMMING_FLAGS:
             return _despite_heat(status)
-        return f'accepted (ILLUMINATOR_STATUS shows {reported.describe(hidden)})'
+        reported = status.configuration(self.configuration)
+        shown = (f'no valid {name}' if getattr(status, name) is None
+                 else reported.describe([name]) for name in hidden)
+        return f'accepted (ILLUMINATOR_STATUS shows {", ".join(shown)})'
 
     def actual(self, status: Status) -> str:
         """See :class:`~..payload.request.Change`."""

@@ -184,8 +184,8 @@ class Change(Protocol[S_contra]):
     def note(self) -> str:
         """Describe a change that was not requested but comes with it, '' if there is none."""
 
-    def shown_by(self, status: S_contra) -> bool:
-        """Return whether a status shows the change."""
+    def shown_by(self, status: S_contra) -> bool | None:
+        """Return whether a status shows the change; None if it cannot show it."""
 
     def evidence(self, status: S_contra) -> str:
         """Describe how far a status that does not contradict shows the change, for people."""
@@ -268,6 +268,7 @@ class Request(Generic[S]):
     :param overtakes: whether its command is sent beside one of its kind that is in progress.
     :param earliest_start: returns the time before which it must not be sent, s; called at each
         poll.
+    :param needs_status: whether only a status makes it a success, even if none has ever come.
     :ivar change: the change, None until it is sent.
     """
 
@@ -275,13 +276,14 @@ class Request(Generic[S]):
         self, target: Target, prepare: Callable[[float], Change[S]],
         done: Callable[[Result, Change[S] | None, S | None, float], None], *, now: float,
         deadline: float, is_stream: bool = False, overtakes: bool = False,
-        earliest_start: Callable[[], float] = at_any_time,
+        earliest_start: Callable[[], float] = at_any_time, needs_status: bool = False,
     ) -> None:
         self.phase = Phase.WAITING
         self.deadline = deadline
         self.is_stream = is_stream
         self.overtakes = overtakes
         self.earliest_start = earliest_start
+        self._needs_status = needs_status
         self.change: Change[S] | None = None
         self._target = target
         self._prepare = prepare
@@ -388,8 +390,11 @@ class Request(Generic[S]):
                  else self._target.status_delay)
         change = self._sent
         shown = change.shown_by(report.status)
+        if shown is None:
+            # Then the acknowledgement decides.
+            shown = self.is_accepted
         if (shown and not self._was_repeated and self._before is not None
-                and not change.shown_by(self._before)):
+                and change.shown_by(self._before) is False):
             self._target.note_status_delay(now - self._sent_at)
             self._before = None
         wait = max(delay + ASK_INTERVAL, 2 * report.span)
@@ -472,7 +477,7 @@ class Request(Generic[S]):
         elif self._shown_by:
             reason = (f'not each of several {kind}s that answer as {self._target.address} has '
                       f'sent {name}')
-        elif self._has_status:
+        elif self._has_status or self._needs_status:
             reason = (f'no {"later " if self._is_outdated else ""}{name} came within '
                       f'{command_sender.format_seconds(now - self._acknowledged_at)}')
         else:
@@ -484,7 +489,10 @@ class Request(Generic[S]):
     def _succeed(
         self, how: str, now: float, status: S | None = None, *, superseded: bool = False,
     ) -> None:
-        self._end(f'{self._sent.goal}, {how}: {self._answer.describe()}', now, status,
+        answer = self._answer.describe()
+        if not self.is_accepted:
+            answer = f'the status decides, since {answer} may belong to an earlier command'
+        self._end(f'{self._sent.goal}, {how}: {answer}', now, status,
                   success=True, superseded=superseded, note=self._sent.note)
 
     def _end(

@@ -75,10 +75,11 @@ def test_gm_16_control_is_taken_and_released_as_the_status_shows(secondary: mav.
 
 @pytest.mark.parametrize(('fields', 'text'), [
     ({'results': {CONFIGURE: mav.MavResult.DENIED}},
-     'manager 1/1 refused "control taken": MAV_RESULT_DENIED (1 try, 0 ms); '
+     'manager 1/1 refused "take control": MAV_RESULT_DENIED (1 try, 0 ms); '
      '1/195 has control and must release it first'),
     ({'applies': False}, 'but GIMBAL_MANAGER_STATUS shows primary 1/195, secondary none'),
-    ({'reports': False}, 'no success without GIMBAL_MANAGER_STATUS'),
+    ({'reports': False}, 'control taken not confirmed: MAV_RESULT_ACCEPTED, but no '
+     'GIMBAL_MANAGER_STATUS came within 1.0'),
     ({'answers': False}, 'no acknowledgement')])
 def test_gm_16_control_that_no_status_shows_is_not_a_success(
         fields: dict[str, object], text: str) -> None:
@@ -89,6 +90,19 @@ def test_gm_16_control_that_no_status_shows_is_not_a_success(
     assert not success
     assert text in message
     assert not rig.gimbal.in_control
+
+
+def test_a_refusal_that_may_answer_another_request_is_not_reported_as_a_refusal() -> None:
+    rig = Rig(FakeManager(primary=OTHER, secondary=OURS, answers=False)).run(3.0)
+    assert not asked(rig, Gimbal.take_control, 5.0)[0]
+    rig.managers[0].answers = True
+    rig.managers[0].results[CONFIGURE] = mav.MavResult.DENIED
+
+    success, message = asked(rig, Gimbal.release_control)
+
+    assert not success
+    assert message.startswith('control released not confirmed: MAV_RESULT_DENIED, which may '
+                              'belong to an earlier command (')
 
 
 def test_release_without_control_sends_nothing() -> None:
@@ -278,7 +292,7 @@ def test_automatic_take_that_fails_is_told() -> None:
     rig = Rig(manager, auto_take_control=True).run(5.0)
 
     assert [event.message for event in rig.all_of(AutomaticTakeFailed)] == [
-        'manager 1/1 refused "control taken": MAV_RESULT_DENIED (1 try, 0 ms); '
+        'manager 1/1 refused "take control": MAV_RESULT_DENIED (1 try, 0 ms); '
         'no component has control: the log of the manager may have the reason']
 
 
@@ -335,7 +349,8 @@ def test_flag_that_no_status_shows_is_not_a_success(ask: Ask) -> None:
     success, message = asked(rig, ask)
 
     assert not success
-    assert message.endswith('; no success without GIMBAL_DEVICE_ATTITUDE_STATUS')
+    assert ('not confirmed: MAV_RESULT_ACCEPTED, but no GIMBAL_DEVICE_ATTITUDE_STATUS came'
+            in message)
 
 
 @pytest.mark.parametrize(('ask', 'needed'), [
@@ -386,16 +401,16 @@ def test_gm_8_place_without_an_answer_is_not_sent_again_after_a_later_setpoint_o
     assert (rig.results[0].success, rig.results[0].superseded) == (False, True)
 
 
-@pytest.mark.parametrize(('ask', 'command', 'goal'), [
-    (FLAG_REQUESTS[2][0], GimbalCommand.DO_GIMBAL_MANAGER_PITCHYAW, 'yaw locked'),
+@pytest.mark.parametrize(('ask', 'command', 'wish'), [
+    (FLAG_REQUESTS[2][0], GimbalCommand.DO_GIMBAL_MANAGER_PITCHYAW, 'lock yaw'),
     (set_roi, GimbalCommand.DO_SET_ROI_LOCATION, 'point at 47, 8.5, 500 m'),
     (Gimbal.clear_roi, GimbalCommand.DO_SET_ROI_NONE, 'point at no place')])
 def test_refusal_names_the_request_the_manager_and_who_has_control(
-        ask: Ask, command: int, goal: str) -> None:
+        ask: Ask, command: int, wish: str) -> None:
     rig = in_control()
     rig.managers[0].results[command] = mav.MavResult.DENIED
 
-    refusal = f'manager 1/1 refused "{goal}": MAV_RESULT_DENIED (1 try, 0 ms); '
+    refusal = f'manager 1/1 refused "{wish}": MAV_RESULT_DENIED (1 try, 0 ms); '
     assert asked(rig, ask) == (
         False, f'{refusal}this node has control: the log of the manager may have the reason')
     rig.managers[0].device_alive = False

@@ -184,7 +184,7 @@ def test_gm_16_control_is_taken_and_released_by_services(
     gimbal.results[GimbalCommand.DO_GIMBAL_MANAGER_CONFIGURE] = MavResult.DENIED
     answer = trigger(ros, 'take_control')
     assert not answer.success
-    assert answer.message.startswith('manager 1/1 refused "control taken": MAV_RESULT_DENIED')
+    assert answer.message.startswith('manager 1/1 refused "take control": MAV_RESULT_DENIED')
 
 
 @pytest.mark.parametrize(('name', 'request_', 'flag', 'on'), [

@@ -17,6 +17,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+import math
 from typing import Any
 
 from illuminator_ros.illuminator.events import (
@@ -27,6 +28,7 @@ from illuminator_ros.illuminator.events import (
     StatusReceived,
 )
 from illuminator_ros.illuminator.light import Settings
+from illuminator_ros.illuminator.model import ErrorFlags, Mode
 from illuminator_ros.mavlink.command_sender import MAX_SAMPLES
 from illuminator_ros.mavlink.messages import CommandAck, MavCmd, MavResult
 from illuminator_ros.payload.command_sources import SourceSettings
@@ -217,7 +219,42 @@ def test_a_late_copy_of_a_refusal_does_not_refuse_the_next_command(
     faked.controller.receive(
         LIGHT, CommandAck(ON_OFF, MavResult.DENIED, 0, 0, *BRIDGE), faked.now)
     fake.fields['enable'] = 1
-    assert faked.wait_for(answer).success
+    result = faked.wait_for(answer)
+    assert result.success
+    assert result.message.startswith(
+        'on, confirmed by ILLUMINATOR_STATUS: the status decides, since MAV_RESULT_DENIED may '
+        'belong to an earlier command (1 try, ')
+
+
+@pytest.mark.parametrize('fields', [
+    {'mode': Mode.EXTERNAL_SYNC}, {'error_status': ErrorFlags.THERMAL_THROTTLING},
+    {'brightness': math.nan}], ids=['follows another signal', 'is hot', 'reports no brightness'])
+def test_each_refusal_counts_where_the_status_cannot_show_the_change(
+    fake: FakeLight, faked: Pair, fields: dict[str, float],
+) -> None:
+    fake.fields |= {'brightness': 30.0, **fields}
+    faked.run(2.0)
+    fake.results[CONFIGURE] = MavResult.DENIED
+    for _ in range(2):
+        result = faked.configure(brightness=50.0)
+        assert not result.success
+        assert result.message.startswith('refused: MAV_RESULT_DENIED')
+    fake.results[CONFIGURE] = MavResult.ACCEPTED
+    faked.run(10.0)
+    fake.applies = False
+    assert faked.configure(brightness=50.0).success
+
+
+def test_a_value_that_the_status_lacks_is_not_called_confirmed(
+    fake: FakeLight, faked: Pair,
+) -> None:
+    fake.applies = False
+    fake.fields['brightness'] = math.nan
+    assert faked.configure(brightness=50.0).message.startswith(
+        'brightness 50 %, accepted (ILLUMINATOR_STATUS shows no valid brightness): '
+        'MAV_RESULT_ACCEPTED')
+
+
 
 
 @pytest.mark.parametrize(('before', 'text'), [
