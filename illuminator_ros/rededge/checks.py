@@ -28,6 +28,7 @@ import math
 from typing import NamedTuple
 
 from . import messages as rededge
+from .conversions import UINT16_UNKNOWN, UINT8_UNKNOWN
 from ..mavlink.messages import Address, Heartbeat, Message, target_of
 from ..payload.checks import component_requirements as component
 from ..payload.checks.requirement import (
@@ -191,13 +192,13 @@ class CameraTester:
         """Return a position with its time, as GPS_RAW_INT."""
         return (rededge.GpsRawInt(
             self._utc_us(), 3, round(LATITUDE * 1e7), round(LONGITUDE * 1e7),
-            round(ALTITUDE * 1e3), 100, 200, 0, 0, 12),)
+            round(ALTITUDE * 1e3), *(UINT16_UNKNOWN,) * 4, UINT8_UNKNOWN),)
 
     def fused_position(self) -> Sequence[Message]:
         """Return the same position as SYSTEM_TIME and GLOBAL_POSITION_INT."""
         return (SystemTime(self._utc_us(), 0), GlobalPositionInt(
             0, round(LATITUDE * 1e7), round(LONGITUDE * 1e7), round(ALTITUDE * 1e3), 0, 0, 0, 0,
-            65535))
+            UINT16_UNKNOWN))
 
     def attitude(self, yaw: float, mount_roll: float) -> Sequence[Message]:
         """Return a level attitude with a yaw, and a mount with a roll, degrees."""

@@ -210,6 +210,16 @@ def test_a_result_has_its_reason_and_the_messages_that_show_it(
     assert line in result.exchange[-1]
 
 
+@pytest.mark.parametrize(('fault', 'name', 'detail'), [
+    ('refuse', 'status-agrees', 'no change was accepted'),
+    ('anything', 'status-unchanged', 'no change was rejected')])
+def test_statuses_are_not_compared_where_there_was_no_such_change(
+    fault: str, name: str, detail: str,
+) -> None:
+    result = Run(faults=(fault,)).finish().result(name)
+    assert (result.verdict, result.detail) == (SKIPPED, detail)
+
+
 def test_a_status_that_contradicts_is_reported_with_its_request() -> None:
     exchange = Run(faults=('lie',), only=('on',)).finish().result('on').exchange
 

@@ -289,6 +289,16 @@ def test_an_older_image_than_the_newest_does_not_confirm_a_capture(newer: int, o
     assert rig.results == [(False, NO_ANSWER)]
 
 
+@pytest.mark.parametrize(('behind', 'confirms'), [(31, False), (32, True)])
+def test_an_image_of_a_restarted_camera_is_32_or_more_behind_the_newest(
+        behind: int, confirms: bool) -> None:
+    rig = Rig()
+    rig.hear(status(40), feedback(40))
+    rig.capture()
+    rig.hear(status(40 - behind), feedback(40 - behind))
+    assert [success for success, _ in rig.results] == [True] * confirms
+
+
 def test_an_image_that_was_not_requested_here_is_reported() -> None:
     rig = Rig()
     rig.hear(status(3), feedback(3))
