@@ -499,7 +499,7 @@ class Gimbal:
                     who = 'this node' if self.in_control else primary or 'no component'
                     advice = self.unreachable(now) or (
                         f'{who} has control: the log of the manager may have the reason')
-                # The answer to an earlier command, as it may be, is no refusal of this one.
+                # A doubtful answer, which may belong to an earlier command, has no such prefix.
                 _, is_refusal, answer = result.message.partition('refused: ')
                 text = (f'manager {manager} refused "{wish}": {answer}' if is_refusal
                         else result.message)

@@ -15,6 +15,9 @@
 Rotations as unit quaternions, and the frames of ROS and MAVLink.
 
 ROS has ENU for the earth and FLU for bodies (REP-103), MAVLink has NED and FRD.
+
+Of pymavlink 2.4.50, ``quaternion`` returns angles that are wrong by up to 180 degrees within 0.06
+degrees of straight up and down, and ``rotmat`` a pitch of 180 degrees straight up and down.
 """
 
 from __future__ import annotations

@@ -27,8 +27,8 @@ from itertools import pairwise
 import math
 from typing import NamedTuple
 
+from . import conversions
 from . import messages as rededge
-from .conversions import UINT16_UNKNOWN, UINT8_UNKNOWN
 from ..mavlink.messages import Address, Heartbeat, Message, target_of
 from ..payload.checks import component_requirements as component
 from ..payload.checks.requirement import (
@@ -192,13 +192,14 @@ class CameraTester:
         """Return a position with its time, as GPS_RAW_INT."""
         return (rededge.GpsRawInt(
             self._utc_us(), 3, round(LATITUDE * 1e7), round(LONGITUDE * 1e7),
-            round(ALTITUDE * 1e3), *(UINT16_UNKNOWN,) * 4, UINT8_UNKNOWN),)
+            round(ALTITUDE * 1e3), *(conversions.UINT16_UNKNOWN,) * 4,
+            conversions.UINT8_UNKNOWN),)
 
     def fused_position(self) -> Sequence[Message]:
         """Return the same position as SYSTEM_TIME and GLOBAL_POSITION_INT."""
         return (SystemTime(self._utc_us(), 0), GlobalPositionInt(
             0, round(LATITUDE * 1e7), round(LONGITUDE * 1e7), round(ALTITUDE * 1e3), 0, 0, 0, 0,
-            UINT16_UNKNOWN))
+            conversions.UINT16_UNKNOWN))
 
     def attitude(self, yaw: float, mount_roll: float) -> Sequence[Message]:
         """Return a level attitude with a yaw, and a mount with a roll, degrees."""

@@ -255,8 +255,6 @@ def test_a_value_that_the_status_lacks_is_not_called_confirmed(
         'MAV_RESULT_ACCEPTED')
 
 
-
-
 @pytest.mark.parametrize(('before', 'text'), [
     (False, 'on not confirmed: MAV_RESULT_DENIED, which may belong to an earlier command'),
     # Each try of the same request may be refused.

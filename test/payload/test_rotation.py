@@ -35,8 +35,11 @@ ENU_TO_NED = Rotation.from_matrix([[0, 1, 0], [1, 0, 0], [0, 0, -1]])
 FLU_TO_FRD = Rotation.from_matrix([[1, 0, 0], [0, -1, 0], [0, 0, -1]])
 
 angles = st.floats(-math.pi, math.pi)
-quaternions = st.builds(
-    Quaternion.from_euler, angles, st.sampled_from((-math.pi / 2, math.pi / 2)) | angles, angles)
+# Straight up and down, exactly and nearly.
+vertical = st.builds(lambda tilt, sign: sign * (math.pi / 2 - tilt),
+                     st.just(0.0) | st.floats(0.0, 1e-5) | st.floats(0.0, 1e-2),
+                     st.sampled_from((-1.0, 1.0)))
+quaternions = st.builds(Quaternion.from_euler, angles, vertical | angles, angles)
 vectors = st.tuples(*[st.floats(-10, 10)] * 3)
 
 
@@ -56,6 +59,19 @@ def test_composition_inverse_and_vectors_are_those_of_scipy(
     assert one.rotate(vector) == pytest.approx(oracle(one).apply(vector), abs=1e-9)
     assert one.angle_to(other) == pytest.approx(
         (oracle(one).inv() * oracle(other)).magnitude(), abs=1e-6)
+
+
+@given(angles, vertical | angles, angles)
+def test_angles_are_those_of_scipy_and_make_the_same_rotation_again(
+        roll: float, pitch: float, yaw: float) -> None:
+    q = Quaternion.from_euler(roll, pitch, yaw)
+
+    read = q.euler()
+
+    assert distance(q, Rotation.from_euler('ZYX', (yaw, pitch, roll))) < 1e-6
+    assert abs(read[1]) <= math.pi / 2
+    assert read[0] == 0 or abs(read[1]) < math.pi / 2
+    assert Quaternion.from_euler(*read).angle_to(q) < 2e-6
 
 
 @given(quaternions, vectors)
