@@ -217,8 +217,6 @@ class ParameterServices:
         name = message.name
         if not self._node.has_parameter(name):
             return f'{name} is not a parameter of this node'
-        if self._node.describe_parameter(name).read_only:
-            return f'{name} is read-only: restart the node with -p {name}:=VALUE'
         try:
             value = _value(message)
         except ValueError:

@@ -19,6 +19,7 @@ import contextlib
 from dataclasses import dataclass
 from importlib import import_module
 import json
+from pathlib import Path
 import re
 from typing import Any
 import xml.etree.ElementTree as ET
@@ -26,6 +27,8 @@ import xml.etree.ElementTree as ET
 from diagnostic_msgs.msg import DiagnosticArray
 from illuminator_ros.mavlink.link import Link
 import pytest
+from rcl_interfaces.srv import SetParameters
+from rclpy.parameter import parameter_dict_from_yaml_file
 from rclpy.qos import DurabilityPolicy, ReliabilityPolicy
 from support.embedded import refusal
 from support.gimbals import FakeManager, served_gimbals
@@ -33,7 +36,7 @@ from support.graph import Interface, interface
 from support.light import Address, eventually, ServedLight
 from support.ports import free_port
 from support.processes import ended, python, ROOT
-from support.ros import bridge_arguments, Ros, STREAM
+from support.ros import bridge_arguments, Parameters, Ros, STREAM
 from support.tables import parameter_file, table
 import yaml
 
@@ -178,6 +181,25 @@ def test_page_has_the_topics_and_services_of_the_node(name: str, running: Runnin
     for heading, topic, _, quality, *_ in node.rows:
         if heading == 'published':
             assert running.qos[topic.replace('~', f'/{name}')] == QOS[quality], topic
+
+
+@each_node
+def test_dump_of_the_parameters_of_a_node_can_be_loaded_again(
+    ros: Ros, running: Running, name: str, tmp_path: Path,
+) -> None:
+    """As by ``ros2 param dump`` and ``ros2 param load``."""
+    node, file = Parameters(ros, f'/{name}'), tmp_path / 'dump.yaml'
+    names = node.names()
+    file.write_text(yaml.safe_dump({f'/{name}': {
+        'ros__parameters': dict(zip(names, node.get(*names), strict=True))}}))
+    loaded = parameter_dict_from_yaml_file(str(file), target_nodes=[f'/{name}'])
+
+    results = node.start(
+        SetParameters, 'set_parameters', parameters=[*loaded.values()]).result().results
+
+    assert {*loaded} == {*names} and 'use_sim_time' in names
+    assert [(name, one.reason) for name, one in zip(loaded, results, strict=True)
+            if not one.successful] == []
 
 
 def permitted(policy: str, node: str, element: str, action: str) -> list[str]:
