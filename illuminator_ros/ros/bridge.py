@@ -16,7 +16,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Hashable, Mapping, Sequence
+from collections.abc import Callable, Hashable, Mapping, Sequence, Set
 import contextlib
 import itertools
 import logging
@@ -31,7 +31,7 @@ from .diagnostics import SIGNING_NEEDED
 from .diagnostics_publisher import DiagnosticsPublisher
 from .executor import NodeExecutor
 from .graph import unheard_publishers
-from .ignored_parameters import ignored_sections, overruled_parameters, unknown_parameters
+from .ignored_parameters import ignored_parameters
 from .node_manager import NodeManager, without_node_name
 from .parameters import (
     declare_link_parameters,
@@ -87,9 +87,14 @@ class Bridge:
         self.log = NodeLog(node.get_logger())
         frame_log = self._frame_log = LogForwarder(self.log)
         kinds = [_load(name, types) for name in declare_payloads(node, payload)]
-        _refuse_same_names(node, kinds)
+        self._own_nodes = [node, *(
+            PayloadNode(kind.node_name, namespace=node.get_namespace(), context=node.context,
+                        cli_args=without_node_name(arguments), use_global_arguments=False)
+            for kind in kinds[1:])]
+        _refuse_same_names(self._own_nodes)
         parameters = _link_parameters(node, kinds, url)
-        values = [declare_read_only(node, kind.parameters) for kind in kinds]
+        values = [declare_read_only(own, kind.parameters)
+                  for own, kind in zip(self._own_nodes, kinds, strict=True)]
         commands = CommandSender(
             parameters.address, parameters.command_timeout, parameters.command_retries)
         clients = [kind.make_client(commands, value)
@@ -115,11 +120,6 @@ class Bridge:
             node, self.link, self._component, url=parameters.connection_url,
             period=parameters.diagnostics_period)
         self._executor = NodeExecutor(node.context, self.log)
-        self._executor.add_node(node)
-        self._own_nodes = [node, *(
-            PayloadNode(kind.node_name, namespace=node.get_namespace(), context=node.context,
-                        cli_args=without_node_name(arguments), use_global_arguments=False)
-            for kind in kinds[1:])]
         self._logs = [self.log, *(NodeLog(own.get_logger()) for own in self._own_nodes[1:])]
         self._payloads: list[ServedPayload] = []
         for own, log, kind, client, value in zip(
@@ -127,18 +127,12 @@ class Bridge:
             self._payloads.append(kind.serve(client, Host(
                 own, self.link, log, frame_log, self._nodes, self._diagnostics, value,
                 self._wake.set)))
-            if own is not node:
-                self._executor.add_node(own)
-        names = [one.get_fully_qualified_name() for one in self._own_nodes]
+            self._executor.add_node(own)
         specs = itertools.chain(LINK_PARAMETERS, *(kind.parameters for kind in kinds))
-        restrictions = {spec.name for spec in specs if spec.restricts}
-        for warning in (*unknown_parameters(self._own_nodes, arguments, restrictions),
-                        *ignored_sections(arguments, names, self._may_name)):
+        for warning in ignored_parameters(
+                arguments, self._own_nodes, {spec.name for spec in specs if spec.restricts},
+                self._of_further_node):
             self.log.warning(warning)
-        for own, log, kind in zip(self._own_nodes, self._logs, kinds, strict=True):
-            for warning in overruled_parameters(
-                    own, node, {spec.name for spec in kind.parameters if spec.restricts}):
-                log.warning(warning)
         # A period is a whole number of ticks, otherwise some periods would be a tick too long.
         self._tick = parameters.diagnostics_period / math.ceil(
             parameters.diagnostics_period / TICK)
@@ -148,8 +142,10 @@ class Bridge:
         """Return all nodes of the process."""
         return [*self._own_nodes, *self._nodes.nodes]
 
-    def _may_name(self, name: str) -> bool:
-        return any(payload.may_name(name) for payload in self._payloads)
+    def _of_further_node(self, name: str) -> Set[str] | None:
+        """Return the parameters of a node that is made later; None if none may have the name."""
+        return next((names for payload in self._payloads
+                     if (names := payload.further_parameters(name)) is not None), None)
 
     def run(self) -> None:
         """Serve until :meth:`end` is called or the context is shut down."""
@@ -312,10 +308,11 @@ def _link_parameters(node: Node, kinds: Sequence[RosPayload], url: str) -> LinkP
     return parameters
 
 
-def _refuse_same_names(node: Node, kinds: Sequence[RosPayload]) -> None:
-    if node.get_name() in (kind.node_name for kind in kinds[1:]):
+def _refuse_same_names(nodes: Sequence[Node]) -> None:
+    names = [node.get_name() for node in nodes]
+    if shared := {name for name in names if names.count(name) > 1}:
         raise ParameterError(
-            f'payloads: two nodes would be called {node.get_name()!r}: name that payload first, '
+            f'payloads: two nodes would be called {", ".join(shared)!r}: name that payload first, '
             'or give the first node another name with -r __node:=NAME')
 
 

@@ -23,7 +23,6 @@ from typing import Generic, Protocol, TypeVar
 from rclpy.node import Node
 
 from .diagnostics_publisher import DiagnosticsSource
-from .ignored_parameters import ignored_parameters
 from .node_manager import NodeRequest
 from .payload import Host
 from .throttled_log import NodeLog
@@ -100,8 +99,6 @@ class DeviceNodes(Generic[K, N]):
     def _serve(self, key: K, request: NodeRequest, node: Node) -> None:
         log = NodeLog(node.get_logger())
         served = self._make(node, log)
-        for warning in ignored_parameters(node, self._host.nodes.first):
-            log.warning(warning)
         if shared := _shared_names(node, self._host.node):
             log.warning(f'{", ".join(shared)}: {self._host.node.get_fully_qualified_name()} has '
                         'the same, since a remapping applies to all nodes; put the name of the '

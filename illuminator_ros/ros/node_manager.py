@@ -61,14 +61,13 @@ class NodeManager:
     :param first: the process's first node, whose namespace the others share.
     :param arguments: the ROS arguments that the nodes follow.
     :param wake: requests a call of :meth:`work`.
-    :ivar first: the first node, as given.
     """
 
     def __init__(
         self, first: PayloadNode, arguments: Sequence[str], log: NodeLog,
         wake: Callable[[], None],
     ) -> None:
-        self.first = first
+        self._first = first
         self._arguments = without_node_name(arguments)
         self._log = log
         self._wake = wake
@@ -141,7 +140,7 @@ class NodeManager:
         if self._thread.ident is None:
             self._thread.start()
         node = PayloadNode(
-            request.name, first=self.first, namespace=self.first.get_namespace(),
+            request.name, first=self._first, namespace=self._first.get_namespace(),
             cli_args=self._arguments)
         try:
             request.serve(node)

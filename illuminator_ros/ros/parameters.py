@@ -232,9 +232,6 @@ def declare_read_only(
         value = spec.check(
             default if override is None or override.value is None else override.value)
         values[spec.name] = value
-        if node.has_parameter(spec.name):
-            # Another payload has declared it.
-            continue
         # The type of an empty list cannot be inferred.
         node.declare_parameter(
             spec.name, spec.type if value == [] else value,

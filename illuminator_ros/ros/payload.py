@@ -16,7 +16,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Hashable, Mapping
+from collections.abc import Callable, Hashable, Mapping, Set
 from dataclasses import dataclass, field
 from typing import Any, NamedTuple
 
@@ -41,7 +41,7 @@ class Host(NamedTuple):
     :param node: the payload's own node.
     :param frame_log: shows the frames of a device in the log of its node.
     :param nodes: makes nodes of further devices.
-    :param values: of the payload's read-only parameters.
+    :param values: of the read-only parameters of that node, without those of the link.
     :param check_diagnostics: checks the levels at once; callable from any thread.
     """
 
@@ -61,9 +61,14 @@ class ServedPayload:
     def poll(self, now: float) -> None:
         """Do what is due; called a few times a second."""
 
-    def may_name(self, name: str) -> bool:
-        """Return whether the node of a further device may have this name, without namespace."""
-        return False
+    def further_parameters(self, name: str) -> Set[str] | None:
+        """
+        Return the parameters of the node of a further device.
+
+        :param name: of the node, without namespace.
+        :return: their names; None if no node of a further device may have this name.
+        """
+        return None
 
     def shut_down(self, now: float, report: ShutdownReport) -> Mapping[Hashable, str]:
         """
@@ -84,7 +89,7 @@ class RosPayload:
     The ROS half of one kind of payload.
 
     :param node_name: the default name of its first node.
-    :param parameters: its read-only parameters, beside those of the link.
+    :param parameters: the read-only ones of that node, beside those of the link.
     :param device_parameters: those that may be set at any time; for ``--help``.
     :param make_client: returns the MAVLink side, given the command sender and the parameters; may
         raise :class:`~.parameters.ParameterError`.

@@ -19,6 +19,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 import contextlib
 import math
+from pathlib import Path
 from typing import Any
 
 from illuminator_ros.gimbal.messages import (
@@ -38,6 +39,9 @@ pytest.importorskip('rclpy')
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus  # noqa: E402, I100
 from geometry_msgs.msg import Quaternion as QuaternionMessage  # noqa: E402
 from geometry_msgs.msg import QuaternionStamped, Vector3, Vector3Stamped  # noqa: E402
+from illuminator_ros.gimbal.ros.gimbals import GIMBAL_PARAMETERS  # noqa: E402, I100
+from illuminator_ros.illuminator.ros.parameters import LIGHT_PARAMETERS  # noqa: E402
+from illuminator_ros.ros.parameters import LINK_PARAMETERS  # noqa: E402
 from sensor_msgs.msg import NavSatFix  # noqa: E402
 from std_msgs.msg import Bool, Header, String  # noqa: E402
 from std_srvs.srv import SetBool, Trigger  # noqa: E402
@@ -60,6 +64,7 @@ EARTH, VEHICLE = Header(frame_id='map'), Header(frame_id='base_link_stabilized')
 # 45 degrees down and 30 to the left of the vehicle, in ROS and in MAVLink.
 ROS_ANGLES = (0.0, math.radians(45), math.radians(30))
 TURNED = Quaternion.from_euler(*ROS_ANGLES)
+NODE_PARAMETERS = ('use_sim_time', 'start_type_description_service')
 LOST = 'control of gimbal 1/154 lost: 1/195 has taken primary control'
 
 
@@ -419,7 +424,33 @@ def test_gimbal_is_served_beside_a_light_with_one_address(own_ros: Ros) -> None:
     with bridge(own_ros, FakeManager(), payloads='[gimbal, illuminator]'):
         own_ros.subscribe(Bool, '/gimbal/connected').wait_value(True)
         assert own_ros.subscribe(Bool, '/illuminator/connected').wait().data is False
-        assert {'gimbal_device_id', 'beam_range'} <= {*Parameters(own_ros, '/gimbal').names()}
+
+
+def test_each_payload_reads_its_parameters_from_the_section_of_its_own_node(
+        own_ros: Ros, tmp_path: Path) -> None:
+    port, file = free_port(), tmp_path / 'boat.yaml'
+    file.write_text(
+        '/**: {ros__parameters: {geoid_separation: 20.0, sources: [pilot]}}\n'
+        'illuminator: {ros__parameters: {payloads: [illuminator, gimbal], frame_id: hull}}\n'
+        'mount: {ros__parameters: {earth_frame: odom, setpoint_timeout: 0.2, sources: [film]}}\n'
+        'mount_1_9: {ros__parameters: {use_sim_time: true}}')
+    manager = FakeManager(primary=OURS)
+    with (running_bridge(
+            own_ros.domain, port, '--params-file', str(file), '-r', 'gimbal:__node:=mount',
+            '-p', 'mount:attitude_interval:=0.05', '-p', 'vehicle_frame:=deck') as program,
+          served_gimbals(port, manager, link=SlowLink), time_passes()):
+        eventually(lambda: [one for one in manager.commands if one.command == 511
+                            and (one.param1, one.param2) == (285, 50_000)])
+        mount, light = (Parameters(own_ros, node) for node in ('/mount', '/illuminator'))
+        given = {'earth_frame': 'odom', 'vehicle_frame': 'deck', 'setpoint_timeout': 0.2,
+                 'attitude_interval': 0.05, 'geoid_separation': 20.0, 'sources': ['film']}
+
+        assert mount.get(*given) == [*given.values()]
+        assert {*mount.names()} - {*NODE_PARAMETERS} == {one.name for one in GIMBAL_PARAMETERS}
+        assert light.get('frame_id', 'sources') == ['hull', ['pilot']]
+        assert {*light.names()} - {*NODE_PARAMETERS} == {
+            one.name for one in (*LINK_PARAMETERS, *LIGHT_PARAMETERS)}
+        assert program.count('WARN') == 0, program.log
 
 
 def test_a_name_of_the_first_node_leaves_the_gimbal_beside_the_light_its_name(

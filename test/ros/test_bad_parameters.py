@@ -14,20 +14,20 @@
 
 """Invalid parameters are refused with the reason, and unknown ones are warned about."""
 
+from collections.abc import Callable, Iterator
 import contextlib
 import math
 from pathlib import Path
 import re
 from typing import Any, cast
 
-from illuminator_ros.ros.ignored_parameters import ignored_sections, unknown_parameters
+from illuminator_ros.ros.ignored_parameters import ignored_parameters
 from illuminator_ros.ros.parameters import ParameterError
 import pytest
 from rclpy.node import Node
 from support.embedded import refusal
 from support.ports import free_port
 from support.ros import Ros, running_bridge
-import yaml
 
 NUMBER, INTEGER, STRING, BOOLEAN = (
     rf'is (no|not an?) {kind}' for kind in ('number', 'integer', 'string', 'boolean'))
@@ -71,12 +71,34 @@ def test_invalid_parameter_is_refused_with_its_name_value_and_range(
     assert re.search(reason, refusal(ros.context, **given))
 
 
-def test_parameter_file_that_cannot_be_read_is_named(tmp_path: Path) -> None:
-    file = tmp_path / 'boat.yaml'
-    file.write_bytes(b'illuminator: caf\xe9')
+@pytest.fixture
+def node(ros: Ros) -> Iterator[Callable[..., Node]]:
+    """Return a function that makes a node, given its name and the names of its parameters."""
+    with contextlib.ExitStack() as stack:
+        def make(name: str, *parameters: str, namespace: str = '') -> Node:
+            made = Node(name, context=ros.context, namespace=namespace)
+            stack.callback(made.destroy_node)
+            for parameter in parameters:
+                made.declare_parameter(parameter, 1.0)
+            return made
 
-    with pytest.raises(ParameterError, match=f'^file {re.escape(str(file))}: '):
-        ignored_sections(['--params-file', str(file)], ['/illuminator'], bool)
+        yield make
+
+
+def write(folder: Path, contents: str, encoding: str = 'utf-8') -> list[str]:
+    """Write a parameter file, and return the arguments that give it to a node."""
+    file = folder / 'boat.yaml'
+    file.write_text(contents, encoding=encoding)
+    return ['--ros-args', '--params-file', str(file)]
+
+
+def test_parameter_file_that_cannot_be_read_is_named(
+    node: Callable[..., Node], tmp_path: Path,
+) -> None:
+    arguments = write(tmp_path, 'illuminator: caf\xe9', 'latin-1')
+
+    with pytest.raises(ParameterError, match=f'^file {re.escape(arguments[-1])}: '):
+        ignored_parameters(arguments, [node('illuminator')], set())
 
 
 @pytest.mark.parametrize(('section', 'is_ignored'), [
@@ -84,54 +106,72 @@ def test_parameter_file_that_cannot_be_read_is_named(tmp_path: Path) -> None:
     ('/**/illuminator', False), ('illuminator_1_244', False), ('belly', False),
     ('illuminatr', True), ('/boat/illuminator', True), ('/boat/**', True), ('/*/*', True)])
 def test_section_of_a_parameter_file_that_matches_no_node_is_warned_about(
-    tmp_path: Path, section: str, is_ignored: bool,
+    node: Callable[..., Node], tmp_path: Path, section: str, is_ignored: bool,
 ) -> None:
-    file = tmp_path / 'boat.yaml'
     # rcl reads UTF-16, too.
-    file.write_text(yaml.safe_dump({section: {'ros__parameters': {'brightness': 40.0}}}),
-                    encoding='utf-16')
+    arguments = write(tmp_path, f'{section}: {{ros__parameters: {{brightness: 40.0}}}}', 'utf-16')
 
-    warnings = ignored_sections(
-        ['--ros-args', '--params-file', str(file)], ['/illuminator'],
-        {'illuminator_1_244', 'belly'}.__contains__)
+    warnings = ignored_parameters(
+        arguments, [node('illuminator', 'brightness')], {'brightness'},
+        dict.fromkeys(('illuminator_1_244', 'belly'), {'brightness'}).get)
 
     assert warnings == [
-        f'{file}: the section {section.strip("/")} matches no node and is ignored; the name here '
-        'is /illuminator'] * is_ignored
+        f'{arguments[-1]}: the section {section.strip("/")} matches no node and is ignored; the '
+        'name here is /illuminator'] * is_ignored
 
 
-@pytest.mark.parametrize(('node', 'namespace', 'is_ignored'), [
-    ('illuminator', '', False), ('illuminator_1_244', '', False), ('spot', '', True),
-    ('illuminator', '/boat', True)])
-def test_parameter_on_the_command_line_for_a_node_that_does_not_exist_is_warned_about(
-    node: str, namespace: str, is_ignored: bool,
+# The reason for which a limit ends the start, which is '' where it has an effect.
+@pytest.mark.parametrize(('given', 'namespace', 'reason'), [
+    ('illuminator:limit', '', ''), ('limit', '', ''),
+    ('spot:limit', '', '-p spot:limit:=1: the name spot matches no node; the name here is '
+                       '/illuminator, /gimbal'),
+    ('illuminator:limit', '/boat', 'matches no node; the name here is /boat/illuminator'),
+    ('gimbal:limit', '', 'limit is given for gimbal, but is a parameter of /illuminator'),
+    ('illuminator_1_244:limit', '', 'limit is given for illuminator_1_244, but'),
+    ('illuminator_1_244:limits', '', "limits is unknown; did you mean 'limit'?"),
+    ('illuminator.limit', '', "illuminator.limit is unknown; did you mean 'limit'?"),
+    ('gimbal:gimbal.limit', '', "gimbal.limit is unknown; did you mean 'limit'?")])
+def test_limit_that_has_no_effect_where_it_is_given_ends_the_start(
+    node: Callable[..., Node], given: str, namespace: str, reason: str,
 ) -> None:
-    rule, name = f'{node}:max_brightness:=30.0', f'{namespace}/illuminator'
+    nodes = [node('illuminator', 'limit', namespace=namespace), node('gimbal', 'rate',
+                                                                     namespace=namespace)]
 
-    warnings = ignored_sections(
-        ['--ros-args', '-p', 'connection_url:=udpin://127.0.0.1:1', '-p', rule], [name],
-        {'illuminator_1_244'}.__contains__)
-
-    assert warnings == [
-        f'-p {rule}: the name {node} matches no node and is ignored; the name here is {name}'
-    ] * is_ignored
+    with pytest.raises(ParameterError, match=re.escape(reason)) if reason else (
+            contextlib.nullcontext()):
+        assert ignored_parameters(
+            ['-p', f'{given}:=1'], nodes, {'limit'}, {'illuminator_1_244': set[str]()}.get) == []
 
 
 @pytest.mark.parametrize(('name', 'ends'), [
     ('max_brightnes', True), ('max_brightness_level', False),
-    ('illuminator.max_brightness', True), ('lamp.max_brightness', False)])
+    ('illuminator.max_brightness', True), ('illuminator_1_244.max_brightness', True),
+    ('lamp.max_brightness', False)])
 def test_misspelt_restriction_in_a_section_for_other_nodes_ends_the_start_if_it_is_clear(
-    ros: Ros, tmp_path: Path, name: str, ends: bool,
+    node: Callable[..., Node], tmp_path: Path, name: str, ends: bool,
 ) -> None:
-    file = tmp_path / 'shared.yaml'
-    file.write_text(f'/**: {{ros__parameters: {{use_sim_time: false, {name}: 40.0}}}}')
-    arguments = ['--ros-args', '--params-file', str(file)]
-    node = Node('illuminator', context=ros.context, cli_args=arguments)
-    node.declare_parameter('max_brightness', 100.0)
+    arguments = write(tmp_path, f'/**: {{ros__parameters: {{use_sim_time: false, {name}: 40.0}}}}')
 
     with pytest.raises(ParameterError) if ends else contextlib.nullcontext():
-        unknown_parameters([node], arguments, {'max_brightness'})
-    node.destroy_node()
+        assert ignored_parameters(
+            arguments, [node('illuminator', 'max_brightness')], {'max_brightness'},
+            {'illuminator_1_244': set[str]()}.get) == []
+
+
+def test_parameter_is_warned_about_only_where_it_is_given_for_a_node_without_it(
+    node: Callable[..., Node], tmp_path: Path,
+) -> None:
+    arguments = write(
+        tmp_path, '/**: {ros__parameters: {rate: 1, period: 2}}\n'
+                  'gimbal: {ros__parameters: {rate: 3, period: 4, use_sim_time: true}}\n'
+                  'gimbal_1_9: {ros__parameters: {rate: 5, use_sim_time: true}}')
+
+    assert ignored_parameters(
+        arguments, [node('illuminator', 'period'), node('gimbal', 'rate')], {'limit'},
+        {'gimbal_1_9': set[str]()}.get,
+    ) == [f"parameter '{name}' is ignored: it is given for {given}, but is a parameter of {owner}"
+          for name, given, owner in (
+              ('period', 'gimbal', '/illuminator'), ('rate', 'gimbal_1_9', '/gimbal'))]
 
 
 def test_unknown_parameters_are_warned_about_and_those_of_other_nodes_are_not(
@@ -141,7 +181,8 @@ def test_unknown_parameters_are_warned_about_and_those_of_other_nodes_are_not(
     # Values that rcl reads as text, and that PyYAML cannot read.
     file.write_text('/**: {ros__parameters: {robot_description: x, use_sim_time: false,\n'
                     '  day: 2026-02-30, equal: =, angle: !degrees 3, 12: 1, left.wheel: 1,\n'
-                    '  qos_overrides: {/tf: {publisher: {depth: 1}}}}}\n'
+                    '  qos_overrides: {/tf: {publisher: {depth: 1}}},\n'
+                    '  restore_configuraton: true}}\n'
                     '---\n'
                     '/*: {ros__parameters: {status_interval: 1.0, azimuth: 3}}\n'
                     'illuminator: {ros__parameters: {elevation: 3}}\n'
@@ -150,32 +191,20 @@ def test_unknown_parameters_are_warned_about_and_those_of_other_nodes_are_not(
                     'belly: {ros__parameters: {brightness: 40}}')
     misspelt = {'brightnes': 'brightness', 'conection_url': 'connection_url',
                 'target_sytem': 'target_system', 'strobe_periode': 'strobe_period'}
+    resembling = {'restore_configuraton': 'restore_configuration'}
     # Names without a similar one: on the command line, in a section of the bridge, and in a
     # section with a parameter of the bridge.
     unknown = ('zoom', 'elevation', 'azimuth')
     given = {'names': '[1/244=belly]', **dict.fromkeys([*misspelt, 'zoom'], 1)}
     with running_bridge(ros.domain, free_port(), '--params-file', str(file),
                         **cast(dict[str, Any], given)) as bridge:
-        for wrong, right in misspelt.items():
+        for wrong, right in (misspelt | resembling).items():
             bridge.wait_for(
-                f"parameter '{wrong}' is unknown and ignored; did you mean '{right}'?")
+                f"parameter '{wrong}' is ignored: it is unknown; did you mean '{right}'?")
         bridge.wait_for('the section boat/illuminator matches no node and is ignored')
         for name in unknown:
-            assert bridge.count(f"parameter '{name}' is unknown and ignored") == 1
-        assert bridge.count('WARN') == len(misspelt) + len(unknown) + 1, bridge.log
-
-
-def test_parameter_of_the_first_node_that_is_given_otherwise_for_another_is_warned_about(
-    ros: Ros,
-) -> None:
-    with running_bridge(
-            ros.domain, free_port(), '-p', 'gimbal:setpoint_timeout:=1.5',
-            '-p', 'gimbal:max_brightness:=60.0', payloads='[illuminator, gimbal]',
-            max_brightness=30.0, attitude_interval=1, sources='[]', brightness=20.0) as bridge:
-        for name in ('setpoint_timeout', 'max_brightness'):
-            bridge.wait_for(f"[gimbal]: parameter '{name}' is ignored here: the value of "
-                            '/illuminator applies')
-        assert bridge.count('WARN') == 2, bridge.log
+            assert bridge.count(f"parameter '{name}' is ignored: it is unknown") == 1
+        assert bridge.count('WARN') == len(misspelt) + len(unknown) + 2, bridge.log
 
 
 def test_off_as_yaml_reads_it_and_integers_for_doubles_are_accepted(ros: Ros) -> None:

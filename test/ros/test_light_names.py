@@ -162,19 +162,6 @@ def test_each_node_takes_its_own_section_of_a_parameter_file_but_for_link_parame
     Parameters(own_ros, '/illuminator').wait(brightness=30.0, mode='internal_control')
     Parameters(own_ros, '/illuminator_1_244').wait(
         brightness=40.0, mode='external_sync', frame_id='stern')
-    bridge.wait_for("[illuminator_1_244]: parameter 'status_interval' is ignored here: the value "
-                    'of /illuminator applies')
+    bridge.wait_for("parameter 'status_interval' is ignored: it is given for illuminator_1_244, "
+                    'but is a parameter of /illuminator')
     assert bridge.count('ignored') == 1
-
-
-def test_parameter_of_a_further_light_without_effect_is_named_beside_another_payload(
-    own_ros: Ros,
-) -> None:
-    port = free_port()
-    with (running_bridge(
-            own_ros.domain, port, '-r', '__node:=first',
-            '-p', 'illuminator_1_244:status_interval:=0.5', payloads='[gimbal, illuminator]',
-            target_component=243) as bridge,
-          ServedLight(port), ServedLight(port, Address(1, 244))):
-        bridge.wait_for("[illuminator_1_244]: parameter 'status_interval' is ignored here: the "
-                        'value of /first applies')

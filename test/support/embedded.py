@@ -18,8 +18,9 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 import contextlib
+from pathlib import Path
+import tempfile
 import threading
-from typing import Any
 from unittest import mock
 
 from illuminator_ros.cli.payloads import PAYLOADS
@@ -29,14 +30,17 @@ from illuminator_ros.ros.parameters import ParameterError
 from illuminator_ros.ros.payload_node import PayloadNode
 import rclpy
 from rclpy.context import Context
-from rclpy.parameter import Parameter
 from support.slow import SlowLink
 from support.waiting import PATIENCE
+import yaml
 
 
-def _node(context: Context, parameters: Mapping[str, Any]) -> PayloadNode:
-    return PayloadNode('illuminator', context=context, parameter_overrides=[
-        Parameter(name, value=value) for name, value in parameters.items()])
+@contextlib.contextmanager
+def _arguments(parameters: Mapping[str, object]) -> Iterator[list[str]]:
+    with tempfile.TemporaryDirectory() as folder:
+        file = Path(folder, 'given.yaml')
+        file.write_text(yaml.safe_dump({'illuminator': {'ros__parameters': {**parameters}}}))
+        yield ['--ros-args', '--params-file', str(file)]
 
 
 @contextlib.contextmanager
@@ -44,10 +48,10 @@ def embedded_bridge(domain: int, port: int, **parameters: object) -> Iterator[Br
     """Run the bridge in a thread, by the slow clock, listening on a UDP port of loopback."""
     context = Context()
     rclpy.init(context=context, domain_id=domain)
-    with mock.patch.object(bridge_module, 'Link', SlowLink):
-        process = Bridge(_node(context, {
-            'connection_url': f'udpin://127.0.0.1:{port}', **parameters}), [], PAYLOADS,
-            'illuminator')
+    given = {'connection_url': f'udpin://127.0.0.1:{port}', **parameters}
+    with mock.patch.object(bridge_module, 'Link', SlowLink), _arguments(given) as arguments:
+        node = PayloadNode('illuminator', context=context, cli_args=arguments)
+        process = Bridge(node, [], PAYLOADS, 'illuminator')
     thread = threading.Thread(target=process.run)
     thread.start()
     try:
@@ -61,11 +65,12 @@ def embedded_bridge(domain: int, port: int, **parameters: object) -> Iterator[Br
 
 def refusal(context: Context, **parameters: object) -> str:
     """Return the reason why a bridge cannot start with these parameters."""
-    node = _node(context, parameters)
-    try:
-        Bridge(node, [], PAYLOADS, 'illuminator')
-    except ParameterError as error:
-        return str(error)
-    finally:
-        node.destroy_node()
+    with _arguments(parameters) as arguments:
+        node = PayloadNode('illuminator', context=context, cli_args=arguments)
+        try:
+            Bridge(node, arguments, PAYLOADS, 'illuminator')
+        except ParameterError as error:
+            return str(error)
+        finally:
+            node.destroy_node()
     return ''

@@ -112,8 +112,8 @@ def test_help_names_every_parameter_option_and_form_of_url() -> None:
     *(('gimbal', f'--ros-args -p {arguments}', text) for arguments, text in (
         ('earth_frame:=base_link_stabilized', 'two different names'),
         ('payloads:=[illuminator,gimbal]', "payloads: two nodes would be called 'gimbal'"),
-        ('payloads:=[gimbal,illuminator] -p illuminator:max_brightness:=30.0',
-         'max_brightness: is given for /illuminator, but the value of /gimbal applies'),
+        ('payloads:=[gimbal,illuminator] -p gimbal:max_brightness:=30.0',
+         'max_brightness is given for gimbal, but is a parameter of /illuminator'),
         ('gimbal_device_id:=256', 'out of range'), ('setpoint_timeout:=0', 'out of range'))),
     ('monitor', '--banana', 'unrecognized arguments: --banana'),
     ('monitor', '--wait 0', 'argument --wait: 0 is outside 0.1 to 3600'),

@@ -16,9 +16,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Hashable, Mapping
+from collections.abc import Callable, Hashable, Mapping, Set
 import functools
 import logging
+import re
 
 from .conversions import FRAME_PARAMETERS
 from .gimbal_node import GimbalNode
@@ -97,6 +98,11 @@ class Gimbals(ServedPayload):
                 # Another manager has a gimbal with this number.
                 name += f'_{key.address.component}'
             nodes.serve(key, name)
+
+    def further_parameters(self, name: str) -> Set[str] | None:
+        """See :meth:`ServedPayload.further_parameters`: they have none of their own."""
+        pattern = rf'{self._host.node.get_name()}(_[0-9]+){{2,3}}'
+        return frozenset() if re.fullmatch(pattern, name) else None
 
     def poll(self, now: float) -> None:
         """See :meth:`ServedPayload.poll`."""

@@ -16,7 +16,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Hashable, Mapping
+from collections.abc import Hashable, Mapping, Set
 import functools
 import logging
 import math
@@ -138,9 +138,9 @@ class Lights(ServedPayload):
         for node in self._nodes:
             node.poll()
 
-    def may_name(self, name: str) -> bool:
-        """See :meth:`ServedPayload.may_name`."""
-        return self._names.may_name(name)
+    def further_parameters(self, name: str) -> Set[str] | None:
+        """See :meth:`ServedPayload.further_parameters`."""
+        return parameters.OF_FURTHER_LIGHTS if self._names.may_name(name) else None
 
     def shut_down(self, now: float, report: ShutdownReport) -> Mapping[Hashable, str]:
         """See :meth:`ServedPayload.shut_down`: switch all off, or name the lights that stay on."""

@@ -82,6 +82,7 @@ DEVICE_PARAMETERS = (
 )
 # Parameters that each node may have for itself.
 _GEOMETRY = ('frame_id', 'beam_range', 'beam_angle', 'mounted_on')
+OF_FURTHER_LIGHTS = frozenset({*_GEOMETRY, *(spec.name for spec in DEVICE_PARAMETERS)})
 
 
 class BeamGeometry(NamedTuple):
