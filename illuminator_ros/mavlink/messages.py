@@ -42,6 +42,7 @@ Int16 = Annotated[int, 'h']
 Int32 = Annotated[int, 'i']
 Float = Annotated[float, 'f']
 # The bytes of a string as they are on the wire, with or without a terminator.
+Char16 = Annotated[bytes, '16s']
 Char24 = Annotated[bytes, '24s']
 Char32 = Annotated[bytes, '32s']
 UInt8x20 = Annotated[tuple[int, ...], '20B']

@@ -15,17 +15,18 @@
 """
 The checks of a camera: the requirements of the RedEdge serial API.
 
-Checks that take images, or give the camera a false position and attitude, need consent.
+Checks that take images, or give the camera a false position and attitude, need consent. The camera
+may leave out anything that a later firmware than its own brought.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Awaitable, Callable, Sequence
 from dataclasses import replace
-from functools import partial
+from functools import partial, wraps
 from itertools import pairwise
 import math
-from typing import NamedTuple
+from typing import NamedTuple, TypeAlias
 
 from . import conversions
 from . import messages as rededge
@@ -52,6 +53,9 @@ STATUS_TIMEOUT = 2.0
 FEEDBACK_TIMEOUT = 10.0
 # s; the time for which the report of an image that must not be taken is awaited.
 NO_IMAGE_TIME = 3.0
+# s; attempts to find out whether the camera has captures, and whether it reports its version.
+CAPTURE_TIMEOUT, VERSION_TIMEOUT = 2.5, 1.0
+CAPTURE_ATTEMPTS, VERSION_ATTEMPTS = 3, 2
 INJECTION_TIME = 1.0
 INJECTION_INTERVAL = 0.2
 # s after the last injected state: the camera still uses it, and no longer uses it.
@@ -66,9 +70,6 @@ SHOTS_WITHOUT_IMAGE = (0, 3)
 LATITUDE, LONGITUDE, ALTITUDE = -48.8766667, -123.3933333, 1234.5
 MAX_PLACE_ERROR, MAX_ALTITUDE_ERROR, MAX_ANGLE_ERROR = 2e-7, 0.1, 0.1
 
-requires = partial(requirement, specification=SERIAL_API)
-# Takes images, or injects false state.
-with_consent = partial(requires, needs_consent=True)
 
 
 class Capture(NamedTuple):
@@ -90,6 +91,9 @@ class CameraTester:
         self.session = session
         self.conditions = conditions
         self._sequence = 0
+        self._first: Capture | None = None
+        self._version: rededge.Firmware | None = None
+        self._asked_version = False
 
     @property
     def saved(self) -> str:
@@ -165,6 +169,50 @@ class CameraTester:
         session.check_presence()
         return reported()
 
+    async def first_capture(self) -> Capture:
+        """
+        Return the first image that was commanded.
+
+        :raises Skipped: if the camera has no captures, as before the firmware that brought them.
+        :raises Failed: if it has none, and its firmware is newer.
+        """
+        if self._first is None:
+            for _ in range(CAPTURE_ATTEMPTS):
+                self._first = await self.capture(timeout=CAPTURE_TIMEOUT)
+                if self._first.taken:
+                    break
+        assert self._first is not None
+        if not self._first.taken:
+            if (version := await self._reported_version()) and version >= rededge.CAPTURES:
+                raise Failed(f'confirms no captures, with firmware {version}')
+            raise Skipped(f'confirms no captures, as firmware before {rededge.CAPTURES}')
+        return self._first
+
+    async def excuse(self, failure: Failed, since: rededge.Firmware) -> None:
+        """
+        Raise a failure, or Skipped if the camera may have an older firmware.
+
+        :param since: the firmware from which on it is a failure.
+        """
+        is_newer = since <= rededge.CAPTURES and self._first is not None and self._first.taken
+        version = None if is_newer else await self._reported_version()
+        if is_newer or version and version >= since:
+            raise failure
+        raise Skipped(f'{failure}, as firmware before {since} may')
+
+    async def _reported_version(self) -> rededge.Firmware | None:
+        """Return the version of the firmware, None if the camera does not report it."""
+        for _ in range(0 if self._asked_version else VERSION_ATTEMPTS):
+            self.session.send(rededge.ParamRequestRead(
+                self.session.device.system, rededge.MAV_COMP_ID_CAMERA, rededge.VERSION_PARAMETER,
+                -1))
+            for _, value in await self.session.receive_more(rededge.ParamValue, VERSION_TIMEOUT):
+                self._version = rededge.Firmware.from_value(value) or self._version
+            if self._version:
+                break
+        self._asked_version = True
+        return self._version
+
     async def image(
         self, shot: int = rededge.Shot.SURVEY, *, component: int = rededge.MAV_COMP_ID_CAMERA,
         system: int | None = None, state: Callable[[], Sequence[Message]] = tuple,
@@ -226,15 +274,41 @@ def _place(feedback: rededge.CameraFeedback) -> str:
     return f'{feedback.lat / 1e7:.7f}, {feedback.lng / 1e7:.7f}, {feedback.alt_msl:.2f} m'
 
 
+Check: TypeAlias = Callable[[CameraTester], Awaitable['str | None']]
+
+
+def requires(
+    name: str, title: str, section: str, *, since: rededge.Firmware | None = None,
+    needs_consent: bool = False, whole_run: bool = False,
+) -> Callable[[Check], Requirement[CameraTester]]:
+    """
+    Return a decorator that makes a requirement of a check.
+
+    :param since: the firmware that brought what is required, None for the first.
+    :param needs_consent: whether it takes images, which a camera without captures does not.
+    """
+    def complete(check: Check) -> Requirement[CameraTester]:
+        @wraps(check)
+        async def checked(tester: CameraTester) -> str | None:
+            if needs_consent:
+                await tester.first_capture()
+            try:
+                return await check(tester)
+            except Failed as failure:
+                if since is None:
+                    raise
+                await tester.excuse(failure, since)
+                return None
+        return requirement(name, title, SERIAL_API, section, needs_consent=needs_consent,
+                           whole_run=whole_run)(checked)
+    return complete
+
+
+with_captures = partial(requires, needs_consent=True, since=rededge.CAPTURES)
+with_ids = partial(requires, section='Communicating', since=rededge.IDS)
+
+
 # Liveness
-
-@requires('heartbeat-contents', 'sends the documented values in HEARTBEAT', section='HEARTBEAT')
-async def heartbeat_contents(tester: CameraTester) -> None:
-    """Read the latest HEARTBEAT."""
-    one = tester.session.received(Heartbeat)[-1][1]
-    if one != HEARTBEAT_CONTENTS:
-        raise Failed(f'{one} instead of {HEARTBEAT_CONTENTS}')
-
 
 @requires('ping', 'answers PING', section='PING')
 async def ping(tester: CameraTester) -> str:
@@ -271,7 +345,7 @@ async def ping_target(tester: CameraTester) -> None:
         raise Failed(f'to {target} instead of {tester.session.address}')
 
 
-@requires('system-id', 'adopts the system ID of the host', section='Communicating')
+@with_ids('system-id', 'adopts the system ID of the host')
 async def system_id(tester: CameraTester) -> str:
     """Send PING from another system, then from our own."""
     own = tester.session.address
@@ -284,18 +358,18 @@ async def system_id(tester: CameraTester) -> str:
 
 # Captures
 
-@with_consent('capture-status', 'reports an image that was commanded with CAMERA_STATUS',
+@with_captures('capture-status', 'reports an image that was commanded with CAMERA_STATUS',
               section='CAMERA_STATUS')
 async def capture_status(tester: CameraTester) -> None:
-    """Command an image."""
-    status = (await tester.capture()).status
+    """Read the status of the first image."""
+    status = (await tester.first_capture()).status
     if status is None:
         raise Failed('no CAMERA_STATUS')
     if status.event_id != rededge.CameraStatusType.TRIGGER:
         raise Failed(f'event_id {status.event_id} instead of {rededge.CameraStatusType.TRIGGER:d}')
 
 
-@with_consent('capture-feedback', 'confirms an image with CAMERA_FEEDBACK',
+@with_captures('capture-feedback', 'confirms an image with CAMERA_FEEDBACK',
               section='CAMERA_FEEDBACK')
 async def capture_feedback(tester: CameraTester) -> str:
     """Command an image, and measure the time."""
@@ -307,13 +381,13 @@ async def capture_feedback(tester: CameraTester) -> str:
     return f'after {tester.session.now - begun:.1f} s'
 
 
-@with_consent('capture-panel', 'takes an image of the panel', section='DIGICAM_CONTROL')
+@with_captures('capture-panel', 'takes an image of the panel', section='DIGICAM_CONTROL')
 async def capture_panel(tester: CameraTester) -> None:
     """Command an image with shot 2."""
     await tester.image(rededge.Shot.PANEL)
 
 
-@with_consent('shot-values', 'takes no image for other values of shot', section='DIGICAM_CONTROL')
+@with_captures('shot-values', 'takes no image for other values of shot', section='DIGICAM_CONTROL')
 async def shot_values(tester: CameraTester) -> None:
     """Send 0 and 3."""
     for shot in SHOTS_WITHOUT_IMAGE:
@@ -321,20 +395,20 @@ async def shot_values(tester: CameraTester) -> None:
             raise Failed(f'takes an image for shot {shot}')
 
 
-@with_consent('other-component', 'ignores messages for other components', section='Communicating')
+@with_ids('other-component', 'ignores messages for other components', needs_consent=True)
 async def other_component(tester: CameraTester) -> None:
     """Command an image of another component."""
     if (await tester.capture(component=OTHER_COMPONENT, timeout=NO_IMAGE_TIME)).taken:
         raise Failed(f'takes an image that component {OTHER_COMPONENT} was requested to take')
 
 
-@with_consent('all-components', 'takes messages for all components', section='Communicating')
+@with_ids('all-components', 'takes messages for all components', needs_consent=True)
 async def all_components(tester: CameraTester) -> None:
     """Command an image of component 0."""
     await tester.image(component=0)
 
 
-@with_consent('any-system', 'ignores the target system', section='Communicating')
+@with_ids('any-system', 'ignores the target system', needs_consent=True)
 async def any_system(tester: CameraTester) -> None:
     """Command an image of another system."""
     await tester.image(system=tester.session.device.system % 254 + 1)
@@ -346,7 +420,7 @@ def _position(
     name: str, section: str, state: Callable[[CameraTester], Sequence[Message]],
 ) -> Requirement[CameraTester]:
     """Return the requirement that images have the position and time of some messages."""
-    @with_consent(name, f'writes position and time of {section} into images', section=section)
+    @with_captures(name, f'writes position and time of {section} into images', section=section)
     async def check(tester: CameraTester) -> str:
         await tester.inject(lambda: state(tester))
         feedback = await tester.image(state=lambda: state(tester))
@@ -359,7 +433,7 @@ def _position(
     return check
 
 
-@with_consent('attitude', 'combines ATTITUDE and MOUNT_STATUS', section='MOUNT_STATUS')
+@with_captures('attitude', 'combines ATTITUDE and MOUNT_STATUS', section='MOUNT_STATUS')
 async def attitude(tester: CameraTester) -> str:
     """Turn the vehicle, then the camera about its line of sight; both turn the image."""
     for yaw, mount_roll in ((90.0, 0.0), (90.0, 30.0)):
@@ -373,7 +447,7 @@ async def attitude(tester: CameraTester) -> str:
     return f'yaw {feedback.yaw:.2f} degrees'
 
 
-@with_consent('validity', 'uses an injected position for 5 s', section='GPS')
+@with_captures('validity', 'uses an injected position for 5 s', section='GPS')
 async def validity(tester: CameraTester) -> None:
     """Inject a position, and take an image before and after that time."""
     await tester.inject(tester.raw_position)
@@ -385,6 +459,15 @@ async def validity(tester: CameraTester) -> None:
 
 
 # The messages of a whole run
+
+@requires('heartbeat-contents', 'sends the documented values in HEARTBEAT', section='HEARTBEAT',
+          since=rededge.CAPTURES, whole_run=True)
+async def heartbeat_contents(tester: CameraTester) -> None:
+    """Read the latest HEARTBEAT."""
+    received = tester.session.received(Heartbeat)
+    if received and received[-1][1] != HEARTBEAT_CONTENTS:
+        raise Failed(f'{received[-1][1]} instead of {HEARTBEAT_CONTENTS}')
+
 
 @requires('capture-index', 'counts the images that were commanded', section='CAMERA_FEEDBACK',
           whole_run=True)
@@ -426,13 +509,14 @@ REQUIREMENTS: tuple[Requirement[CameraTester], ...] = (
     _documented(component.heartbeat,
                 f'sends HEARTBEAT from component {rededge.MAV_COMP_ID_CAMERA} '
                 '(MAV_COMP_ID_CAMERA)'),
-    heartbeat_contents, ping, ping_sequence, ping_once, ping_target, system_id,
+    ping, ping_sequence, ping_once, ping_target, system_id,
     capture_status, capture_feedback, capture_panel, shot_values,
     other_component, all_components, any_system,
     _position('raw-position', 'GPS_RAW_INT', CameraTester.raw_position),
     _position('fused-position', 'GLOBAL_POSITION_INT', CameraTester.fused_position),
     attitude, validity,
-    _documented(component.heartbeat_rate), capture_index, mavlink_1, lengths, component.checksums,
+    _documented(component.heartbeat_rate), heartbeat_contents, capture_index,
+    mavlink_1, lengths, component.checksums,
 )
 
 
@@ -443,6 +527,8 @@ def describe(message: Message) -> str:
         return f'PING {message.seq} to {target}' if any(target) else f'PING {message.seq}'
     if isinstance(message, rededge.DigicamControl):
         return f'DIGICAM_CONTROL to {target_of(message)}: shot {message.shot}'
+    if isinstance(message, rededge.ParamRequestRead | rededge.ParamValue):
+        return f'{message.name} {message.param_id.rstrip(bytes(1)).decode(errors="replace")}'
     if isinstance(message, rededge.CameraStatus):
         return f'CAMERA_STATUS image {message.img_idx}, event {message.event_id}'
     if isinstance(message, rededge.CameraFeedback):
@@ -453,7 +539,7 @@ def describe(message: Message) -> str:
 
 CHECKS: PayloadChecks[CameraTester] = PayloadChecks(
     payload='rededge', device='camera',
-    messages=(rededge.Ping, rededge.CameraStatus, rededge.CameraFeedback),
+    messages=(rededge.Ping, rededge.ParamValue, rededge.CameraStatus, rededge.CameraFeedback),
     is_device=lambda message: isinstance(message, Heartbeat), component=rededge.MAV_COMP_ID_CAMERA,
     evidence=f'HEARTBEAT from component {rededge.MAV_COMP_ID_CAMERA}', describe=describe,
     tester=CameraTester, requirements=REQUIREMENTS, mavlink_version=1,

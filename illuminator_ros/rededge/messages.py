@@ -22,6 +22,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from enum import IntEnum
+import struct
+from typing import NamedTuple
 
 from ..mavlink import messages as mav
 
@@ -56,6 +58,29 @@ class Ping(mav.Message):
     seq: mav.UInt32
     target_system: mav.UInt8
     target_component: mav.UInt8
+
+
+@mav.define(20, 'PARAM_REQUEST_READ')
+@dataclass(slots=True)
+class ParamRequestRead(mav.Message):
+    """A ``param_index`` of -1 requests the parameter ``param_id``."""
+
+    target_system: mav.UInt8
+    target_component: mav.UInt8
+    param_id: mav.Char16
+    param_index: mav.Int16
+
+
+@mav.define(22, 'PARAM_VALUE')
+@dataclass(slots=True)
+class ParamValue(mav.Message):
+    """The four bytes of ``param_value`` are a value of the type ``param_type``."""
+
+    param_id: mav.Char16
+    param_value: mav.Float
+    param_type: mav.UInt8
+    param_count: mav.UInt16
+    param_index: mav.UInt16
 
 
 @mav.define(24, 'GPS_RAW_INT')
@@ -160,3 +185,44 @@ class CameraFeedback(mav.Message):
     foc_len: mav.Float
     flags: mav.UInt8
     completed_captures: mav.UInt16 = 0
+
+
+class Firmware(NamedTuple):
+    """A version of the camera's software."""
+
+    major: int
+    minor: int
+    patch: int
+
+    def __str__(self) -> str:
+        return '.'.join(map(str, self))
+
+    @classmethod
+    def parse(cls, text: str) -> Firmware:
+        """
+        Read ``1.5.5``.
+
+        :raises ValueError: if the text is not a version.
+        """
+        parts = text.split('.')
+        if len(parts) != 3 or not all(one.isdecimal() and int(one) < 256 for one in parts):
+            raise ValueError(f'{text!r} is not a version such as 1.5.5')
+        return cls(*map(int, parts))
+
+    @classmethod
+    def from_value(cls, message: ParamValue) -> Firmware | None:
+        """Return the version that a message reports, None if it reports another parameter."""
+        if message.param_id.rstrip(b'\0') != VERSION_PARAMETER:
+            return None
+        return cls(*struct.pack('<f', message.param_value)[:3])
+
+    def value(self) -> ParamValue:
+        """Return the message that reports this version."""
+        (bits,) = struct.unpack('<f', bytes((*self, 0)))
+        return ParamValue(VERSION_PARAMETER, bits, MAV_PARAM_TYPE_UINT32, 1, 0)
+
+
+VERSION_PARAMETER = b'~swVersion'
+MAV_PARAM_TYPE_UINT32 = 5
+# The firmware that brought captures; its use of system and component ids; and parameters.
+CAPTURES, IDS, PARAMETERS = Firmware(1, 5, 5), Firmware(3, 3, 0), Firmware(7, 1, 0)

@@ -116,6 +116,7 @@ FAULTS = FaultTable({
     'late': Fault('feedback_delay', 'sends CAMERA_FEEDBACK S seconds after the image', 'S',
                   number(0.001, 3600), 15.0),
     'same-index': Fault('counts', 'does not count its images', default=False),
+    'no-captures': Fault('shots', 'takes no image on DIGICAM_CONTROL', default=()),
     'no-panel': Fault('shots', 'takes no image of the panel', default=(rededge.Shot.SURVEY,)),
     'any-shot': Fault('shots', 'takes an image for each value of shot',
                       default=tuple(range(256))),
@@ -287,22 +288,26 @@ class SimulatedRedEdge(simulated.SimulatedDevice):
     :param validity: s for which injected state is used.
     :param interval: s between images, 0 for none.
     :param own_gps: the position of its own GPS receiver, None without a fix.
+    :param firmware: it has no captures, and no parameters, before the firmware that brought them.
     :ivar images: the latest images.
     """
 
     messages = (Heartbeat, rededge.Ping, rededge.GpsRawInt, rededge.GpsStatus, SystemTime,
-                GlobalPositionInt, Attitude, rededge.MountStatus, rededge.DigicamControl)
-    sends = (Heartbeat, rededge.Ping, rededge.CameraStatus, rededge.CameraFeedback)
+                GlobalPositionInt, Attitude, rededge.MountStatus, rededge.DigicamControl,
+                rededge.ParamRequestRead)
+    sends = (Heartbeat, rededge.Ping, rededge.ParamValue, rededge.CameraStatus,
+             rededge.CameraFeedback)
     faults = FAULTS
     commands = COMMANDS
     behaviour: RedEdgeBehaviour
 
     def __init__(
         self, address: Address, *, validity: float = 5.0, interval: float = 0.0,
-        own_gps: GeoPoint | None = None,
+        own_gps: GeoPoint | None = None, firmware: rededge.Firmware = rededge.PARAMETERS,
     ) -> None:
         super().__init__(RedEdgeBehaviour(validity=validity))
         self.own_gps = own_gps
+        self._firmware = firmware
         self.images: deque[Image] = deque(maxlen=MAX_IMAGES)
         self._component = address.component
         self._first_interval = interval
@@ -351,6 +356,10 @@ class SimulatedRedEdge(simulated.SimulatedDevice):
             return self._answer(source, message)
         if isinstance(message, rededge.DigicamControl):
             return self._control(source, message, now)
+        if isinstance(message, rededge.ParamRequestRead):
+            is_known = (self._firmware >= rededge.PARAMETERS
+                        and message.param_id.rstrip(b'\0') == rededge.VERSION_PARAMETER)
+            return (self._firmware.value(),) if is_known else ()
         if self.behaviour.injectable:
             self._inject(message, now)
         return ()
@@ -378,7 +387,7 @@ class SimulatedRedEdge(simulated.SimulatedDevice):
         self, source: Address, control: rededge.DigicamControl, now: float,
     ) -> Iterable[Message]:
         behaviour = self.behaviour
-        if control.shot not in behaviour.shots:
+        if control.shot not in behaviour.shots or self._firmware < rededge.CAPTURES:
             return
         self._index = (self._index + behaviour.counts) & 0xFFFF
         is_panel = control.shot == rededge.Shot.PANEL
@@ -499,6 +508,9 @@ SETTINGS: Mapping[str, Setting] = {
     'interval': Setting('S', 'take an image every S seconds (default: 0, none)', _interval),
     'validity': Setting('S', 'time for which injected state is used (default: 5; firmware before '
                         '1.3.0 had 30)', number(0.001, 3600)),
+    'firmware': Setting('X.Y.Z', 'its software version (default: 7.1.0); it takes images on '
+                        'DIGICAM_CONTROL from 1.5.5 on, and reports the version from 7.1.0 on',
+                        rededge.Firmware.parse),
     'own_gps': Setting('LAT,LON,ALT', "position of the camera's own GPS, above mean sea level, or "
                        f'none (default: {DEFAULT_PLACE})', read_place),
 }
@@ -517,6 +529,7 @@ SIMULATED = simulated.SimulatedType(
     examples=(
         '--payload rededge --interval 1 --images flight.csv',
         '--payload rededge pty:///tmp/ttyREDEDGE',
+        '--payload rededge --firmware 1.3.2',
         '--payload rededge --fault no-feedback'),
     mavlink_version=1, url='udpout://127.0.0.1:14592',
     records=simulated.RecordType(

@@ -24,6 +24,8 @@ from illuminator_ros.payload.checks.requirement import Verdict
 from illuminator_ros.payload.messages import GeoPoint
 from illuminator_ros.payload.simulated import Description, SimulatedComponents
 from illuminator_ros.rededge.checks import CHECKS, REQUIREMENTS
+from illuminator_ros.rededge.messages import CAPTURES as CAPTURES_FIRMWARE
+from illuminator_ros.rededge.messages import Firmware, PARAMETERS
 from illuminator_ros.rededge.simulated import FAULTS, SimulatedRedEdge
 import pytest
 from support.checks_run import ChecksRun
@@ -53,6 +55,7 @@ SEEDED = {
     'no-feedback': CAPTURES - {'capture-status', 'shot-values', 'other-component'},
     'late': CAPTURES - {'capture-status', 'shot-values', 'other-component'},
     'same-index': {'capture-index'},
+    'no-captures': CAPTURES,
     'no-panel': {'capture-panel'},
     'any-shot': {'shot-values'},
     'no-injection': INJECTED,
@@ -65,6 +68,7 @@ DETAILS = {
     'ping-target': ('ping-target', 'to 0/0 instead of 255/190'),
     'other-ping': ('ping', 'no answer to 3 requests within 1 s each'),
     'fixed-system': ('system-id', 'after a message from 2/190 it sends from 255/100'),
+    'no-captures': ('validity', 'confirms no captures, with firmware 7.1.0'),
     'late': ('capture-feedback', 'no CAMERA_FEEDBACK within 10 s after CAMERA_STATUS'),
     'same-index': ('capture-index', 'img_idx 0, then 0'),
     'stale': ('validity', 'still used 7 s later'),
@@ -78,14 +82,15 @@ RANDOM = {'drop': 'heartbeat-rate', 'duplicate': 'ping-once', 'delay': 'ping',
 
 def start(
     fault: str = '', *, address: Address = CAMERA, others: Iterable[int] = (), version: int = 1,
-    seed: int = 0, **options: Any,
+    seed: int = 0, firmware: Firmware = PARAMETERS, **options: Any,
 ) -> ChecksRun:
     """
     Begin to check a camera.
 
     :param others: component ids of further cameras.
     """
-    camera = SimulatedRedEdge(address, own_gps=GeoPoint(47.0, 8.0, 400.0))
+    camera = SimulatedRedEdge(
+        address, own_gps=GeoPoint(47.0, 8.0, 400.0), firmware=firmware)
     if fault:
         camera.behave(FAULTS.add(camera.behaviour, fault), START)
     camera.set_clock(UTC + START, START)
@@ -114,6 +119,27 @@ def test_fault_fails_exactly_its_requirements(fault: str) -> None:
     if fault in DETAILS:
         name, detail = DETAILS[fault]
         assert detail in done.result(name).detail
+
+
+@pytest.mark.parametrize(('firmware', 'fault', 'skipped'), [
+    (Firmware(1, 3, 2), '', CAPTURES | {'capture-index'}),
+    (Firmware(1, 3, 2), 'type', CAPTURES | {'capture-index', 'heartbeat-contents'}),
+    (CAPTURES_FIRMWARE, 'fixed-system', {'system-id', 'any-system'}),
+    (CAPTURES_FIRMWARE, 'any-target', {'other-component'}),
+])
+def test_requirements_of_later_firmware_are_skipped(
+        firmware: Firmware, fault: str, skipped: set[str]) -> None:
+    done = run(fault, firmware=firmware)
+    assert done.failed == set()
+    assert done.names(Verdict.SKIPPED) == skipped
+
+
+def test_a_skipped_requirement_names_the_firmware_that_brought_it() -> None:
+    done = run('fixed-system', firmware=Firmware(1, 3, 2))
+    assert done.result('capture-panel').detail == (
+        'confirms no captures, as firmware before 1.5.5')
+    assert done.result('system-id').detail.endswith(
+        'it sends from 255/100, as firmware before 3.3.0 may')
 
 
 def test_camera_that_stops_sending_fails_a_ping_and_later_checks_are_skipped() -> None:

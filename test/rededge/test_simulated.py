@@ -310,3 +310,9 @@ def test_settings_make_a_camera() -> None:
     assert (device.own_gps, device.behaviour.validity) == (None, 30.0)
     assert device.next_deadline() == 2.0
     assert SIMULATED.make({}, Address(255, 100)).own_gps is not None
+
+
+@pytest.mark.parametrize('text', ['7.1', '7.1.x', '7.1.256', ''])
+def test_text_that_is_not_a_firmware_version_is_refused(text: str) -> None:
+    with pytest.raises(ValueError, match='is not a version such as 1.5.5'):
+        SIMULATED.all_settings['firmware'].read(text)
