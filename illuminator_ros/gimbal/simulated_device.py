@@ -67,6 +67,7 @@ class GimbalBehaviour(Behaviour):
     :param identifies: whether it sends its INFORMATION message.
     :param static_information: whether its INFORMATION message always has the same content.
     :param limits_range: whether it keeps within the range that it reports.
+    :param limits_in_degrees: whether it reports its ranges in degrees.
     :param stops: whether a rate of 0 stops it.
     :param accepts_earth_always: whether it reports ACCEPTS_YAW_IN_EARTH_FRAME even without a
         heading.
@@ -86,6 +87,7 @@ class GimbalBehaviour(Behaviour):
     identifies: bool = True
     static_information: bool = True
     limits_range: bool = True
+    limits_in_degrees: bool = False
     stops: bool = True
     accepts_earth_always: bool = False
     takes_manager_set: bool = False
@@ -111,6 +113,7 @@ GIMBAL_FAULTS = FaultTable({
     'changing-identity': Fault('static_information', 'changes the limits that it reports',
                                default=False),
     'no-limits': Fault('limits_range', 'turns beyond the range that it reports', default=False),
+    'degrees': Fault('limits_in_degrees', 'reports its ranges in degrees'),
     'runaway': Fault('stops', 'goes on turning when the rate is set to 0', default=False),
 })
 # No command changes a device, so the faults in the results of such commands are left out.
@@ -217,6 +220,8 @@ class SimulatedMount:
     def limits(self, behaviour: GimbalBehaviour) -> Mapping[str, float]:
         """Return the fields roll_min to yaw_max of an INFORMATION message."""
         fields = range_fields(self._properties.mechanics.ranges)
+        if behaviour.limits_in_degrees:
+            fields = {name: math.degrees(value) for name, value in fields.items()}
         self._informed += 1
         return fields if behaviour.static_information else {
             **fields, 'pitch_max': fields['pitch_max'] + 0.01 * self._informed}

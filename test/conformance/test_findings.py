@@ -46,16 +46,18 @@ SEEDED = {
     'thermistor': {'flags-at-rest'},
     'refuse': ACCEPTED_CHANGES,
     'refuse=failed': ACCEPTED_CHANGES | DENIED_VALUES,
-    'progress': {'finished'},
-    'busy': {'not-busy'},
+    'progress': set(),
+    'progress=3600': ACCEPTED_CHANGES | DENIED_VALUES | {'finished', 'not-busy'},
+    'busy': set(),
+    'busy=1000': ACCEPTED_CHANGES | DENIED_VALUES | {'not-busy'},
     'slow': {'acknowledged-promptly'},
-    # The light is already off when it is switched off.
-    'lie': ACCEPTED_CHANGES - {'off'} | {'status-agrees'},
+    # The light is already off when it is switched off, and strobes neither at 0 nor at 100 %.
+    'lie': ACCEPTED_CHANGES - {'off', 'duty-cycle'} | {'status-agrees'},
     'heartbeat': {'heartbeat-rate'},
     'type': {'heartbeat-type'},
     'autopilot': {'heartbeat-autopilot'},
     'no-clock': {'uptime'},
-    'no-int': {'command-int'},
+    'no-int': set(),
     'no-broadcast': {'broadcast'},
     'any-target': {'other-target'},
     'no-stop': {'interval-stop'},
@@ -82,17 +84,16 @@ RANDOM = {
 # Requirement -> a light that does not meet it, without a fault.
 PROPERTIES = {
     'address': IlluminatorProperties(address=Address(255, 0)),
-    'status-stream': IlluminatorProperties(status_interval=0.0),
     'status-mode': IlluminatorProperties(mode_bitmask=0),
     'strobe-limits': IlluminatorProperties(strobe_range=StrobeRange(5.0, 1.0)),
     'information-text': IlluminatorProperties(identity=Identity('\x01\x02', 'm', '1', '1', '1')),
-    'mode-internal': IlluminatorProperties(modes=()),
+    'mode-internal': IlluminatorProperties(modes=(), mode_bitmask=3),
 }
 # Profile -> all requirements that fail.
 DEVIATIONS = {
     'default': set(),
     'extended': set(),
-    'reference': {'address', 'information-terminated', 'other-target', 'command-int',
+    'reference': {'address', 'information-terminated', 'other-target',
                   'not-a-number', 'interval', 'uptime'},
     'ardusub': {'heartbeat-type', 'heartbeat-autopilot', 'information-request', 'not-a-number'},
 }
@@ -125,13 +126,27 @@ def test_a_profile_fails_exactly_its_known_deviations_and_is_restored(profile: s
 def test_every_fault_is_seeded_and_every_requirement_can_fail() -> None:
     assert set(FAULTS) == {name.partition('=')[0] for name in SEEDED} | set(RANDOM)
     assert {one.name for one in REQUIREMENTS} == set().union(
-        *SEEDED.values(), RANDOM.values(), PROPERTIES, {'status-content'})
+        *SEEDED.values(), RANDOM.values(), PROPERTIES, {'status-content', 'status-stream'})
 
 
 def test_a_status_with_nan_fails_status_content() -> None:
     run = Run()
     run.lamp.configuration = replace(run.lamp.configuration, brightness=math.nan)
     assert run.finish().failed == {'status-content'}
+
+
+def test_a_light_that_sends_its_status_irregularly_fails_status_stream() -> None:
+    run = Run(only=('status-stream',))
+    for interval in (0.2, 2.0):
+        run.link.run(1.0)
+        run.set_interval(interval)
+    assert run.finish().failed == {'status-stream'}
+
+
+def test_a_light_that_sends_its_status_on_request_only_passes() -> None:
+    run = Run(IlluminatorProperties(status_interval=0.0)).finish()
+    assert run.failed == set()
+    assert run.result('status-stream').verdict is Verdict.SKIPPED
 
 
 def test_a_hot_light_without_faults_meets_every_requirement() -> None:

@@ -26,7 +26,14 @@ from illuminator_ros.gimbal import simulated_device, simulated_manager
 from illuminator_ros.gimbal.checks import device, manager
 from illuminator_ros.gimbal.manager_setpoint import Demand
 from illuminator_ros.gimbal.messages import GimbalCommand
-from illuminator_ros.mavlink.messages import Address, CommandLong, MavResult
+from illuminator_ros.mavlink.messages import (
+    Address,
+    CommandAck,
+    CommandInt,
+    CommandLong,
+    MavCmd,
+    MavResult,
+)
 from illuminator_ros.payload.checks.requirement import PayloadChecks, Verdict
 from illuminator_ros.payload.messages import GimbalDeviceAttitudeStatus as AttitudeStatus
 from illuminator_ros.payload.mount_attitude import MountFlags
@@ -50,26 +57,30 @@ COMMON = {
     'silence': {'heartbeat'},
     'slow': {'acknowledged-promptly'},
     'heartbeat': {'heartbeat-rate'},
-    'no-int': {'command-int'},
+    'no-int': set(),
     'no-broadcast': {'broadcast'},
     'any-target': {'other-target'},
     'no-stop': {'interval-stop'},
     'fixed-rate': {'interval'},
     'unknown': {'unknown-command', 'unknown-message'},
-    'no-request': {'status-request'},
+    'no-request': set(),
     'no-resume': {'interval-default'},
     'misaddress': {'acknowledged-to-us'},
     'jumps': {'continuous'},
-    'no-frame': {'yaw-frame'},
+    'no-frame': set(),
     'flags': {'failures-at-rest'},
     'no-identity': {'information'},
     'changing-identity': {'information-static'},
     'no-limits': {'range'},
+    'degrees': {'limits', 'range'},
     'runaway': {'stop'},
 }
 POINTING = {'set-attitude', 'set-pitchyaw', 'pitchyaw', 'one-axis', 'angles-with-rates',
             'all-devices', 'earth-frame'}
 TURNING = {'rate', 'pitchyaw-rate', 'manual'}
+# The requirements on a manager that need a command.
+CHANGED = {'take', 'release', 'unchanged', 'secondary', 'neutral', 'retract', 'flags-shown', 'roi',
+           *POINTING, *TURNING}
 SEEDED = {
     'gimbal': {
         **COMMON,
@@ -78,24 +89,23 @@ SEEDED = {
         'lie': {'setpoint', 'rate', 'neutral', 'retract', 'earth-frame', 'yaw-lock'},
         'frozen-axis': {'setpoint', 'rate', 'earth-frame', 'yaw-lock'},
         'obeys-others': {'only-manager', 'one-manager'},
-        'no-status': {'status-stream', 'status-request'},
-        'stale-flags': {'neutral', 'retract'},
+        'no-status': {'status-stream'},
+        'stale-flags': {'neutral', 'retract', 'yaw-lock'},
         'false-north': {'north-needs-heading'},
         'manager-set': {'manager-set'},
     },
     'gimbal_manager': {
         **COMMON,
-        'no-int': {'command-int', 'roi'},
-        'refuse': {'take', 'release', 'unchanged', 'secondary', 'neutral', 'retract',
-                   'flags-shown', 'roi', *POINTING, *TURNING},
-        'progress': {'finished'},
-        'busy': {'not-busy'},
+        'refuse': CHANGED,
+        'progress': set(),
+        'busy': set(),
+        'busy=1000': {'not-busy', *CHANGED},
         'disobey': {'no-control-command', 'no-control-roi'},
         'lie': {'take', 'secondary', 'one-player', 'roi', 'neutral', 'retract',
                 'flags-shown', *POINTING, *TURNING},
         'frozen-axis': {'roi', *POINTING, *TURNING},
         'obeys-others': {'no-control-command', 'no-control-messages', 'one-player'},
-        'no-status': {'status-stream', 'status-request', 'attitude-stream'},
+        'no-status': {'status-stream', 'attitude-stream'},
         'stale-flags': {'neutral', 'retract', 'flags-shown'},
         'stale-control': {'take', 'secondary', 'one-player'},
     },
@@ -199,6 +209,30 @@ def _accepts_what_it_ignores(one: ChecksRun) -> None:
     one.device.execute = execute
 
 
+def _answers_requests(cls: type[Any], *answers: CommandAck) -> Callable[[ChecksRun], None]:
+    """Answer MAV_CMD_REQUEST_MESSAGE, in messages of a class, with these messages only."""
+    def seed(one: ChecksRun) -> None:
+        original = one.component.receive
+
+        def receive(source: Address, message: Any, now: float) -> None:
+            if isinstance(message, cls) and message.command == MavCmd.REQUEST_MESSAGE:
+                one.component.outgoing.extend((one.component.address, ack) for ack in answers)
+            else:
+                original(source, message, now)
+        one.component.receive = receive  # type: ignore[method-assign]
+    return seed
+
+
+def _turns_with_the_vehicle(one: ChecksRun) -> None:
+    mount = one.device.mount
+    original = mount.obey
+
+    def turned(demand: Demand, *others: Any) -> None:
+        original(demand._replace(angles=(0.0, -0.26, 0.5)) if (
+            demand.flags & MountFlags.YAW_LOCK) else demand, *others)
+    mount.obey = turned
+
+
 def _silent_at(param: float) -> Callable[[ChecksRun], None]:
     def seed(one: ChecksRun) -> None:
         original = one.device.receive
@@ -207,11 +241,20 @@ def _silent_at(param: float) -> Callable[[ChecksRun], None]:
     return seed
 
 
+ACCEPTED = CommandAck(MavCmd.REQUEST_MESSAGE, MavResult.ACCEPTED)
+BOTH_FRAMES = MountFlags.YAW_IN_VEHICLE_FRAME | MountFlags.YAW_IN_EARTH_FRAME
 INFORMATION, STATUS = gimbal.GimbalDeviceInformation, gimbal.GimbalManagerStatus
 DEVIATIONS = {
     ('gimbal', 'device-id'): _changed(INFORMATION, gimbal_device_id=3),
     ('gimbal', 'limits'): _changed(INFORMATION, roll_min=1.0),
     ('gimbal', 'pitch-axis'): _changed(INFORMATION, cap_flags2=256),
+    ('gimbal', 'status-request'): _answers_requests(CommandLong),
+    ('gimbal_manager', 'status-request'): _answers_requests(CommandLong),
+    ('gimbal', 'command-int'): _answers_requests(CommandInt, ACCEPTED),
+    ('gimbal_manager', 'command-int'): _answers_requests(CommandInt, ACCEPTED),
+    ('gimbal', 'yaw-frame'): _changed(AttitudeStatus, flags=BOTH_FRAMES),
+    ('gimbal_manager', 'yaw-frame'): _changed(AttitudeStatus, flags=BOTH_FRAMES),
+    ('gimbal', 'yaw-lock'): _turns_with_the_vehicle,
     ('gimbal', 'attitude'): _changed(AttitudeStatus, q=(0.5, 0.0, 0.0, 0.0)),
     ('gimbal', 'status-to-all'): _changed(AttitudeStatus, target_system=1),
     ('gimbal', 'limit-flags'): _changed(AttitudeStatus, failure_flags=0),
@@ -238,11 +281,12 @@ def test_a_deviation_fails_its_requirement(kind: str, name: str) -> None:
 @every_kind
 def test_every_fault_is_seeded_and_every_requirement_can_fail(kind: str) -> None:
     checks, simulated = KINDS[kind]
-    assert set(simulated.device.faults) == {*SEEDED[kind], *RANDOM}
+    assert set(simulated.device.faults) == {
+        *(name.partition('=')[0] for name in SEEDED[kind]), *RANDOM}
     found = set().union(*SEEDED[kind].values(), RANDOM.values(), *PROFILES.values(),
                         {name for one, name in DEVIATIONS if one == kind})
     # test/conformance covers the address, and changes by command, which a device does not have.
-    others = {'address'} if kind == 'gimbal_manager' else {'address', 'finished', 'not-busy'}
+    others = {'address', 'finished'} | ({'not-busy'} if kind == 'gimbal' else set())
     assert {one.name for one in checks.requirements} - found == others
 
 

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""A run of ``conformance`` against simulated devices, without links and clocks."""
+"""A run of ``conformance`` against devices, without links and clocks."""
 
 from __future__ import annotations
 
@@ -21,6 +21,7 @@ import contextlib
 from typing import Any, TypeVar
 
 from illuminator_ros.cli.conformance.run import LISTEN_TIME
+from illuminator_ros.mavlink.component import Endpoint
 from illuminator_ros.mavlink.messages import Address
 from illuminator_ros.payload.checks import requirement
 from illuminator_ros.payload.checks.runner import absence, CheckRunner
@@ -36,22 +37,24 @@ R = TypeVar('R', bound='ChecksRun')
 
 class ChecksRun:
     """
-    A session with its checks, simulated devices, and the line between them.
+    A session with its checks, devices, and the line between them.
 
+    :param devices: simulated or other devices.
     :param only: names of requirements, all if empty.
     :param version: of MAVLink.
     :param utc: the time at 0 of the link's clock, s since 1970.
     """
 
     def __init__(
-        self, checks: requirement.PayloadChecks[Any], devices: SimulatedComponents[Any], *,
+        self, checks: requirement.PayloadChecks[Any], devices: Endpoint, *,
         target: Address | None = None, consent: bool = True, only: tuple[str, ...] = (),
         requirements: Sequence[requirement.Requirement[Any]] = (), version: int = 2,
         utc: float = 0.0, **options: float,
     ) -> None:
         self.checks = checks
-        self.component = devices.components[0]
-        self.device: Any = self.component.device
+        if isinstance(devices, SimulatedComponents):
+            self.component = devices.components[0]
+            self.device: Any = self.component.device
         self.session = checks.session(TESTER, target)
         self.link = VirtualLink(self.session, devices, version)
         defaults = {one.name: one.default for one in checks.options}

@@ -34,10 +34,14 @@ from .tester import (
     STEP,
     TOLERANCE,
 )
-from ..axes import LEVEL
+from ..axes import AT_LIMIT, LEVEL
 from ..messages import Capabilities, ErrorFlags
-from ...mavlink.messages import MavCmd, MavResult, Message
-from ...payload.checks.component_requirements import none_of
+from ...mavlink.messages import MavCmd, Message
+from ...payload.checks.component_requirements import (
+    check_command_int,
+    none_of,
+    REQUEST_TIMEOUT,
+)
 from ...payload.checks.requirement import (
     AnyRequirement,
     COMMAND,
@@ -48,12 +52,22 @@ from ...payload.checks.requirement import (
 )
 from ...payload.checks.session import Failed, Skipped, Transaction
 from ...payload.messages import GimbalDeviceAttitudeStatus as AttitudeStatus
-from ...payload.mount_attitude import MountFlags, yaw_frame
+from ...payload.mount_attitude import AXES, MountFlags, yaw_frame
 from ...payload.rotation import Quaternion
 
 STATUS = 'GIMBAL_DEVICE_ATTITUDE_STATUS'
 # Degrees; the rotation between two statuses that the angular velocity need not explain.
 JUMP = 8.0
+# Degrees; the steepest pitch that is commanded.
+STEEP = 75.0
+UNREACHABLE = 'a quaternion cannot have a pitch beyond its range'
+# Degrees from a limit at which AT_PITCH_LIMIT contradicts it; the vehicle may be tilted.
+FAR_FROM_LIMIT = 45.0
+# The most turns of yaw in one direction that a range may permit: a cable limits a gimbal without
+# slip rings.
+MAX_TURNS = 10
+# Flags that are set in normal operation.
+NO_FAILURES = sum(AT_LIMIT) | ErrorFlags.CALIBRATION_RUNNING | ErrorFlags.NO_MANAGER
 FRAMES = MountFlags.YAW_IN_EARTH_FRAME | MountFlags.YAW_IN_VEHICLE_FRAME
 
 T = TypeVar('T', bound=GimbalTester)
@@ -100,9 +114,9 @@ def turns(
     seconds: float = 1.0, slowest: float = 0.25, fastest: float = 3.0,
 ) -> Requirement[T]:
     """
-    Return the requirement that a gimbal turns down for some seconds when a speed is sent.
+    Return the requirement that a gimbal turns down, or up, for some time when a speed is sent.
 
-    :param speed: deg/s, below 0.
+    :param speed: deg/s.
     :param slowest: the lowest accepted speed, as a multiple of ``speed``.
     :param fastest: the highest accepted speed, likewise; infinite where the specification does
         not limit it.
@@ -110,7 +124,8 @@ def turns(
     @moves(name, title, specification, section)
     async def check(tester: T) -> str:
         before = await tester.begin()
-        one = await send(tester, speed)
+        direction = await tester.free_direction(before, 2 * speed * seconds)
+        one = await send(tester, direction * speed)
         await tester.pause(seconds)
         after = await tester.pose()
         await send(tester, 0.0)
@@ -119,8 +134,8 @@ def turns(
         turned = after.pitch - before.pitch
         text = f'turned {turned:.1f} deg in {seconds:g} s'
         if fastest < math.inf:
-            text = f'commanded {speed:g} deg/s, {text}'
-        if not fastest * speed * seconds < turned < slowest * speed * seconds:
+            text = f'commanded {direction * speed:g} deg/s, {text}'
+        if not slowest * speed * seconds < direction * turned < fastest * speed * seconds:
             raise Failed(text)
         return text
     return check
@@ -138,31 +153,51 @@ def information(cls: type[Information]) -> tuple[Requirement[GimbalTester], ...]
         if str(Limits.from_message(first)) != str(Limits.from_message(second)):
             raise Failed('two requests returned different limits or capabilities')
 
-    @requirement('limits', 'reports a minimum that is at most the maximum of each axis',
+    @requirement('limits', 'reports a range of each axis whose ends are in order, and in rad',
                  MESSAGES, cls.name)
     async def limits(tester: GimbalTester) -> str:
-        *ranges, _ = await tester.limits()
-        if wrong := [f'{low:g} to {high:g} deg' for low, high in ranges if low > high]:
-            raise Failed(', '.join(wrong))
-        return ', '.join(f'{low:g} to {high:g}' for low, high in ranges) + ' deg'
+        found = await tester.limits()
+        ranges = dict(zip(AXES, (found.roll, found.pitch, found.yaw), strict=True))
+        failures = [
+            f'{axis} {math.radians(low):g} to {math.radians(high):g} rad: {reason}'
+            for axis, (low, high) in ranges.items() if (reason := _implausible(axis, low, high))]
+        if failures:
+            raise Failed('; '.join(failures))
+        return ', '.join(f'{low:g} to {high:g}' for low, high in ranges.values()) + ' deg'
 
-    @requirement('pitch-axis', 'can turn about its pitch axis', PROPOSAL, 'Gimbals (GM-1)')
+    @requirement('pitch-axis', 'reports a pitch axis, if it reports a range of its pitch',
+                 PROPOSAL, 'Gimbals (GM-1)')
     async def pitch_axis(tester: GimbalTester) -> None:
-        capabilities = (await tester.limits()).capabilities
-        if not capabilities & Capabilities.HAS_PITCH_AXIS:
-            raise Failed(f'{cls.name} has the capabilities 0x{capabilities:x}')
+        found = await tester.limits()
+        if not found.capabilities & Capabilities.HAS_PITCH_AXIS:
+            text = f'{cls.name} has the capabilities 0x{found.capabilities:x}'
+            raise Failed(text) if found.pitch.low < found.pitch.high else Skipped(text)
 
     return static, limits, pitch_axis
 
 
+def _implausible(axis: str, low: float, high: float) -> str:
+    """Return why a range, degrees, cannot be right, '' if it can; an unknown end is NaN."""
+    if low > high:
+        return 'the minimum is above the maximum'
+    turns = MAX_TURNS if axis == 'yaw' else 1
+    is_far = any(turns * 360.0 < abs(end) < math.inf for end in (low, high))
+    return f'more than {"one turn" if turns == 1 else f"{turns} turns"}, so in degrees?' if (
+        is_far) else ''
+
+
 def command_int(cls: type[Message]) -> Requirement[GimbalTester]:
     """Return the requirement on COMMAND_INT, with a request of a message."""
-    @requirement('command-int', 'answers COMMAND_INT, at least with MAV_RESULT_COMMAND_LONG_ONLY',
+    @requirement('command-int', 'executes a command as COMMAND_INT, if it takes that message',
                  COMMAND, 'Use COMMAND_INT or COMMAND_LONG?')
     async def check(tester: GimbalTester) -> str:
-        one = await tester.session.command(MavCmd.REQUEST_MESSAGE, cls.id, as_int=True)
-        if one.result in (None, MavResult.UNSUPPORTED):
-            raise one.failure()
+        session = tester.session
+        before = session.received(cls).total
+        one = await session.command(MavCmd.REQUEST_MESSAGE, cls.id, as_int=True)
+        check_command_int(one)
+        if one.accepted and not await session.runner.until(
+                lambda: session.received(cls).total > before, REQUEST_TIMEOUT):
+            raise Failed(f'COMMAND_INT {one.text}: {one.answer}, but no {cls.name}', one.lines)
         return one.answer
     return check
 
@@ -194,8 +229,9 @@ def _content(status: AttitudeStatus) -> str:
 
 def _frame(status: AttitudeStatus) -> str:
     found = status.flags & FRAMES
-    return '' if found not in (0, FRAMES) else f'flags 0x{status.flags:x} name ' + (
-        'both frames' if found else 'no frame')
+    if not found:
+        raise Skipped(f'flags 0x{status.flags:x} name no frame, as those of old devices')
+    return f'flags 0x{status.flags:x} name both frames' if found == FRAMES else ''
 
 
 CONTENT = (
@@ -211,11 +247,11 @@ async def continuous(tester: GimbalTester) -> str:
     received = list(tester.session.received(AttitudeStatus))
     failures, count = [], 0
     for (before, one), (at, other) in pairwise(received):
-        speeds = [math.hypot(*(rate for rate in (
+        speeds = [math.hypot(
             status.angular_velocity_x, status.angular_velocity_y, status.angular_velocity_z)
-            if math.isfinite(rate))) for status in (one, other)]
-        # Without rates the statuses do not say how far the gimbal turned.
-        if not any(math.isfinite(status.angular_velocity_y) for status in (one, other)):
+            for status in (one, other)]
+        # Without the rate of each axis the statuses do not say how far the gimbal turned.
+        if any(map(math.isnan, speeds)):
             continue
         if _content(one) or _content(other) or other.time_boot_ms < one.time_boot_ms:
             continue
@@ -251,8 +287,8 @@ async def uptime(tester: GimbalTester) -> None:
 @requirement('failures-at-rest', 'reports no failure before the first command', MESSAGES,
              'GIMBAL_DEVICE_ERROR_FLAGS')
 async def failures_at_rest(tester: GimbalTester) -> None:
-    """Read the flags; a device may report that it has no manager."""
-    seen = {one.failure_flags & ~ErrorFlags.NO_MANAGER
+    """Read the flags, except those of normal operation."""
+    seen = {one.failure_flags & ~NO_FAILURES
             for _, one in tester.session.idle(AttitudeStatus)}
     if flags := [str(flag.name) for flag in ErrorFlags if any(one & flag for one in seen)]:
         raise Failed(', '.join(flags))
@@ -264,40 +300,48 @@ async def failures_at_rest(tester: GimbalTester) -> None:
 
 @moves('stop', 'stops at a rate of 0', MESSAGES, 'GIMBAL_DEVICE_SET_ATTITUDE')
 async def stop(tester: GimbalTester) -> None:
-    """Turn down, then send a rate of 0."""
-    await tester.begin()
-    await tester.point(None, rates=(NAN, -RATE, NAN))
+    """Turn down or up, then send a rate of 0."""
+    direction = await tester.free_direction(await tester.begin(), 2 * RATE)
+    await tester.point(None, rates=(NAN, direction * RATE, NAN))
     await tester.pause(0.8)
     await tester.point(None, rates=(NAN, 0.0, NAN))
     await tester.pause(0.5)
     await tester.stays(await tester.steady(), 'after a rate of 0')
 
 
-def _beyond(found: Limits) -> tuple[float, float]:
-    low, high = found.pitch
+async def _end_of_pitch(tester: GimbalTester) -> tuple[int, float, float]:
+    """
+    Return an end of the range of pitch, and a pitch to command, degrees.
+
+    :return: 1 for the upper end, or -1 for the lower one; the end; a pitch beyond it, or else the
+        steepest one.
+    """
+    await tester.requires(Capabilities.HAS_PITCH_AXIS)
+    low, high = (await tester.limits()).pitch
     if not (math.isfinite(low) and math.isfinite(high)):
         raise Skipped('it does not report the range of its pitch')
-    # A quaternion cannot have a pitch beyond the singular pitch of 90 degrees.
-    if high <= 75.0:
-        return high, high + STEP
-    if low >= -75.0:
-        return low, low - STEP
-    raise Skipped('its pitch has a range that a quaternion cannot exceed')
+    if high > STEEP and low >= -STEEP:
+        return -1, low, low - STEP
+    return 1, high, STEEP if high > STEEP else high + STEP
 
 
 @moves('range', 'keeps within the range that it reports', MESSAGES, 'GIMBAL_DEVICE_INFORMATION')
 async def within_range(tester: GimbalTester) -> str:
-    """Command a pitch beyond the range."""
-    limit, beyond = _beyond(await tester.limits())
+    """Command a pitch beyond the range, or the steepest one in it."""
+    sign, limit, commanded = await _end_of_pitch(tester)
     start = await tester.begin()
-    target = replace(start, roll=0.0, pitch=beyond)
-    await tester.point(target)
-    reached = await tester.until(lambda pose: abs(pose.pitch - limit) < 0.5)
+    await tester.point(replace(start, roll=0.0, pitch=commanded))
+    await tester.until(lambda pose: abs(pose.pitch - limit) < 0.5)
     await tester.pause(0.5)
     reached = await tester.pose()
-    if abs(reached.pitch) > abs(limit) + TOLERANCE and reached.pitch * limit > 0:
-        raise Failed(f'commanded {beyond:g} deg, and it turned to {reached.pitch:.1f} deg; its '
-                     f'limit is {limit:.1f} deg')
+    text = f'commanded {commanded:.1f} deg, turned to {reached.pitch:.1f} deg'
+    beyond = sign * (reached.pitch - limit)
+    if beyond > TOLERANCE:
+        raise Failed(f'{text}; its limit is {limit:.1f} deg')
+    if reached.failures & ErrorFlags.AT_PITCH_LIMIT and beyond < -FAR_FROM_LIMIT:
+        raise Failed(f'{text}, and reports AT_PITCH_LIMIT; its limit is {limit:.1f} deg')
+    if sign * (commanded - limit) <= 0:
+        raise Skipped(f'{text}: {UNREACHABLE}')
     return f'{reached.pitch:.1f} deg'
 
 
@@ -305,14 +349,17 @@ async def within_range(tester: GimbalTester) -> str:
        'GIMBAL_DEVICE_ERROR_FLAGS')
 async def limit_flags(tester: GimbalTester) -> None:
     """Command a pitch beyond the range, and wait for AT_PITCH_LIMIT."""
-    limit, beyond = _beyond(await tester.limits())
+    sign, limit, commanded = await _end_of_pitch(tester)
+    if sign * (commanded - limit) <= 0:
+        raise Skipped(UNREACHABLE)
     start = await tester.begin()
-    await tester.point(replace(start, roll=0.0, pitch=beyond))
-    pose = await tester.until(lambda pose: bool(pose.failures & ErrorFlags.AT_PITCH_LIMIT))
+    await tester.point(replace(start, roll=0.0, pitch=commanded))
+    pose = await tester.until(lambda pose: bool(
+        pose.failures & ErrorFlags.AT_PITCH_LIMIT) and abs(pose.pitch - limit) <= TOLERANCE)
     if abs(pose.pitch - limit) > TOLERANCE:
         raise Skipped(f'its pitch is {pose.pitch:.1f} deg, and its limit {limit:.1f} deg')
     if not pose.failures & ErrorFlags.AT_PITCH_LIMIT:
-        raise Failed(f'commanded {beyond:.1f} deg, stopped at {pose.pitch:.1f} deg, no '
+        raise Failed(f'commanded {commanded:.1f} deg, stopped at {pose.pitch:.1f} deg, no '
                      'AT_PITCH_LIMIT')
 
 
@@ -339,7 +386,7 @@ MOTION: tuple[AnyRequirement, ...] = (
             'GIMBAL_DEVICE_SET_ATTITUDE', 'a setpoint of NaN',
             lambda tester, pose: tester.point(None)),
     turns('rate', 'turns at a rate', MESSAGES, 'GIMBAL_DEVICE_SET_ATTITUDE',
-          lambda tester, speed: tester.point(None, rates=(NAN, speed, NAN)), -RATE,
+          lambda tester, speed: tester.point(None, rates=(NAN, speed, NAN)), RATE,
           seconds=1.5, slowest=1 / 3, fastest=2.0),
     stop, within_range, limit_flags, *POSITIONS)
 

@@ -23,6 +23,7 @@ from __future__ import annotations
 
 from collections.abc import AsyncIterator
 import contextlib
+from dataclasses import replace
 import math
 
 from . import attitude
@@ -71,6 +72,8 @@ ANNOUNCE_INTERVAL = 0.4
 # MAV_COMP_ID_ONBOARD_COMPUTER
 MANAGER_ID = 191
 VEHICLE_FRAME = MountFlags.YAW_IN_VEHICLE_FRAME
+# ESTIMATOR_STATUS_FLAGS: only the attitude of the vehicle is valid.
+ESTIMATOR_ATTITUDE = 1
 
 
 class DeviceTester(GimbalTester):
@@ -102,8 +105,8 @@ class DeviceTester(GimbalTester):
         if self.heading is not None:
             q = Quaternion.from_euler(0.0, 0.0, math.radians(self.heading))
             self.session.send(gimbal.AutopilotStateForGimbalDevice(
-                *self.session.device, int(self.session.now * 1e6), q, 0, NAN, NAN, NAN, 0, NAN, 0,
-                0, 1e-5), manager)
+                *self.session.device, int(self.session.now * 1e6), q, 0, NAN, NAN, NAN, 0, NAN,
+                ESTIMATOR_ATTITUDE, 0, 1e-5), manager)
 
     async def prepare(self) -> None:
         """See :class:`GimbalTester`."""
@@ -207,17 +210,30 @@ async def _point_others(tester: DeviceTester, pose: Pose) -> None:
 
 @contextlib.asynccontextmanager
 async def _heading(tester: DeviceTester, heading: float) -> AsyncIterator[None]:
-    """Send a heading of the vehicle, degrees, during the context."""
+    """
+    Send a heading of the vehicle, degrees, during the context.
+
+    :raises Skipped: if the device lacks a yaw axis, or does not use the heading.
+    """
     await tester.requires(Capabilities.SUPPORTS_YAW_IN_EARTH_FRAME)
+    await tester.requires(Capabilities.HAS_YAW_AXIS)
     if any(not math.isnan(one.delta_yaw) for _, one in tester.session.idle(AttitudeStatus)):
         raise Skipped('another component sends it a heading')
     await tester.begin()
     tester.heading = heading
     try:
         await tester.pause(2 * ANNOUNCE_INTERVAL)
+        pose = await tester.pose()
+        if not pose.flags & MountFlags.ACCEPTS_YAW_IN_EARTH_FRAME:
+            raise Skipped('it does not report ACCEPTS_YAW_IN_EARTH_FRAME')
+        if abs(math.remainder(pose.heading - heading, 360.0)) > TOLERANCE:
+            raise Skipped(f'it was sent a heading of {heading:g} deg, and reports '
+                          f'{pose.heading:.1f} deg')
         yield
     finally:
         tester.heading = None
+        # End a lock, in which the yaw of an old device cannot be read without the heading.
+        await tester.point(None)
 
 
 @moves('earth-frame', 'takes and reports yaw relative to north (GM-2)', MESSAGES,
@@ -225,13 +241,15 @@ async def _heading(tester: DeviceTester, heading: float) -> AsyncIterator[None]:
 async def earth_frame(tester: DeviceTester) -> str:
     """Send a heading of 40 degrees, and command a yaw of 55 degrees."""
     async with _heading(tester, 40.0):
-        await tester.point(Pose(0.0, -STEP, 40.0 + STEP),
+        target = await tester.target(-STEP, STEP)
+        commanded = 40.0 + target.yaw
+        await tester.point(replace(target, yaw=commanded),
                            flags=LEVEL | MountFlags.YAW_IN_EARTH_FRAME)
-        target = Pose(0.0, -STEP, STEP)
         pose = await tester.settle(target)
         (yaw,) = earth_yaw([pose])
-        if not pose.near(target) or not abs(yaw - 40.0 - STEP) < TOLERANCE:
-            raise Failed(f'commanded {40.0 + STEP:g} deg from north at a heading of 40 deg: it '
+        # A device need not know the heading.
+        if not pose.near(target) or abs(yaw - commanded) > TOLERANCE:
+            raise Failed(f'commanded {commanded:g} deg from north at a heading of 40 deg: it '
                          f'reports {pose}, {yaw:.1f} deg from north')
         return f'{yaw:.1f} deg from north'
 
@@ -239,15 +257,19 @@ async def earth_frame(tester: DeviceTester) -> str:
 @moves('yaw-lock', 'holds a locked yaw against north while the vehicle turns (GM-3)', MESSAGES,
        'GIMBAL_DEVICE_FLAGS')
 async def yaw_lock(tester: DeviceTester) -> str:
-    """Lock the yaw straight ahead, then turn the vehicle."""
+    """Lock the yaw straight ahead, then send the heading of a vehicle that turns."""
     await tester.requires(Capabilities.HAS_YAW_LOCK)
     async with _heading(tester, 40.0):
-        await tester.point(Pose(0.0, -STEP, 0.0),
-                           flags=LEVEL | MountFlags.YAW_LOCK | VEHICLE_FRAME)
+        start, target = await tester.target(-STEP, 0.0), await tester.target(-STEP, -STEP)
+        await tester.point(start, flags=LEVEL | MountFlags.YAW_LOCK | VEHICLE_FRAME)
         await tester.pause(0.5)
+        pose = await tester.until(lambda pose: bool(pose.flags & MountFlags.YAW_LOCK), 1.5)
+        if not pose.flags & MountFlags.YAW_LOCK:
+            raise Failed(f'flags 0x{pose.flags:x} without YAW_LOCK')
         tester.heading = 40.0 + STEP
-        target = Pose(0.0, -STEP, -STEP)
         pose = await tester.settle(target)
+        if pose.near(start) and not start.near(target):
+            raise Skipped('it did not turn; the vehicle did not, either')
         if not pose.near(target):
             raise Failed(f'the vehicle turned by {STEP:g} deg, and it reports {pose}')
         return str(pose)
@@ -259,7 +281,8 @@ REQUIREMENTS: tuple[Requirement[DeviceTester], ...] = (
     component.heartbeat_type(gimbal.MAV_TYPE_GIMBAL, 'GIMBAL', 'a gimbal'),
     component.heartbeat_autopilot, component.address,
     component.status_stream(AttitudeStatus, GIMBAL, 'Gimbal Device Broadcast/Status Messages'),
-    component.sent_on_request('status-request', AttitudeStatus, MESSAGES, attitude.STATUS),
+    component.sent_on_request(
+        'status-request', AttitudeStatus, MESSAGES, attitude.STATUS, optional=True),
     attitude.failures_at_rest, north_needs_heading,
     component.sent_on_request('information', INFORMATION, GIMBAL, 'Discovery of Gimbal Device'),
     *attitude.information(INFORMATION), device_id,
@@ -279,7 +302,7 @@ REQUIREMENTS: tuple[Requirement[DeviceTester], ...] = (
             _send_to_manager),
     ignores('other-target', 'ignores setpoints for other components and systems', ROUTING,
             'Routing Detail', 'setpoints for other addresses', _point_others),
-    *component.interval_requirements(AttitudeStatus, optional=True),
+    *component.interval_requirements(AttitudeStatus),
     component.heartbeat_rate, *attitude.CONTENT, status_to_all, attitude.continuous,
     attitude.uptime, *component.ACKNOWLEDGEMENTS, component.checksums,
 )

@@ -47,7 +47,13 @@ from .tester import (
 from .. import messages as gimbal
 from ..axes import LEVEL
 from ..messages import Capabilities, GimbalCommand, NO_COMPONENT
-from ...mavlink.messages import Address, MAV_COMP_ID_AUTOPILOT1, Message, time_boot_ms
+from ...mavlink.messages import (
+    Address,
+    MAV_COMP_ID_AUTOPILOT1,
+    MavResult,
+    Message,
+    time_boot_ms,
+)
 from ...payload.checks import component_requirements as component
 from ...payload.checks.requirement import (
     Conditions,
@@ -142,9 +148,14 @@ class ManagerTester(GimbalTester):
         """Take primary control; the second player releases any control that it has."""
         if self.other in await self.control():
             await self.configure(-3.0, -3.0, -3.0, -3.0, source=self.other)
-        if (await self.control())[0] != self.session.address:
-            await self.configure(*self.session.address, *NO_COMPONENT)
+        own = self.session.address
+        if (await self.control())[0] != own:
+            one = await self.configure(*own, *NO_COMPONENT)
             await self.pause(0.3)
+            holder = (await self.control())[0]
+            # The holder must consent (GM-17), or any component may take control.
+            if not one.accepted and holder not in (own, self.other, NO_COMPONENT):
+                raise Skipped(f'{one.answer}: {holder} keeps primary control')
 
     async def pause(self, seconds: float) -> None:
         """See :class:`GimbalTester`."""
@@ -223,10 +234,8 @@ class ManagerTester(GimbalTester):
              'its INFORMATION (GM-27)', GIMBAL, 'Mapping from Gimbal Managers to Gimbal Devices')
 async def same_device(tester: ManagerTester) -> str:
     """Compare the ids."""
-    information = await tester.session.request(INFORMATION)
-    status = await tester.session.request(MANAGER_STATUS)
-    if information is None or status is None:
-        raise Skipped('INFORMATION or STATUS was not received')
+    information = await tester.session.required(INFORMATION)
+    status = await tester.newest(MANAGER_STATUS, 'its gimbal device')
     found = {information.gimbal_device_id, status.gimbal_device_id}
     if len(found) != 1 or 0 in found:
         raise Failed(f'gimbal_device_id {information.gimbal_device_id} in INFORMATION, '
@@ -361,6 +370,7 @@ async def _point_other_device(tester: ManagerTester, pose: Pose) -> Transaction:
 @moves('earth-frame', 'takes yaw relative to north (GM-2)', MESSAGES, 'GIMBAL_MANAGER_FLAGS')
 async def earth_frame(tester: ManagerTester) -> str:
     """Command a yaw relative to north without locking it."""
+    await tester.requires(Capabilities.SUPPORTS_YAW_IN_EARTH_FRAME)
     start = await tester.begin()
     if not abs(start.heading) > 2 * TOLERANCE:
         raise Skipped('it does not report delta_yaw' if math.isnan(start.heading) else
@@ -416,11 +426,16 @@ async def roi(tester: ManagerTester) -> str:
         one = await session.command(
             GimbalCommand.DO_SET_ROI_LOCATION, tester.device_id, 0.0, 0.0, 0.0, *PLACE,
             as_int=True)
+        if one.result in (None, MavResult.UNSUPPORTED, MavResult.COMMAND_LONG_ONLY):
+            latitude, longitude, altitude = PLACE
+            one = await session.command(
+                GimbalCommand.DO_SET_ROI_LOCATION, tester.device_id, 0.0, 0.0, 0.0,
+                latitude / 1e7, longitude / 1e7, altitude)
         if not one.accepted and tester.vehicle is None:
             raise Skipped(f'{one.answer}: the position of the vehicle may be unknown')
         one.expect(accepted=True)
         if tester.vehicle is not None:
-            await tester.reach(NORTH)
+            await tester.reach(await tester.target(NORTH.pitch, NORTH.yaw))
         pose = await tester.pose()
         one = await session.command(GimbalCommand.DO_SET_ROI_NONE, tester.device_id)
         one.expect(accepted=True)
@@ -432,7 +447,8 @@ async def roi(tester: ManagerTester) -> str:
 REQUIREMENTS: tuple[Requirement[ManagerTester], ...] = (
     component.heartbeat, component.address,
     component.status_stream(MANAGER_STATUS, GIMBAL, 'Gimbal Manager Status'),
-    component.sent_on_request('status-request', MANAGER_STATUS, MESSAGES, MANAGER_STATUS.name),
+    component.sent_on_request(
+        'status-request', MANAGER_STATUS, MESSAGES, MANAGER_STATUS.name, optional=True),
     attitude.failures_at_rest,
     component.sent_on_request('information', INFORMATION, GIMBAL, 'Discovery of Gimbal Manager'),
     *attitude.information(INFORMATION), same_device, attitude_stream,
@@ -454,14 +470,14 @@ REQUIREMENTS: tuple[Requirement[ManagerTester], ...] = (
             lambda tester, pose: tester.pitchyaw(pose.pitch, pose.yaw, NAN, NAN)),
     # A manager that reads this low rate as rad/s is detected and does no harm.
     turns('pitchyaw-rate', f'turns at rates in deg/s ({PITCHYAW_COMMAND})', MESSAGES,
-          PITCHYAW_COMMAND, lambda tester, speed: tester.pitchyaw(NAN, NAN, speed, 0.0), -2.0),
+          PITCHYAW_COMMAND, lambda tester, speed: tester.pitchyaw(NAN, NAN, speed, 0.0), 2.0),
     reaches('one-axis', f'changes one angle and keeps the other ({PITCHYAW_COMMAND})', MESSAGES,
             PITCHYAW_COMMAND, lambda tester, pose: tester.pitchyaw(pose.pitch, NAN, NAN, NAN),
             yaw=0.0),
     # A fifth of the full rate.
     turns('manual', 'turns by manual control (GIMBAL_MANAGER_SET_MANUAL_CONTROL)', GIMBAL,
           'Manual Gimbal Control using MAVLink', lambda tester, speed: tester.send(
-              gimbal.GimbalManagerSetManualControl, pitch_rate=speed / 10, yaw_rate=0.0), -2.0,
+              gimbal.GimbalManagerSetManualControl, pitch_rate=speed / 10, yaw_rate=0.0), 2.0,
           fastest=math.inf),
     earth_frame, flags_shown, roi,
     ignores('no-control-command', f'rejects {PITCHYAW_COMMAND} of a component without control '
@@ -476,7 +492,7 @@ REQUIREMENTS: tuple[Requirement[ManagerTester], ...] = (
             GIMBAL, ADDRESSING, 'setpoints for another gimbal device', _point_other_device),
     reaches('all-devices', 'treats gimbal device 0 as all of its gimbals (GM-28)', GIMBAL,
             ADDRESSING, lambda tester, pose: tester.point(pose, device_id=0)),
-    other_target, *component.interval_requirements(MANAGER_STATUS, optional=True),
+    other_target, *component.interval_requirements(MANAGER_STATUS),
     component.heartbeat_rate, *attitude.CONTENT, attitude.continuous, attitude.uptime,
     *component.ACKNOWLEDGEMENTS, component.checksums,
 )

@@ -30,7 +30,13 @@ from ...payload.checks.component_requirements import restore_interval
 from ...payload.checks.requirement import Conditions, Specification
 from ...payload.checks.session import Failed, Session, Skipped
 from ...payload.messages import GimbalDeviceAttitudeStatus as AttitudeStatus
-from ...payload.mount_attitude import MountFlags, UNSET_VECTOR, yaw_frame, YawFrame
+from ...payload.mount_attitude import (
+    MountFlags,
+    names_frame,
+    UNSET_VECTOR,
+    yaw_frame,
+    YawFrame,
+)
 from ...payload.rotation import Quaternion
 
 GIMBAL = Specification('gimbal protocol v2', 'https://mavlink.io/en/services/gimbal_v2.html')
@@ -79,12 +85,14 @@ class Pose:
         :raises ValueError: if it has no attitude relative to the vehicle.
         """
         roll, pitch, yaw = Quaternion(*message.q).normalized().euler()
+        # A receiver must ignore delta_yaw if the status names no frame.
+        heading = message.delta_yaw if names_frame(message.flags) else NAN
         if yaw_frame(message.flags) is YawFrame.EARTH:
-            yaw = math.remainder(yaw - message.delta_yaw, math.tau)
+            yaw = math.remainder(yaw - heading, math.tau)
         if math.isnan(yaw):
             raise ValueError('yaw is relative to north, and delta_yaw is not known')
         return cls(math.degrees(roll), math.degrees(pitch), math.degrees(yaw), message.flags,
-                   message.failure_flags, math.degrees(message.delta_yaw))
+                   message.failure_flags, math.degrees(heading))
 
     def near(self, other: Pose, tolerance: float = TOLERANCE) -> bool:
         """Return whether another pose is the same within a tolerance, degrees."""
@@ -271,12 +279,37 @@ class GimbalTester(ABC):
             if limits.capabilities & Capabilities.HAS_YAW_AXIS else now.yaw)
 
     async def begin(self) -> Pose:
-        """Turn the gimbal to the pose from which checks start; return the pose that it reaches."""
+        """
+        Turn the gimbal to the pose from which checks start; return the pose that it reaches.
+
+        :raises Skipped: if radio control alone turns it.
+        """
         await self.prepare()
-        start = await self.target(-STEP, 0.0)
-        if not start.near(await self.pose()):
+        start, now = await self.target(-STEP, 0.0), await self.pose()
+        if now.flags & MountFlags.RC_EXCLUSIVE:
+            raise Skipped('it reports RC_EXCLUSIVE, so it ignores setpoints')
+        if not start.near(now):
             await self.point(start)
         return await self.until(start.near)
+
+    async def free_direction(self, pose: Pose, angle: float) -> int:
+        """
+        Return the direction in which the pitch can turn by an angle: -1, or else 1 for up.
+
+        :raises Skipped: if there is none.
+        """
+        try:
+            _, (low, high), _, capabilities = await self.limits()
+        except Skipped:
+            return -1
+        if not capabilities & Capabilities.HAS_PITCH_AXIS:
+            raise Skipped('it does not have HAS_PITCH_AXIS')
+        # An unknown end is NaN.
+        if not pose.pitch - angle < low:
+            return -1
+        if not pose.pitch + angle > high:
+            return 1
+        raise Skipped(f'its pitch cannot turn by {angle:g} deg')
 
     async def stays(self, before: Pose, cause: str) -> None:
         """Raise Failed if the gimbal moves within :data:`WATCH_TIME`."""

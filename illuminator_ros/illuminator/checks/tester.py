@@ -20,11 +20,20 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 from ..messages import IlluminatorStatus
-from ..model import Configuration, DIMMING_FLAGS, flag_names, Mode, NOTHING, shortest, Status
+from ..model import (
+    Configuration,
+    DIMMING_FLAGS,
+    flag_names,
+    Mode,
+    NOTHING,
+    shortest,
+    Status,
+    unexpected_differences,
+)
 from ...mavlink.messages import MavCmd, MavResult
 from ...payload.checks.component_requirements import restore_interval
 from ...payload.checks.requirement import Conditions, NOT_AGREED, Specification
-from ...payload.checks.session import Failed, MESSAGE_TIMEOUT, Session, Skipped, Transaction
+from ...payload.checks.session import Failed, Session, Skipped, Transaction
 
 ILLUMINATOR = Specification(
     'illuminator protocol', 'https://mavlink.io/en/services/illuminator.html')
@@ -35,6 +44,10 @@ DIM = 20.0
 ON_OFF, CONFIGURE = MavCmd.ILLUMINATOR_ON_OFF, MavCmd.DO_ILLUMINATOR_CONFIGURE
 # s to wait for a status of the stream if the light sends none on request.
 STREAM_TIMEOUT = 2.5
+# s from an acknowledgement to the status that shows the change: a light may fade.
+CHANGE_TIMEOUT = 3.0
+# %; the protocol does not limit the steps in which a light is dimmed.
+BRIGHTNESS_STEP = 5.0
 
 
 def status_text(status: Status) -> str:
@@ -55,8 +68,16 @@ def differences(asked: Configuration, status: Status) -> list[str]:
     if not status.complete:
         return [text.split()[0] for text in status.invalid]
     shown = status.configuration(NOTHING)
-    dimmed = status.error_flags & DIMMING_FLAGS and shown.brightness < asked.brightness
-    return [name for name in asked.differences(shown) if name != 'brightness' or not dimmed]
+    names = unexpected_differences(asked, shown, status.error_flags, step=True)
+    if abs(shown.brightness - asked.brightness) <= BRIGHTNESS_STEP:
+        names = [name for name in names if name != 'brightness']
+    # A period of 0, and a duty cycle of 0 or 100 %, mean the same: no strobe.
+    return names if _strobes(asked) or _strobes(shown) else [
+        name for name in names if not name.startswith('strobe_')]
+
+
+def _strobes(one: Configuration) -> bool:
+    return one.strobe_period > 0 and 0 < one.strobe_duty_cycle < 100
 
 
 def same(one: Status, other: Status) -> bool:
@@ -130,21 +151,22 @@ class LightTester:
     async def _compared(self, one: Transaction, differ: Callable[[Status], list[str]]) -> Change:
         if not one.accepted:
             return Change(one)
-        session = self.session
-        mark, since = session.log.total, session.now
-        while True:
-            status = await self.status()
-            not_shown = [] if status is None else differ(status)
-            if status is None or not not_shown:
-                return Change(one)
-            if session.now - since >= MESSAGE_TIMEOUT:
-                break
-            await session.runner.sleep(0.1)
+        mark = self.session.log.total
+        status = await self._after_change(differ)
+        if status is None or not (not_shown := differ(status)):
+            return Change(one)
         self.disagreements.append(Failed(
             f'{one.text}: {one.answer}, but then the status differs in '
             f'{" and ".join(not_shown)}: {status_text(status)}',
-            one.lines + session.log.since(mark)[-3:]))
+            one.lines + self.session.log.since(mark)[-3:]))
         return Change(one, tuple(not_shown), self.disagreements[-1])
+
+    async def _after_change(self, differ: Callable[[Status], list[str]]) -> Status | None:
+        """Return the first status that shows a change, or the last before CHANGE_TIMEOUT."""
+        end = self.session.now + CHANGE_TIMEOUT
+        while (status := await self.status()) and differ(status) and self.session.now < end:
+            await self.session.runner.sleep(0.1)
+        return status
 
     async def rejected(self, command: int, *params: float) -> Failed | None:
         """Send a command that must be rejected; return a failure unless the result is DENIED."""
@@ -171,8 +193,9 @@ class LightTester:
             await self._switch_off()
             status = await self.status()
         if status is None or differences(low, status):
-            await self.session.command(CONFIGURE, *low.params())
-            status = await self.status()
+            one = await self.session.command(CONFIGURE, *low.params())
+            status = await (self._after_change(lambda status: differences(low, status))
+                            if one.accepted else self.status())
         if status is not None and status.enabled:
             # A brightness above 0 switches some lights on.
             await self._switch_off()

@@ -34,9 +34,9 @@ from .requirement import (
     Specification,
     Tester,
 )
-from .session import fail_if, Failed, Session, Skipped, Transaction
+from .session import fail_if, Failed, REJECTIONS, Session, Skipped, Transaction
 from ...mavlink import messages
-from ...mavlink.messages import Address, Heartbeat, MavCmd, MavResult, Message, result_name
+from ...mavlink.messages import Address, Heartbeat, MavCmd, MavResult, Message
 
 # s
 HEARTBEAT_TIMEOUT = 5.0
@@ -46,13 +46,14 @@ INTERVAL = 0.25
 WATCH_TIME = 2.5
 DEFAULT_TIMEOUT = 5.0
 PROMPT = 1.0
-FINISHED = 2.0
 # Not a MAV_CMD, and far from the range in which new commands are defined.
 UNKNOWN_COMMAND = 65000
 # HIL_STATE (90), which only a simulator sends.
 UNKNOWN_MESSAGE = 90
 # The most failures that are quoted.
 MAX_QUOTED = 3
+# Results with which a device leaves out an optional command or message.
+UNAVAILABLE = (MavResult.UNSUPPORTED, MavResult.DENIED)
 
 
 def periods(received: Iterable[tuple[float, object]]) -> list[float]:
@@ -142,18 +143,30 @@ def broadcast(status: type[Message]) -> Requirement[Tester]:
     return check
 
 
+def check_command_int(one: Transaction) -> None:
+    """Raise Skipped if a device does not take COMMAND_INT, which is optional."""
+    if not one.acks or one.result == MavResult.UNSUPPORTED:
+        raise Skipped(f'COMMAND_INT: {one.answer}; it may take COMMAND_LONG only')
+
+
 # Messages on request: the status, and the identity
 
 def sent_on_request(
     name: str, cls: type[Message], specification: Specification, section: str,
-    measurement: Callable[[Session], str] = lambda session: '',
+    measurement: Callable[[Session], str] = lambda session: '', *, optional: bool = False,
 ) -> Requirement[Tester]:
-    """Return the requirement that a device sends a message on request."""
+    """
+    Return the requirement that a device sends a message on request.
+
+    :param optional: whether a device may reject the request.
+    """
     @requirement(name, f'sends {cls.name} on request', specification, section)
     async def check(tester: Tester) -> str:
         session = tester.session
         before = session.received(cls).total
         one = await session.command(MavCmd.REQUEST_MESSAGE, cls.id)
+        if optional and one.result in UNAVAILABLE:
+            raise Skipped(one.answer)
         if not one.accepted:
             raise Failed(one.answer)
         if not await session.runner.until(
@@ -203,35 +216,38 @@ IDENTITY_STRINGS = (
 # The status stream, and its interval
 
 def status_stream(
-    status: type[Message], specification: Specification, section: str,
+    status: type[Message], specification: Specification, section: str, *, optional: bool = False,
 ) -> Requirement[Tester]:
-    """Return the requirement on the regularity of the status."""
+    """
+    Return the requirement on the regularity of the status.
+
+    :param optional: whether a device may send it on request only.
+    """
     @requirement('status-stream', f'sends {status.name} at a regular rate', specification,
                  section)
     async def check(tester: Tester) -> str:
         times = periods(tester.session.idle(status))
         if not times:
-            raise Failed('it sends at most one without a request')
+            text = 'it sends at most one without a request'
+            raise Skipped(text) if optional else Failed(text)
         if max(times) > 2 * median_high(times) + 0.1:
             raise Failed(f'irregular: intervals of {min(times):.2f} to {max(times):.2f} s')
         return f'every {median_high(times):.2f} s'
     return check
 
 
-def interval_requirements(
-    status: type[Message], *, optional: bool = False,
-) -> tuple[Requirement[Tester], ...]:
+def interval_requirements(status: type[Message]) -> tuple[Requirement[Tester], ...]:
     """
     Return the requirements ``interval``, ``interval-stop`` and ``interval-default``.
 
-    :param optional: whether a device may reject the command.
+    A device may reject the command.
     """
     on_interval = partial(requirement, specification=MESSAGES,
                           section='MAV_CMD_SET_MESSAGE_INTERVAL', changes=True)
 
     async def set_interval(tester: Tester, interval: float) -> None:
         one = await tester.session.command(MavCmd.SET_MESSAGE_INTERVAL, status.id, interval)
-        if optional and one.result in (MavResult.UNSUPPORTED, MavResult.DENIED):
+        if one.result in UNAVAILABLE:
             raise Skipped(one.answer)
         one.expect(accepted=True)
 
@@ -368,15 +384,13 @@ def _unfinished(one: Transaction, own: Address) -> str:
         return ''
     if not one.finals:
         return 'never'
-    if (seconds := one.finals[-1].at - one.sent[0]) > FINISHED:
-        return f'after {seconds:.1f} s'
     return 'progress above 100 %' if any(100 < ack.progress < 255 for ack in reports) else ''
 
 
 def _busy(one: Transaction, own: Address) -> str:
     # The session never sends commands in parallel.
-    return ', '.join(result_name(ack.result) for ack in one.acks
-                     if ack.result == MavResult.TEMPORARILY_REJECTED)
+    return (f'{one.answer} at each of {one.rejections} attempts'
+            if one.rejections == REJECTIONS else '')
 
 
 ACKNOWLEDGEMENTS = (
@@ -389,10 +403,10 @@ ACKNOWLEDGEMENTS = (
                       f', the slowest {max(map(_delay, every)) * 1000:.0f} ms'),
     _for_each_command('acknowledged-to-us', 'addresses acknowledgements to the sender, or leaves '
                       'their target 0', 'Message/Enum Summary', _to_others),
-    _for_each_command('finished', f'completes every change within {FINISHED:g} s',
+    _for_each_command('finished', 'ends every command whose progress it reports with a result',
                       'Long Running Commands', _unfinished),
-    _for_each_command('not-busy', 'never rejects a command temporarily while it is idle',
-                      'Long Running Commands', _busy),
+    _for_each_command('not-busy', 'takes a command that it rejected temporarily when it is '
+                      'repeated', 'Long Running Commands', _busy),
 )
 
 

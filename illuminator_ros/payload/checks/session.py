@@ -46,7 +46,6 @@ M = TypeVar('M', bound=Message)
 
 # s
 ACK_TIMEOUT = 3.0
-PROGRESS_TIMEOUT = 4.0
 PROGRESS_LIMIT = 15.0
 MESSAGE_TIMEOUT = 1.0
 # s after a final acknowledgement, so that a duplicate is not assigned to the next command.
@@ -54,14 +53,14 @@ SETTLE_TIME = 0.05
 # s; the time for which an answer that must not come is awaited.
 NO_ANSWER_TIME = 0.7
 LOST_TIMEOUT = 5.0
-REJECTION_PAUSE = 0.3
+REJECTION_PAUSE = 0.5
 DISCOVERY_INTERVAL = 1.0
 
 ATTEMPTS = 4
 # After so many commands without any acknowledgement each is sent once, and its answer awaited for
 # MESSAGE_TIMEOUT: with a device that receives nothing a run would take 40 minutes.
 UNANSWERED = 4
-REJECTIONS = 12
+REJECTIONS = 20
 # The most entries that are kept of each record, and acknowledgements of one command.
 MAX_ENTRIES = 10_000
 MAX_ACKS = 400
@@ -230,6 +229,7 @@ class Transaction:
     One command with its acknowledgements.
 
     :param expected: whether every device must acknowledge this command.
+    :ivar rejections: how often it was rejected temporarily without another result.
     :ivar sent: time of each attempt, s.
     :ivar lines: the lines of the session's log about this command.
     """
@@ -237,6 +237,7 @@ class Transaction:
     command: int
     params: tuple[float, ...]
     expected: bool
+    rejections: int = 0
     sent: list[float] = field(default_factory=list)
     acks: list[Ack] = field(default_factory=list)
     lines: list[str] = field(default_factory=list)
@@ -543,7 +544,9 @@ class Session(Endpoint):
         is_deaf = len(self.transactions) >= UNANSWERED and not any(
             one.acks for one in self.transactions)
         attempts, timeout = (1, MESSAGE_TIMEOUT) if is_deaf else (ATTEMPTS, ACK_TIMEOUT)
-        for _ in range(REJECTIONS):
+        # A device that has rejected a command temporarily so often is not waited for again.
+        is_stuck = any(one.rejections == REJECTIONS for one in self.transactions)
+        for rejections in range(1, 2 if is_stuck else REJECTIONS + 1):
             # Separate requirements cover COMMAND_INT and other addresses.
             one = self._begin(
                 command, params, expected=not as_int and target is None and source is None)
@@ -555,6 +558,7 @@ class Session(Endpoint):
                 self.check_presence()
             if one.result != MavResult.TEMPORARILY_REJECTED:
                 break
+            one.rejections = rejections
             await self.runner.sleep(REJECTION_PAUSE)
         return one
 
@@ -609,12 +613,11 @@ class Session(Endpoint):
         return await self.runner.until(lambda: len(one.acks) > before, timeout)
 
     async def _answered(self, one: Transaction, timeout: float) -> bool:
-        """Wait for the result of an attempt, longer while progress is reported."""
-        until = self.now + PROGRESS_LIMIT
-        while not one.finals and self.now < until:
-            if not await self._acknowledged(one, timeout):
-                return False
-            timeout = PROGRESS_TIMEOUT
+        """Wait for the result of an attempt; return whether the device has received it."""
+        if not await self._acknowledged(one, timeout):
+            return False
+        # After a report of progress the command must not be sent again.
+        await self.runner.until(lambda: one.finals, PROGRESS_LIMIT)
         # A late acknowledgement must not be assigned to the next command.
         if len(one.sent) > 1:
             await self.runner.until(lambda: len(one.finals) >= len(one.sent), ACK_TIMEOUT)

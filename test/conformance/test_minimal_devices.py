@@ -1,0 +1,249 @@
+# Copyright 2026 The illuminator_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Devices that do what their protocol demands, and no more, and devices that deviate from it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+import math
+from typing import Any, TypeAlias
+
+from illuminator_ros.gimbal.checks import device, manager
+from illuminator_ros.gimbal.messages import GimbalDeviceSetAttitude
+from illuminator_ros.illuminator.checks import requirements as illuminator
+from illuminator_ros.illuminator.messages import IlluminatorStatus
+from illuminator_ros.mavlink.messages import Address, Message
+from illuminator_ros.payload.checks.requirement import PayloadChecks, Verdict
+from illuminator_ros.rededge import checks as rededge
+from illuminator_ros.rededge.messages import Ping
+import pytest
+from support.checks_run import ChecksRun
+from support.minimal_devices import (
+    IN_EARTH_FRAME,
+    IN_VEHICLE_FRAME,
+    MAV_TYPE_CAMERA,
+    MinimalCamera,
+    MinimalCapturingCamera,
+    MinimalDevice,
+    MinimalGimbal,
+    MinimalLight,
+    MinimalManager,
+)
+from support.virtual_link import START
+
+LIGHT, GIMBAL, MANAGER, CAMERA = (
+    illuminator.CHECKS, device.CHECKS, manager.CHECKS, rededge.CHECKS)
+UTC = 1.7e9
+Q: TypeAlias = tuple[float, float, float, float]
+
+
+def run(checks: PayloadChecks[Any], one: MinimalDevice) -> ChecksRun:
+    """Check a device, which is then as it was."""
+    return ChecksRun(
+        checks, one, version=checks.mavlink_version or 2, utc=UTC).finish()
+
+
+def shown(done: ChecksRun) -> dict[str, str]:
+    """Return the failures with their reasons."""
+    return {one.requirement.name: one.detail for one in done.runner.results
+            if one.verdict is Verdict.FAIL}
+
+
+class PitchGimbal(MinimalGimbal):
+    """A gimbal that turns only up and down."""
+
+    capabilities = 32 | 128
+    ranges = (MinimalGimbal.ranges[0], (0.0, 0.0))
+
+
+class OldGimbal(MinimalGimbal):
+    """A gimbal that does not name its yaw frame."""
+
+    frame = 0
+
+
+class EndlessGimbal(MinimalGimbal):
+    """A gimbal with slip rings: its yaw has no limits."""
+
+    capabilities = MinimalGimbal.capabilities | 2048
+    ranges = (MinimalGimbal.ranges[0], (-math.inf, math.inf))
+
+
+class WindingGimbal(MinimalGimbal):
+    """A gimbal whose cable permits three turns to each side."""
+
+    ranges = (MinimalGimbal.ranges[0], (-3 * math.tau, 3 * math.tau))
+
+
+class UnlimitedGimbal(MinimalGimbal):
+    """A gimbal that does not report its limits."""
+
+    def reported_limits(self) -> tuple[float, float, float, float]:
+        return (math.nan,) * 4
+
+
+class HighGimbal(MinimalGimbal):
+    """A gimbal that cannot turn far down."""
+
+    ranges = (-0.1, 0.7), MinimalGimbal.ranges[1]
+
+
+RIGHT: dict[str, tuple[PayloadChecks[Any], Callable[[], MinimalDevice]]] = {
+    'light': (LIGHT, MinimalLight),
+    'light with steps of 10 %': (LIGHT, lambda: MinimalLight(step=10.0)),
+    'light that fades for 2 s': (LIGHT, lambda: MinimalLight(fade=2.0)),
+    'light that needs 5 s': (LIGHT, lambda: MinimalLight(progress=5.0)),
+    'light that is busy at first': (LIGHT, lambda: MinimalLight(busy=3)),
+    'light with a strobe': (LIGHT, lambda: MinimalLight(strobes=True)),
+    'gimbal': (GIMBAL, MinimalGimbal),
+    'gimbal without yaw axis': (GIMBAL, PitchGimbal),
+    'gimbal without yaw frame': (GIMBAL, OldGimbal),
+    'gimbal without yaw limits': (GIMBAL, EndlessGimbal),
+    'gimbal with three turns of yaw': (GIMBAL, WindingGimbal),
+    'gimbal without limits': (GIMBAL, UnlimitedGimbal),
+    'gimbal that cannot turn far down': (GIMBAL, HighGimbal),
+    'manager': (MANAGER, MinimalManager),
+    'camera': (CAMERA, MinimalCamera),
+    'camera with captures': (CAMERA, lambda: MinimalCapturingCamera(UTC)),
+}
+
+
+@pytest.mark.parametrize('name', RIGHT)
+def test_a_device_that_does_what_its_protocol_demands_passes(name: str) -> None:
+    checks, make = RIGHT[name]
+    done = run(checks, make())
+    assert shown(done) == {}
+    assert done.runner.passed
+
+
+def test_checks_of_a_camera_without_captures_end_within_20_s() -> None:
+    done = run(CAMERA, MinimalCamera())
+    assert done.link.now - START < 20.0
+
+
+# Deviations
+
+class FractionLight(MinimalLight):
+    """Reports its brightness as a share of 1."""
+
+    def message(self, message_id: int) -> Message:
+        status = super().message(message_id)
+        return replace(status, brightness=status.brightness / 100) if isinstance(
+            status, IlluminatorStatus) else status
+
+
+class ObedientGimbal(MinimalGimbal):
+    def obeys(self, source: Address) -> bool:
+        return True
+
+
+class CameraGimbal(MinimalGimbal):
+    mav_type = MAV_TYPE_CAMERA
+
+
+class DegreeRateGimbal(MinimalGimbal):
+    def obey(self, message: GimbalDeviceSetAttitude) -> None:
+        super().obey(replace(
+            message, angular_velocity_y=math.radians(message.angular_velocity_y),
+            angular_velocity_z=math.radians(message.angular_velocity_z)))
+
+
+class ClaimingGimbal(MinimalGimbal):
+    """Claims HAS_RETRACT."""
+
+    capabilities = MinimalGimbal.capabilities | 1
+
+
+class ConjugatedCommandGimbal(MinimalGimbal):
+    def commanded(self, q: Q) -> tuple[float, float]:
+        w, x, y, z = q
+        return super().commanded((w, -x, -y, -z))
+
+
+class ConjugatedReportGimbal(MinimalGimbal):
+    def reported(self) -> Q:
+        w, x, y, z = super().reported()
+        return w, -x, -y, -z
+
+
+class ScalarLastGimbal(MinimalGimbal):
+    def reported(self) -> Q:
+        w, x, y, z = super().reported()
+        return x, y, z, w
+
+
+class SwappedLimitsGimbal(MinimalGimbal):
+    def reported_limits(self) -> Q:
+        pitch_min, pitch_max, yaw_min, yaw_max = super().reported_limits()
+        return pitch_max, pitch_min, yaw_max, yaw_min
+
+
+class BothFramesGimbal(MinimalGimbal):
+    frame = IN_VEHICLE_FRAME | IN_EARTH_FRAME
+
+
+class DegreeLimitsGimbal(MinimalGimbal):
+    def reported_limits(self) -> Q:
+        low, high, left, right = map(math.degrees, super().reported_limits())
+        return low, high, left, right
+
+
+class DegreePitchGimbal(MinimalGimbal):
+    """A gimbal whose pitch turns little: its limits could be rad, were it not for its motion."""
+
+    ranges = (-0.1, 0.09), MinimalGimbal.ranges[1]
+
+    def reported_limits(self) -> Q:
+        low, high, left, right = super().reported_limits()
+        return math.degrees(low), math.degrees(high), left, right
+
+
+class ObedientManager(MinimalManager):
+    def controls(self, source: Address) -> bool:
+        return True
+
+
+class StaleCamera(MinimalCamera):
+    """Answers PING with the sequence number before."""
+
+    def send(self, message: Message) -> None:
+        super().send(replace(message, seq=message.seq - 1) if isinstance(
+            message, Ping) and message.seq else message)
+
+
+WRONG: dict[type[MinimalDevice], tuple[PayloadChecks[Any], set[str]]] = {
+    FractionLight: (LIGHT, {'brightness', 'status-agrees'}),
+    ObedientGimbal: (GIMBAL, {'only-manager', 'one-manager'}),
+    CameraGimbal: (GIMBAL, {'heartbeat-type'}),
+    DegreeRateGimbal: (GIMBAL, {'rate'}),
+    ClaimingGimbal: (GIMBAL, {'retract'}),
+    ConjugatedCommandGimbal: (GIMBAL, {'setpoint'}),
+    ConjugatedReportGimbal: (GIMBAL, {'setpoint'}),
+    ScalarLastGimbal: (GIMBAL, {'setpoint'}),
+    SwappedLimitsGimbal: (GIMBAL, {'limits'}),
+    BothFramesGimbal: (GIMBAL, {'yaw-frame'}),
+    DegreeLimitsGimbal: (GIMBAL, {'limits', 'range'}),
+    DegreePitchGimbal: (GIMBAL, {'range'}),
+    ObedientManager: (MANAGER, {'no-control-command', 'no-control-messages', 'one-player'}),
+    StaleCamera: (CAMERA, {'ping-sequence'}),
+}
+
+
+@pytest.mark.parametrize('device', WRONG)
+def test_a_device_that_deviates_fails_the_requirement_that_it_breaks(
+        device: type[MinimalDevice]) -> None:
+    checks, names = WRONG[device]
+    assert run(checks, device()).failed >= names  # type: ignore[call-arg]

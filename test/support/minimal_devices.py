@@ -1,0 +1,483 @@
+# Copyright 2026 The illuminator_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+Devices written from the documents alone: each does what its protocol demands, and no more.
+
+They share no code with the simulator, so that an error of the package does not hide itself.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+import math
+from typing import Any, ClassVar
+
+from illuminator_ros.gimbal import messages as gimbal
+from illuminator_ros.illuminator.messages import IlluminatorStatus
+from illuminator_ros.mavlink import messages as mav
+from illuminator_ros.mavlink.component import Endpoint
+from illuminator_ros.mavlink.messages import Address, MavResult
+from illuminator_ros.payload.messages import Attitude, GlobalPositionInt, SystemTime
+from illuminator_ros.payload.messages import GimbalDeviceAttitudeStatus as AttitudeStatus
+from illuminator_ros.rededge import messages as rededge
+
+MAV_TYPE_QUADROTOR, MAV_TYPE_GIMBAL, MAV_TYPE_CAMERA, MAV_TYPE_ILLUMINATOR = 2, 26, 30, 44
+MAV_AUTOPILOT_INVALID, MAV_AUTOPILOT_PX4 = 8, 12
+NAN = math.nan
+# GIMBAL_DEVICE_FLAGS
+ROLL_LOCK, PITCH_LOCK, YAW_LOCK, IN_VEHICLE_FRAME, IN_EARTH_FRAME = 4, 8, 16, 32, 64
+# s
+STEP = 0.05
+# rad/s
+SPEED = 0.7
+
+
+class MinimalDevice(Endpoint):
+    """
+    A component with a heartbeat and commands; it takes COMMAND_LONG only.
+
+    :cvar intervals: s between messages of each class.
+    :cvar requestable: the messages that can be requested.
+    """
+
+    intervals: ClassVar[Mapping[type[mav.Message], float]] = {}
+    requestable: ClassVar[Sequence[type[mav.Message]]] = ()
+    messages: Sequence[type[mav.Message]] = (mav.CommandLong, mav.CommandInt)
+
+    def __init__(self, address: Address, mav_type: int, autopilot: int) -> None:
+        super().__init__()
+        self.address = address
+        self.heartbeat = mav.Heartbeat(mav_type, autopilot, 0, 0, 0, 3)
+        self.now = self._booted = 0.0
+        self._due: list[tuple[float, Callable[[], object]]] = []
+
+    def link_opened(self, now: float) -> None:
+        self.now = self._booted = now
+        self._repeat(1.0, lambda: self.heartbeat)
+        for cls, interval in self.intervals.items():
+            self._repeat(interval, lambda cls=cls: self.message(cls.id))  # type: ignore[misc]
+
+    @property
+    def uptime_ms(self) -> int:
+        """Return the time since the start, ms."""
+        return round((self.now - self._booted) * 1e3)
+
+    def after(self, seconds: float, action: Callable[[], object]) -> None:
+        """Call a function after some time."""
+        self._due.append((self.now + seconds, action))
+
+    def _repeat(self, interval: float, make: Callable[[], mav.Message]) -> None:
+        self.send(make())
+        self.after(interval, lambda: self._repeat(interval, make))
+
+    def send(self, message: mav.Message) -> None:
+        """Send a message."""
+        self.outgoing.append((self.address, message))
+
+    def poll(self, now: float) -> None:
+        self.now = now
+        due, self._due = ([one for one in self._due if one[0] <= now],
+                          [one for one in self._due if one[0] > now])
+        for _, action in due:
+            action()
+
+    def next_deadline(self) -> float:
+        return min((at for at, _ in self._due), default=math.inf)
+
+    def receive(self, source: Address, message: Any, now: float) -> None:
+        self.now = now
+        system, component = mav.target_of(message) if hasattr(message, 'target_system') else (0, 0)
+        if system not in (0, self.address.system) or component not in (0, self.address.component):
+            return
+        if isinstance(message, mav.CommandLong):
+            self._answer(source, message)
+        elif not isinstance(message, mav.CommandInt):
+            self.take(source, message)
+
+    def _answer(self, source: Address, command: mav.CommandLong) -> None:
+        if command.command == mav.MavCmd.REQUEST_MESSAGE:
+            is_known = command.param1 in {cls.id for cls in self.requestable}
+            self.acknowledge(command, MavResult.ACCEPTED if is_known else MavResult.DENIED)
+            if is_known:
+                self.send(self.message(int(command.param1)))
+        else:
+            self.execute(source, command)
+
+    def acknowledge(self, command: mav.CommandLong, result: int, progress: int = 0) -> None:
+        """Send COMMAND_ACK without its optional target."""
+        self.send(mav.CommandAck(command.command, result, progress, 0, 0, 0))
+
+    # What a device of one kind adds
+
+    def message(self, message_id: int) -> mav.Message:
+        """Return a message that can be requested or is streamed."""
+        raise NotImplementedError
+
+    def execute(self, source: Address, command: mav.CommandLong) -> None:
+        """Execute and acknowledge a command."""
+        self.acknowledge(command, MavResult.UNSUPPORTED)
+
+    def take(self, source: Address, message: Any) -> None:
+        """Take another message."""
+
+
+class MinimalLight(MinimalDevice):
+    """
+    A light that is switched and dimmed in whole percent.
+
+    It has no strobe, no external sync, no thermometer and no names, sends its status on request
+    only, and rejects MAV_CMD_SET_MESSAGE_INTERVAL.
+
+    :param step: of its brightness, %.
+    :param fade: s from a change of brightness to its end.
+    :param progress: s of MAV_RESULT_IN_PROGRESS before each change.
+    :param busy: how many commands are rejected temporarily at first.
+    :param strobes: whether it has a strobe, which then shows no period while it does not strobe.
+    """
+
+    requestable = (IlluminatorStatus, mav.ComponentInformationBasic)
+
+    def __init__(
+        self, *, step: float = 1.0, fade: float = 0.0, progress: float = 0.0, busy: int = 0,
+        strobes: bool = False,
+    ) -> None:
+        super().__init__(Address(1, 243), MAV_TYPE_ILLUMINATOR, MAV_AUTOPILOT_INVALID)
+        self.step, self.fade, self.progress, self.busy = step, fade, progress, busy
+        self.limits = (0.1, 5.0) if strobes else (0.0, 0.0)
+        self.on = 0
+        self.brightness = 40.0
+        self.strobe = 0.0, 0.0
+
+    def message(self, message_id: int) -> mav.Message:
+        if message_id == IlluminatorStatus.id:
+            return IlluminatorStatus(
+                self.uptime_ms, self.on, 1, 0, 1, self.brightness, *self.strobe, NAN, *self.limits)
+        return mav.ComponentInformationBasic(0, 0, 0, b'', b'', b'', b'', b'')
+
+    def execute(self, source: Address, command: mav.CommandLong) -> None:
+        p1, p2, p3, p4 = command.param1, command.param2, command.param3, command.param4
+        change: Callable[[], object]
+        if command.command == mav.MavCmd.ILLUMINATOR_ON_OFF:
+            valid, change = p1 in (0, 1), lambda: setattr(self, 'on', int(p1))
+        elif command.command == mav.MavCmd.DO_ILLUMINATOR_CONFIGURE:
+            low, high = self.limits
+            valid = (p1 == 1 and 0 <= p2 <= 100 and 0 <= p4 <= 100
+                     and (p3 == 0 or low <= p3 <= high and high > 0))
+            change = lambda: self._configure(p2, p3, p4)  # noqa: E731
+        else:
+            super().execute(source, command)
+            return
+        if self.busy and valid:
+            self.busy -= 1
+            self.acknowledge(command, MavResult.TEMPORARILY_REJECTED)
+        elif self.progress and valid:
+            self.acknowledge(command, MavResult.IN_PROGRESS, 255)
+            self.after(self.progress, lambda: self.acknowledge(command, MavResult.ACCEPTED))
+            self.after(self.progress, change)
+        else:
+            self.acknowledge(command, MavResult.ACCEPTED if valid else MavResult.DENIED)
+            if valid:
+                change()
+
+    def _configure(self, brightness: float, period: float, duty: float) -> None:
+        self.strobe = (period, duty) if period and 0 < duty < 100 else (0.0, 0.0)
+        end = round(brightness / self.step) * self.step
+        if self.fade:
+            self.after(self.fade / 2, lambda: setattr(
+                self, 'brightness', (self.brightness + end) / 2))
+        self.after(self.fade, lambda: setattr(self, 'brightness', end))
+
+
+def quaternion(pitch: float, yaw: float) -> tuple[float, float, float, float]:
+    """Return w, x, y, z of a rotation about z, then about y."""
+    c, s = (math.cos(pitch / 2), math.sin(pitch / 2))
+    d, t = (math.cos(yaw / 2), math.sin(yaw / 2))
+    return d * c, -t * s, d * s, t * c
+
+
+def angles(q: tuple[float, float, float, float]) -> tuple[float, float]:
+    """Return pitch and yaw of a unit quaternion."""
+    w, x, y, z = q
+    return (math.asin(max(-1.0, min(1.0, 2 * (w * y - z * x)))),
+            math.atan2(2 * (w * z + x * y), 1 - 2 * (y * y + z * z)))
+
+
+class MinimalAxes:
+    """
+    Pitch and yaw that turn to angles, or at rates, within their ranges, rad.
+
+    :ivar now: pitch and yaw.
+    """
+
+    def __init__(self, ranges: tuple[tuple[float, float], tuple[float, float]]) -> None:
+        self.ranges = ranges
+        self.now = [0.0, 0.0]
+        self._targets = [0.0, 0.0]
+        self._rates = [0.0, 0.0]
+
+    def turn(self, targets: tuple[float, float], rates: tuple[float, float]) -> None:
+        """Turn each axis to an angle, else at a rate; NaN for neither, which stops it."""
+        for axis in (0, 1):
+            self._targets[axis] = targets[axis]
+            self._rates[axis] = 0.0 if math.isnan(rates[axis]) else rates[axis]
+
+    def advance(self, seconds: float) -> None:
+        """Move."""
+        for axis, (low, high) in enumerate(self.ranges):
+            if math.isnan(self._targets[axis]):
+                moved = self.now[axis] + self._rates[axis] * seconds
+            else:
+                speed = abs(self._rates[axis]) or SPEED
+                way = self._targets[axis] - self.now[axis]
+                moved = self.now[axis] + math.copysign(min(abs(way), speed * seconds), way)
+            self.now[axis] = max(low, min(high, moved))
+
+    def at_limits(self) -> int:
+        """Return AT_PITCH_LIMIT and AT_YAW_LIMIT of the axes whose target is beyond the range."""
+        return sum(flag for flag, target, (low, high) in zip(
+            (2, 4), self._targets, self.ranges, strict=True) if target < low or target > high)
+
+
+PITCH = math.radians(-90), math.radians(30)
+YAW = math.radians(-160), math.radians(160)
+
+
+class MinimalGimbal(MinimalDevice):
+    """
+    A gimbal device with pitch and yaw that obeys its manager.
+
+    It reports no rates, no heading and no names, and has neither neutral nor retracted position,
+    yaw lock, nor yaw relative to north.
+
+    :cvar ranges: of pitch and yaw, rad.
+    :cvar capabilities: HAS_PITCH_AXIS, HAS_PITCH_LOCK, HAS_YAW_AXIS, HAS_YAW_FOLLOW.
+    :cvar frame: the flag of its yaw frame.
+    """
+
+    intervals = {AttitudeStatus: 0.1}
+    requestable = (gimbal.GimbalDeviceInformation,)
+    messages = (*MinimalDevice.messages, gimbal.GimbalManagerStatus,
+                gimbal.GimbalDeviceSetAttitude, gimbal.GimbalManagerSetPitchyaw)
+    ranges: ClassVar[tuple[tuple[float, float], tuple[float, float]]] = (PITCH, YAW)
+    capabilities: ClassVar[int] = 32 | 128 | 256 | 512
+    frame: ClassVar[int] = IN_VEHICLE_FRAME
+    mav_type: ClassVar[int] = MAV_TYPE_GIMBAL
+
+    def __init__(self) -> None:
+        super().__init__(Address(1, 154), self.mav_type, MAV_AUTOPILOT_INVALID)
+        self.axes = MinimalAxes(self.ranges)
+        self.flags = ROLL_LOCK | PITCH_LOCK
+        self.manager: Address | None = None
+
+    def link_opened(self, now: float) -> None:
+        super().link_opened(now)
+        self._move()
+
+    def _move(self) -> None:
+        self.axes.advance(STEP)
+        self.after(STEP, self._move)
+
+    def message(self, message_id: int) -> mav.Message:
+        if message_id == AttitudeStatus.id:
+            return self.status()
+        return gimbal.GimbalDeviceInformation(
+            self.uptime_ms, b'', b'', b'', 0, 0, 0, self.capabilities, 0, NAN, NAN,
+            *self.reported_limits())
+
+    def reported_limits(self) -> tuple[float, float, float, float]:
+        """Return pitch_min to yaw_max."""
+        return (*self.ranges[0], *self.ranges[1])
+
+    def status(self) -> AttitudeStatus:
+        """Return its attitude."""
+        return AttitudeStatus(
+            0, 0, self.uptime_ms, self.flags | self.frame, self.reported(), NAN, NAN, NAN,
+            self.axes.at_limits(), NAN, NAN)
+
+    def reported(self) -> tuple[float, float, float, float]:
+        """Return the quaternion of its status."""
+        pitch, yaw = self.axes.now
+        return quaternion(pitch, yaw)
+
+    def commanded(self, q: tuple[float, float, float, float]) -> tuple[float, float]:
+        """Return the angles of a commanded quaternion."""
+        return (NAN, NAN) if any(map(math.isnan, q)) else angles(q)
+
+    def take(self, source: Address, message: Any) -> None:
+        if isinstance(message, gimbal.GimbalManagerStatus):
+            if (source.system, message.gimbal_device_id) == self.address and not self.manager:
+                self.manager = source
+        elif isinstance(message, gimbal.GimbalDeviceSetAttitude) and self.obeys(source):
+            self.obey(message)
+
+    def obeys(self, source: Address) -> bool:
+        """Return whether it obeys a component."""
+        return source == self.manager
+
+    def obey(self, message: gimbal.GimbalDeviceSetAttitude) -> None:
+        """Obey a setpoint."""
+        self.axes.turn(self.commanded(message.q),
+                       (message.angular_velocity_y, message.angular_velocity_z))
+
+
+class MinimalManager(MinimalDevice):
+    """
+    An autopilot that manages a gimbal on its outputs, without region of interest.
+
+    It gives control to each component that asks for it, and takes angles of its gimbal's frame.
+    """
+
+    intervals = {AttitudeStatus: 0.1, gimbal.GimbalManagerStatus: 0.2}
+    requestable = (gimbal.GimbalManagerInformation,)
+    messages = (*MinimalDevice.messages, gimbal.GimbalManagerSetAttitude,
+                gimbal.GimbalManagerSetPitchyaw, gimbal.GimbalManagerSetManualControl)
+    device_id: ClassVar[int] = 1
+
+    def __init__(self) -> None:
+        super().__init__(Address(1, 1), MAV_TYPE_QUADROTOR, MAV_AUTOPILOT_PX4)
+        self.axes = MinimalAxes((PITCH, YAW))
+        # Primary system and component id, and those of secondary control.
+        self.control = [0, 0, 0, 0]
+        self.flags = ROLL_LOCK | PITCH_LOCK
+
+    def link_opened(self, now: float) -> None:
+        super().link_opened(now)
+        self._move()
+
+    def _move(self) -> None:
+        self.axes.advance(STEP)
+        self.after(STEP, self._move)
+
+    def message(self, message_id: int) -> mav.Message:
+        if message_id == AttitudeStatus.id:
+            return AttitudeStatus(
+                0, 0, self.uptime_ms, self.flags | IN_VEHICLE_FRAME,
+                quaternion(*self.axes.now), NAN, NAN, NAN, self.axes.at_limits(), NAN, NAN,
+                self.device_id)
+        if message_id == gimbal.GimbalManagerStatus.id:
+            return gimbal.GimbalManagerStatus(
+                self.uptime_ms, self.flags, self.device_id, *self.control)
+        return gimbal.GimbalManagerInformation(
+            self.uptime_ms, 32 | 128 | 256 | 512, self.device_id, NAN, NAN, *PITCH, *YAW)
+
+    def controls(self, source: Address) -> bool:
+        """Return whether a component has control."""
+        return list(source) in (self.control[:2], self.control[2:])
+
+    def take(self, source: Address, message: Any) -> None:
+        if message.gimbal_device_id not in (0, self.device_id) or not self.controls(source):
+            return
+        if isinstance(message, gimbal.GimbalManagerSetAttitude):
+            is_set = not any(map(math.isnan, message.q))
+            self.axes.turn(angles(message.q) if is_set else (NAN, NAN),
+                           (message.angular_velocity_y, message.angular_velocity_z))
+        elif isinstance(message, gimbal.GimbalManagerSetPitchyaw):
+            self.axes.turn((message.pitch, message.yaw), (message.pitch_rate, message.yaw_rate))
+        elif isinstance(message, gimbal.GimbalManagerSetManualControl):
+            self.axes.turn((NAN, NAN), (message.pitch_rate * SPEED, message.yaw_rate * SPEED))
+
+    def execute(self, source: Address, command: mav.CommandLong) -> None:
+        values = [command.param1, command.param2, command.param3, command.param4]
+        if command.command not in (1000, 1001):
+            super().execute(source, command)
+        elif command.param7 not in (0, self.device_id):
+            self.acknowledge(command, MavResult.DENIED)
+        elif command.command == 1000:
+            if self.controls(source):
+                pitch, yaw, *rates = map(math.radians, values)
+                self.axes.turn((pitch, yaw), (rates[0], rates[1]))
+            self.acknowledge(
+                command, MavResult.ACCEPTED if self.controls(source) else MavResult.DENIED)
+        elif any(value < -3 or value > 255 for value in values):
+            self.acknowledge(command, MavResult.DENIED)
+        else:
+            for at in (0, 2):
+                if values[at] == -3:
+                    given = [0, 0] if self.control[at:at + 2] == list(source) else [-1, -1]
+                else:
+                    given = list(source) if values[at] == -2 else [
+                        int(value) for value in values[at:at + 2]]
+                if given != [-1, -1]:
+                    self.control[at:at + 2] = given
+            self.acknowledge(command, MavResult.ACCEPTED)
+
+
+class MinimalCamera(MinimalDevice):
+    """
+    A camera of the serial API 1.3.2: it sends HEARTBEAT and answers PING.
+
+    The API says nothing about the contents of its heartbeat, and about its system id.
+    """
+
+    messages: Sequence[type[mav.Message]] = (rededge.Ping, rededge.DigicamControl)
+
+    def __init__(self) -> None:
+        super().__init__(Address(1, 100), MAV_TYPE_CAMERA, MAV_AUTOPILOT_INVALID)
+
+    def receive(self, source: Address, message: Any, now: float) -> None:
+        self.now = now
+        if isinstance(message, rededge.Ping) and not any(mav.target_of(message)):
+            self.send(rededge.Ping(0, message.seq, *source))
+        elif isinstance(message, rededge.DigicamControl):
+            self.capture(source, message)
+
+    def capture(self, source: Address, message: rededge.DigicamControl) -> None:
+        """Take no image: the API has no captures."""
+
+
+class MinimalCapturingCamera(MinimalCamera):
+    """
+    A camera of the serial API 1.5.5: it takes images, too, and uses injected state for 5 s.
+
+    The API says nothing about its system id, and about messages for other components.
+
+    :param utc: UTC at 0 on the link's clock, s since 1970.
+    """
+
+    messages = (*MinimalCamera.messages, rededge.GpsRawInt, SystemTime, GlobalPositionInt,
+                Attitude, rededge.MountStatus)
+
+    def __init__(self, utc: float) -> None:
+        super().__init__()
+        self.heartbeat = mav.Heartbeat(0, 1, 2, 3, 4, 3)
+        self.utc = utc
+        self.images = 0
+        # The latest message of each class, and when it was received, s.
+        self.injected: dict[type[mav.Message], tuple[float, Any]] = {}
+
+    def receive(self, source: Address, message: Any, now: float) -> None:
+        super().receive(source, message, now)
+        self.injected[type(message)] = now, message
+
+    def _fresh(self, cls: type[mav.Message]) -> Any:
+        at, message = self.injected.get(cls, (-math.inf, None))
+        return message if self.now - at <= 5.0 else None
+
+    def capture(self, source: Address, message: rededge.DigicamControl) -> None:
+        if message.shot not in (1, 2):
+            return
+        self.images += 1
+        time_usec = int((self.utc + self.now) * 1e6)
+        place = self._fresh(rededge.GpsRawInt) or self._fresh(GlobalPositionInt)
+        attitude, mount = self._fresh(Attitude), self._fresh(rededge.MountStatus)
+        # The roll of the mount is about the line of sight, so it turns the image.
+        yaw = math.degrees(attitude.yaw) + mount.pointing_b / 100 if attitude and mount else 0.0
+        self.send(rededge.CameraStatus(
+            time_usec, source.system, 0, self.images, 1, 0.0, 0.0, 0.0, 0.0))
+        feedback = rededge.CameraFeedback(
+            time_usec, source.system, 0, self.images, place.lat if place else 0,
+            place.lon if place else 0, place.alt / 1e3 if place else 0.0, 0.0, 0.0, 0.0,
+            yaw % 360.0, 5.4, 3)
+        self.after(0.5, lambda: self.send(feedback))
