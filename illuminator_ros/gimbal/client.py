@@ -23,12 +23,14 @@ import math
 from .events import GimbalEvent, GimbalForgotten, GimbalFound, GimbalKey
 from .gimbal import Gimbal, GimbalSettings, Repetition
 from .messages import (
+    GimbalCommand,
     GimbalDeviceInformation,
     GimbalManagerInformation,
     GimbalManagerSetAttitude,
     GimbalManagerStatus,
     MAV_TYPE_GIMBAL,
     NON_MAVLINK_IDS,
+    REMOVE_SENDER,
 )
 from ..mavlink.command_sender import Command, CommandSender
 from ..mavlink.component import Payload
@@ -200,6 +202,22 @@ class GimbalClient(Payload):
         if now < component.heard_at + FORGET_AFTER:
             self._commands.start(Command(
                 address, MavCmd.REQUEST_MESSAGE, (float(GimbalManagerInformation.id),)), now)
+
+    # The end
+
+    def may_send_at_end(self, sent: Command | Message) -> bool:
+        """See :meth:`Payload.may_send_at_end`: a release of control, and rates of zero."""
+        if isinstance(sent, Command):
+            return (sent.command == GimbalCommand.DO_GIMBAL_MANAGER_CONFIGURE
+                    and sent.params[0] == REMOVE_SENDER)
+        return isinstance(sent, GimbalManagerSetAttitude) and not any((
+            *map(math.isfinite, sent.q), sent.angular_velocity_x, sent.angular_velocity_y,
+            sent.angular_velocity_z))
+
+    def close(self, now: float) -> None:
+        """See :meth:`Payload.close`."""
+        for gimbal in self._gimbals.values():
+            gimbal.close(now)
 
     # Time
 

@@ -299,7 +299,8 @@ class Gimbal:
                 self._emit(events.GimbalLost(self.key, reason))
             else:
                 self._link_problem = ''
-                self._may_take = self._settings.auto_take_control
+                self._may_take = (
+                    self._settings.auto_take_control and not self._commands.refusal)
                 self._identity_query = Repetition()
                 if self._settings.attitude_interval:
                     self._interval_query = Repetition()
@@ -417,6 +418,10 @@ class Gimbal:
 
     def unavailable(self, now: float) -> str:
         """Return why the gimbal cannot be commanded now, for people; '' if it can."""
+        return self._commands.refusal or self._obstacle(now)
+
+    def _obstacle(self, now: float) -> str:
+        """Return why a command would fail, for people; '' if it may succeed."""
         if not self._manager_heard:
             return f'gimbal {self.key} is not connected: {self.unreachable(now)}'
         if self._control is None:
@@ -448,6 +453,13 @@ class Gimbal:
         self._begin(now)
         self._configure(True, now, done)
 
+    def close(self, now: float) -> None:
+        """Answer all requests; :meth:`release_control` is still possible."""
+        self._may_take = False
+        for manager in self._managers.values():
+            for queue in manager.queues:
+                queue.replace(now, self._commands.refusal)
+
     def release_control(self, now: float, done: request.Done) -> None:
         """Release control; succeed only if GIMBAL_MANAGER_STATUS shows it."""
         def ended(result: request.Result, now: float) -> None:
@@ -473,9 +485,9 @@ class Gimbal:
                     message=f'{result.message}; ArduPilot also obeys components without control')
             done(result, now)
 
-        manager = self._active
-        if manager is None or not self._manager_heard:
-            done(request.Result(False, self.unavailable(now)), now)
+        manager, refusal = self._active, self._commands.refusal if take else ''
+        if refusal or manager is None or not self._manager_heard:
+            done(request.Result(False, refusal or self._obstacle(now)), now)
         elif (not take and self._control is not None and not manager.requests
                 and not self.has_any_control):
             # PX4 would take the system id from another component of our system.
@@ -652,7 +664,7 @@ class Gimbal:
                 result.accepted, f'{result.describe_failure()} ({result.timing()})',
                 refused=result.refused,
                 permanent=result.refused and result.result in request.PERMANENT_RESULTS,
-                superseded=result.status is CommandStatus.CANCELLED), now)
+                superseded=result.status in (CommandStatus.CANCELLED, CommandStatus.CLOSED)), now)
 
         self._commands.start(command, now, ended, deadline=now + REQUEST_LIMIT)
 

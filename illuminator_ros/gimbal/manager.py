@@ -299,8 +299,10 @@ class GimbalManager(Payload):
             return None
         if params[DEVICE_ID_PARAM[command.command]] not in (0, self.tracker.device_id):
             return MavResult.DENIED
-        if inactive := self._inactivity():
-            if command.command != GimbalCommand.DO_GIMBAL_MANAGER_CONFIGURE:
+        is_configure = command.command == GimbalCommand.DO_GIMBAL_MANAGER_CONFIGURE
+        # Control may be released at the end.
+        if (inactive := self._inactivity()) and not (is_configure and self._commands.refusal):
+            if not is_configure:
                 self.events.emit(DemandRefused(source, inactive))
             return (MavResult.DENIED if self.tracker.state is ManagerState.INACTIVE
                     else MavResult.TEMPORARILY_REJECTED)
@@ -397,6 +399,19 @@ class GimbalManager(Payload):
             self._changed_at = now
             self._commands.send(self.status(now))
 
+    # The end
+
+    def may_send_at_end(self, sent: Command | mav.Message) -> bool:
+        """See :meth:`Payload.may_send_at_end`: reports, and setpoints without rates."""
+        if isinstance(sent, GimbalDeviceSetAttitude):
+            rates = (sent.angular_velocity_x, sent.angular_velocity_y, sent.angular_velocity_z)
+            return not any(rate for rate in rates if not math.isnan(rate))
+        return isinstance(sent, self.sends)
+
+    def close(self, now: float) -> None:
+        """See :meth:`Payload.close`: the device stays where it is, and follows nothing more."""
+        self.stop(now)
+
     # Setpoints
 
     def stop(self, now: float, offsets: Vector = STILL) -> None:
@@ -455,6 +470,8 @@ class GimbalManager(Payload):
 
     def _inactivity(self) -> str:
         """Return that the manager gives no setpoints now, '' if it does."""
+        if self._commands.refusal:
+            return self._commands.refusal
         state = self.tracker.state
         return '' if state is ManagerState.ACTIVE else f'the manager is not active: {state.value}'
 
@@ -541,7 +558,7 @@ class GimbalManager(Payload):
             return
         converts = setpoint.frame is YawFrame.EARTH and not self._accepts_earth_frame(now)
         ahead = self._ahead(setpoint, now)
-        self._send_due = now + (
+        self._send_due = math.inf if self._commands.refusal else now + (
             FOLLOW_INTERVAL if setpoint.turning != STILL or converts or self._roi is not None
             else HOLD_INTERVAL)
         attitude, self._clipped = clip(

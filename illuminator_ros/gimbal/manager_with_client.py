@@ -33,7 +33,7 @@ from .manager import GimbalManager, ManagerSettings
 from .manager_setpoint import AnySetpoint
 from ..mavlink import messages as mav
 from ..mavlink.command_receiver import AnyCommand, CommandReceiver
-from ..mavlink.command_sender import CommandSender, CommandStatus
+from ..mavlink.command_sender import Command, CommandSender, CommandStatus
 from ..mavlink.component import HEARTBEAT_INTERVAL, Payload
 from ..payload.messages import GimbalDeviceAttitudeStatus
 
@@ -73,6 +73,16 @@ class ManagerWithClient(Payload):
         self._own.end_all(now, CommandStatus.LINK_LOST)
         self.manager.link_closed(now, reason)
         self.client.link_closed(now, reason)
+
+    def may_send_at_end(self, sent: Command | mav.Message) -> bool:
+        """See :meth:`Payload.may_send_at_end`."""
+        return self.manager.may_send_at_end(sent) or self.client.may_send_at_end(sent)
+
+    def close(self, now: float) -> None:
+        """See :meth:`Payload.close`."""
+        self._manage(lambda: self.manager.close(now), now)
+        self._own.close(now, self.client.may_send_at_end)
+        self.client.close(now)
 
     def receive(self, source: mav.Address, message: mav.Message, now: float) -> None:
         """See :meth:`Payload.receive`."""

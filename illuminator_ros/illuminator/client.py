@@ -20,14 +20,22 @@ from collections.abc import Callable, Mapping, Sequence
 import functools
 import itertools
 
+from .commands import SWITCHES
 from .events import AnyLightEvent, LightForgotten, LightFound
 from .light import Light, Settings
 from .messages import IlluminatorStatus
 from .model import Status
 from .mount_orientation import MountOrientations
-from ..mavlink.command_sender import CommandSender
+from ..mavlink.command_sender import Command, CommandSender
 from ..mavlink.component import Payload
-from ..mavlink.messages import Address, ComponentInformationBasic, Heartbeat, MavType, Message
+from ..mavlink.messages import (
+    Address,
+    ComponentInformationBasic,
+    Heartbeat,
+    MavCmd,
+    MavType,
+    Message,
+)
 from ..payload.discovery import Discovery
 from ..payload.identity import Identity
 from ..payload.listeners import Listeners
@@ -64,6 +72,8 @@ class IlluminatorClient(Payload):
         self._commands = commands
         self.settings = settings
         self.events: Listeners[AnyLightEvent] = Listeners()
+        # Takes the results of the OFF at the end of the process.
+        self._report_off: Callable[[Light, Result, float], None] | None = None
         self._discovery = Discovery(
             self._make, commands, found=self._found, forgotten=self._forgotten, wanted=wanted)
         self.lights: Mapping[Address, Light] = self._discovery.devices
@@ -106,6 +116,7 @@ class IlluminatorClient(Payload):
         self.events.emit(LightFound(light.address))
         for event in light.snapshot(now).events():
             self.events.emit(event)
+        self._switch_off_finally(light, now)
 
     def _forgotten(self, light: Light) -> None:
         self.events.emit(LightForgotten(light.address))
@@ -143,6 +154,28 @@ class IlluminatorClient(Payload):
             elif isinstance(message, ComponentInformationBasic):
                 self._discovery.prove(source, now)
                 light.take_identity(Identity.from_message(message), now)
+
+    def may_send_at_end(self, sent: Command | Message) -> bool:
+        """See :meth:`Payload.may_send_at_end`."""
+        return (isinstance(sent, Command) and sent.command == MavCmd.ILLUMINATOR_ON_OFF
+                and sent.params == SWITCHES[False].params)
+
+    def close(self, now: float) -> None:
+        """See :meth:`Payload.close`."""
+        for light in self._discovery:
+            light.close(now)
+
+    def switch_off_finally(
+        self, now: float, report: Callable[[Light, Result, float], None],
+    ) -> None:
+        """Switch off all lights, and those found later; see :meth:`Light.switch_off_finally`."""
+        self._report_off = report
+        for light in self.lights_by_address:
+            self._switch_off_finally(light, now)
+
+    def _switch_off_finally(self, light: Light, now: float) -> None:
+        if self._report_off is not None:
+            light.switch_off_finally(now, functools.partial(self._report_off, light))
 
     def poll(self, now: float) -> None:
         """See :meth:`Payload.poll`."""

@@ -40,6 +40,7 @@ from ..payload.repeat_limit import RepeatLimit
 from ..payload.request import (
     Change,
     Done,
+    OVERTAKEN,
     Phase,
     Request,
     RequestQueue,
@@ -120,8 +121,8 @@ class ConfigurationManager:
     :param emit: takes the events.
     :param limits: apply to each command that is sent.
     :param reassert: whether changes by other senders are undone.
-    :param must_wait: returns whether no pending values may be sent now, since an OFF is under way
-        and a brightness may be an ON.
+    :param must_wait: returns whether no pending values may be sent now, since the process ends, or
+        since an OFF is under way and a brightness may be an ON.
     :ivar confirmed: the configuration that the light last accepted from us or, if another sender
         has changed it since, last reported; None before either.
     :ivar limit_exceeded: how the light exceeds the limits.
@@ -259,16 +260,11 @@ class ConfigurationManager:
     def _wanted(self) -> Changes:
         return self._pending.values if self._pending else {}
 
-    def cancel(self, now: float) -> None:
-        """End all requests, and drop the pending values."""
-        self._pending = None
-        self.end_requests('cancelled', now)
-
-    def replace(self, now: float) -> None:
-        """End all requests, and drop the pending values: an OFF replaces them."""
+    def replace(self, now: float, message: str = OVERTAKEN) -> None:
+        """End all requests, and drop the pending values: an OFF or the end replaces them."""
         self.drop_pending()
         self._setpoint = None
-        self._queue.replace(now)
+        self._queue.replace(now, message)
 
     def end_requests(self, message: str, now: float) -> None:
         """End all requests, but keep the pending values."""

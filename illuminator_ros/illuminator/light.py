@@ -38,6 +38,7 @@ from ..mavlink.messages import Address, MavCmd
 from ..payload.arbitration import Cause, HolderChanged
 from ..payload.command_sources import DEFAULT, SourceSettings
 from ..payload.identity import Identity, IdentityQuery
+from ..payload.last_change import LastChange
 from ..payload.repeat_limit import RepeatLimit
 from ..payload.request import (
     at_any_time,
@@ -60,6 +61,8 @@ RESTART_CHECK_TIME = 2.5
 PROGRESS_LIMIT = 30.0
 # s; enough for two commands in sequence, each with its tries, and for their messages.
 REFRESH_LIMIT = 5.0
+# s after an ON in which an OFF may overtake it on the way to the light.
+OVERTAKING_TIME = 0.2
 
 
 @dataclass(frozen=True)
@@ -147,7 +150,7 @@ class Light:
         self._configuration = ConfigurationManager(
             self._target, emit, limits=settings.limits,
             restore=settings.restore_configuration, reassert=settings.reassert,
-            must_wait=self._may_brightness_undo_off)
+            must_wait=lambda: bool(commands.refusal) or self._may_brightness_undo_off())
         self._tracker = StatusTracker()
         self._is_shared = False
         self._measures_temperature = False
@@ -183,6 +186,7 @@ class Light:
             configuration_manager.REPEATS, configuration_manager.REPEAT_INTERVAL)
         self._sources = LightSources(settings.sources)
         self._refreshes: list[_Refresh] = []
+        self._last_off: LastChange[Status] | None = None
 
     def _command_ended(self, result: CommandResult, now: float) -> None:
         self.has_answered |= result.result is not None
@@ -284,9 +288,11 @@ class Light:
             if (self._automatic and self._enabled is self._automatic.on
                     and (self._enabled or not report.shared_address)):
                 self._automatic = None
-            if not restarted:
+            if not (restarted or self._commands.refusal):
                 self._follow_switch(before, report, now)
         self._switching.take(report, now)
+        if self._last_off is not None:
+            self._last_off.take(report, now)
         self._configuration.take(
             report, now, can_follow=self._tracker.conflict.can_follow,
             switched_at=self._last_switch[1], brightness_is_switch=self._brightness_is_switch)
@@ -356,8 +362,9 @@ class Light:
             self._automatic = None
 
     def _switch_automatically(self, switch: _AutomaticSwitch) -> None:
-        self._automatic = switch
-        self._emit(events.AutomaticSwitch(self.address, switch.on, switch.reason))
+        if not self._commands.refusal:
+            self._automatic = switch
+            self._emit(events.AutomaticSwitch(self.address, switch.on, switch.reason))
 
     def take_identity(self, identity: Identity, now: float) -> None:
         """Take a COMPONENT_INFORMATION_BASIC."""
@@ -452,9 +459,11 @@ class Light:
 
     def _can_reach(self, now: float, done: Done, refusal: str = '') -> bool:
         """Return whether the light is heard; if not, fail a request with the reason."""
-        if self.connected and not refusal:
+        closed = self._commands.refusal
+        if self.connected and not (closed or refusal):
             return True
-        done(Result(False, refusal or self.unreachable(now)), now)
+        done(Result(False, closed or refusal or self.unreachable(now), superseded=bool(closed)),
+             now)
         return False
 
     def enable(
@@ -495,6 +504,8 @@ class Light:
         brightness: float | None = None,
     ) -> str:
         """Take a request; return why a source may not command the light, '' if it may."""
+        if refusal := self._commands.refusal:
+            return refusal
         self.was_commanded = True
         self._note_request(now)
         self._changed(self, now)
@@ -634,7 +645,7 @@ class Light:
         """
         def failed(result: Result, now: float) -> None:
             # While another source holds the light, a setpoint is remembered.
-            if not self.is_held_by_other(source):
+            if not (result.superseded or self.is_held_by_other(source)):
                 self._emit(events.SetpointFailed(self.address, result.message))
 
         if self._can_reach(now, failed, self._claim(source, now, brightness=brightness)):
@@ -649,20 +660,42 @@ class Light:
         self._configuration.set_desired(values, now)
         self._changed(self, now)
 
-    def cancel(self, now: float) -> None:
-        """End all requests, so that the OFF at shutdown is sent at once."""
+    def close(self, now: float) -> None:
+        """Answer all requests, and make no change any more but :meth:`switch_off_finally`."""
+        refusal = self._commands.refusal
         self._automatic = None
-        self._switching.cancel('cancelled', now)
-        self._configuration.cancel(now)
-        self._commands.end_all(now, CommandStatus.CANCELLED, self.address)
+        self._sources = LightSources(None)
+        self._switching.replace(now, refusal)
+        self._configuration.replace(now, refusal)
+        refreshes, self._refreshes = self._refreshes, []
+        for refresh in refreshes:
+            refresh.done(Result(False, refusal), now)
         self._changed(self, now)
 
-    def shut_down(self, now: float, done: Done) -> None:
-        """Switch the light off at once, whichever source holds it; no other request may follow."""
-        self.cancel(now)
-        self._sources = LightSources(None)
-        if self._can_reach(now, done):
-            self._switch(False, now, done, None)
+    def switch_off_finally(self, now: float, report: Done) -> None:
+        """
+        Switch the light off, and again whenever it may be on, after :meth:`close`.
+
+        :param report: see :class:`~..payload.last_change.LastChange`. The failure of a light that
+            is not heard is permanent until it is heard.
+        """
+        self._last_off = LastChange(self._target, SWITCHES[False], report,
+                                    counts_from=self._on_sent_by(now) + OVERTAKING_TIME)
+        self._last_switch = False, now
+        if self.connected:
+            self._last_off.poll(now)
+        else:
+            report(Result(False, self.unreachable(now), permanent=True), now)
+        self._changed(self, now)
+
+    def _on_sent_by(self, now: float) -> float:
+        """Return the time after which no ON was sent, s, unless it has succeeded or failed."""
+        on, switched_at = self._last_switch
+        if on:
+            switched_at = now if now < self._late_until else -math.inf
+        if self._off_brightness == 0.0:
+            switched_at = max(switched_at, self._configuration.sent_at)
+        return switched_at
 
     def refresh(self, now: float, done: Done) -> None:
         """Ask for identity and status again; ``done`` is called once with the result."""
@@ -713,6 +746,8 @@ class Light:
             self._switch_automatically(_AutomaticSwitch(False, reason, now))
         if self._automatic and now >= self._automatic_due:
             self._send_automatic(self._automatic, now)
+        if self._last_off is not None and self.connected:
+            self._last_off.poll(now)
         self._switching.poll(now)
         self._configuration.poll(now, connected=self.connected)
         self._check_refreshes(now)
@@ -727,16 +762,24 @@ class Light:
         silent_since = max(self.heard_at, self._asked_at) if self.connected else math.inf
         return min(self._status_due, silent_since + self._longest_silence)
 
+    def may_stay_on(self, now: float) -> bool:
+        """Return whether the light is on, or may go on by an ON of ours that was sent."""
+        return self._may_be_on or self._is_own(True, now)
+
     @property
-    def _silence_due(self) -> float:
-        """Return the time at which the light is switched off after silence, s."""
+    def _may_be_on(self) -> bool:
         # A light that sends no status may be on if it was switched on, and so may one of several
         # lights at the address, whose statuses may come at once. A try of an ON that has not ended
         # may still take effect.
-        may_be_on = self._enabled or self._switching.has(_is_on) or self._last_switch[0] and (
-            self._enabled is None or self._is_shared) or self._was_on and self._is_shared
-        if (not self._settings.off_after_silence or not may_be_on or not self.connected
-                or self._automatic and not self._automatic.on):
+        return bool(
+            self._enabled or self._switching.has(_is_on) or self._last_switch[0] and (
+                self._enabled is None or self._is_shared) or self._was_on and self._is_shared)
+
+    @property
+    def _silence_due(self) -> float:
+        """Return the time at which the light is switched off after silence, s."""
+        if (not self._settings.off_after_silence or not self._may_be_on or not self.connected
+                or self._automatic and not self._automatic.on or self._commands.refusal):
             return math.inf
         return self._requested_at + self._settings.off_after_silence
 
@@ -790,6 +833,8 @@ class Light:
             due = min(due, min(one.started for one in self._refreshes) + REFRESH_LIMIT)
         if self._sources.are_ranked:
             due = min(due, self._sources.next_deadline())
+        if self._last_off is not None and self.connected:
+            due = min(due, self._last_off.next_deadline())
         return due
 
 

@@ -50,6 +50,8 @@ MAX_TARGETS = 128
 MIN_SAMPLES = 4
 # s for which an acknowledgement, or a copy of it, may be under way.
 ACK_LIFETIME = 5.0
+# s between the tries of a command while the process ends, which has less than a second.
+CLOSING_TIMEOUT = 0.1
 # COMMAND_INT: x and y are degrees * 1e7 in the global frames and metres * 1e4 in the local ones.
 GLOBAL_FRAMES = frozenset((0, 3, 5, 6, 10, 11))
 DEGREE_SCALE, METRE_SCALE = 1e7, 1e4
@@ -67,6 +69,7 @@ class CommandStatus(Enum):
     LINK_LOST = 'the link was lost'
     CANCELLED = 'cancelled'
     REFUSED_LOCALLY = 'too many commands are waiting for this component'
+    CLOSED = 'the bridge is ending'
 
 
 @dataclass(frozen=True)
@@ -391,6 +394,7 @@ class CommandSender:
     outgoing: deque[tuple[Address, Message]] = field(default_factory=deque)
     counters: CommandCounters = field(default_factory=CommandCounters)
     unanswering: dict[Address, None] = field(default_factory=dict)
+    _may_send: Callable[[Command | Message], bool] | None = None
     # In the order of sending: the sent command first, then the waiting ones.
     _pending: dict[Address, list[_PendingCommand]] = field(default_factory=dict)
     # In the order of their ends; those that ended more than ACK_LIFETIME ago do not matter.
@@ -407,9 +411,35 @@ class CommandSender:
         """Return how many commands have not ended."""
         return sum(map(len, self._pending.values()))
 
+    def close(self, now: float, may_send: Callable[[Command | Message], bool]) -> None:
+        """
+        Send nothing any more that changes a device, since the process ends.
+
+        All other commands end with CLOSED, now or when they are started, and other messages are
+        dropped. A command that may still be sent is repeated until it is acknowledged.
+
+        :param may_send: returns whether a command or message may still be sent, in addition to
+            requests for messages.
+        """
+        self._may_send = may_send
+        self.timeout = min(self.timeout, CLOSING_TIMEOUT)
+        self.end_all(now, CommandStatus.CLOSED, ends=self._is_refused)
+
+    @property
+    def refusal(self) -> str:
+        """Return why no device may be changed any more, for people; '' if it may be."""
+        return '' if self._may_send is None else CommandStatus.CLOSED.value
+
+    def _is_refused(self, sent: Command | Message) -> bool:
+        if self._may_send is None:
+            return False
+        is_request = isinstance(sent, Command) and sent.command == messages.MavCmd.REQUEST_MESSAGE
+        return not (is_request or self._may_send(sent))
+
     def send(self, message: Message) -> None:
         """Send a message that is not a command from our address."""
-        self.outgoing.append((self.address, message))
+        if not self._is_refused(message):
+            self.outgoing.append((self.address, message))
 
     def start(
         self, command: Command, now: float, done: Done = lambda result, now: None, *,
@@ -423,6 +453,9 @@ class CommandSender:
         :param overtake: end all commands of its kind that are not in progress, with CANCELLED, and
             send this one at once, even beside a command in progress.
         """
+        if self._is_refused(command):
+            done(CommandResult(CommandStatus.CLOSED), now)
+            return
         if now >= deadline:
             done(CommandResult(CommandStatus.OUT_OF_TIME), now)
             return
@@ -543,7 +576,8 @@ class CommandSender:
                       else CommandStatus.OUT_OF_TIME, now)
         elif pending.state is CommandState.IN_PROGRESS:
             self._end(pending, CommandStatus.PROGRESS_STOPPED, now)
-        elif pending.tries - pending.rejected > self.retries or now >= pending.tries_end:
+        elif self._may_send is None and (
+                pending.tries - pending.rejected > self.retries or now >= pending.tries_end):
             self._end(pending, CommandStatus.NO_ANSWER, now)
         else:
             pending.state = CommandState.SENT
@@ -590,7 +624,7 @@ class CommandSender:
 
     def _transmit(self, pending: _PendingCommand, now: float) -> None:
         command = pending.command
-        self.send(command.message(pending.tries, pending.as_int))
+        self.outgoing.append((self.address, command.message(pending.tries, pending.as_int)))
         pending.tries += 1
         self.counters.sent += 1
         self.counters.resent += pending.tries > 1

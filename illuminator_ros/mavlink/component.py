@@ -22,7 +22,7 @@ from collections.abc import Callable, Sequence
 import math
 
 from .command_receiver import AnyCommand, CommandReceiver
-from .command_sender import CommandSender, CommandStatus
+from .command_sender import Command, CommandSender, CommandStatus
 from .conflating_queue import StreamGroup
 from .frame import Frame
 from .messages import (
@@ -107,6 +107,17 @@ class Payload(MessageHandler):
     def receive_conflicting(self, message: Message, now: float) -> None:  # noqa: B027 - optional
         """Receive a message of one of these classes from another sender with our address."""
 
+    def close(self, now: float) -> None:  # noqa: B027 - optional
+        """
+        Answer all requests, since the process ends: the command sender has been closed.
+
+        See :meth:`~.command_sender.CommandSender.close`; it can no longer be opened.
+        """
+
+    def may_send_at_end(self, sent: Command | Message) -> bool:
+        """Return whether a command or a message may still be sent while the process ends."""
+        return False
+
     def execute(self, source: Address, command: AnyCommand, now: float) -> MavResult | None:
         """
         Execute a command to this component, or to all components, and return its result.
@@ -181,6 +192,13 @@ class Component(Endpoint):
     def address_conflict(self, now: float) -> bool:
         """Return whether another sender has lately used our address."""
         return now - self._conflict_at < CONFLICT_MEMORY
+
+    def close(self, now: float) -> None:
+        """Change no device any more, except as the payloads do at the end of the process."""
+        self.commands.close(now, lambda sent: any(
+            payload.may_send_at_end(sent) for payload in self._payloads))
+        for payload in self._payloads:
+            payload.close(now)
 
     def link_opened(self, now: float) -> None:
         """See :meth:`Endpoint.link_opened`."""

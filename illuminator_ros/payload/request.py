@@ -347,6 +347,8 @@ class Request(Generic[S]):
         accepted = outcome.accepted
         if outcome.status is command_sender.CommandStatus.CANCELLED:
             self.replace(now)
+        elif outcome.status is command_sender.CommandStatus.CLOSED:
+            self.replace(now, outcome.status.value)
         elif accepted and self._must_repeat(outcome, now):
             self._send(Step.SEND_AGAIN, now)
         elif accepted or outcome.may_answer_earlier(now):
@@ -446,10 +448,10 @@ class Request(Generic[S]):
         if self.phase is not Phase.FINISHED:
             self._finish(Result(False, message), now)
 
-    def replace(self, now: float) -> None:
-        """End without a success, if it has not ended: a newer request replaces it."""
+    def replace(self, now: float, message: str = OVERTAKEN) -> None:
+        """End without a success, if it has not ended: something newer replaces it."""
         if self.phase is not Phase.FINISHED:
-            self._finish(Result(False, OVERTAKEN, superseded=True), now)
+            self._finish(Result(False, message, superseded=True), now)
 
     def _refused(self, now: float) -> None:
         answer = self._answer
@@ -566,10 +568,10 @@ class RequestQueue(Generic[S]):
         for request in self._remove(which):
             request.fail(message, now)
 
-    def replace(self, now: float) -> None:
-        """End all requests: a request of another queue replaces them."""
+    def replace(self, now: float, message: str = OVERTAKEN) -> None:
+        """End all requests: a request of another queue, or the end, replaces them."""
         for request in self._remove(lambda request: True):
-            request.replace(now)
+            request.replace(now, message)
 
     def _remove(self, which: Callable[[Request[S]], bool]) -> list[Request[S]]:
         removed = [one for one in self._requests if which(one)]

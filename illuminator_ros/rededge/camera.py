@@ -149,6 +149,8 @@ class Camera:
         self._send = send
         self._emit = emit
         self._link_open = False
+        # Why no request is taken any more, '' while requests are taken.
+        self._closed = ''
         self._address: Address | None = None
         self._connected = False
         self._heard_at = -math.inf
@@ -202,12 +204,20 @@ class Camera:
         self._pings.clear()
         self._link_failure = f'link lost: {reason}'
         self._lose(self._link_failure)
-        requests, self._ping_requests = self._ping_requests, []
-        for request in requests:
-            request.done(False, self._link_failure)
         if self._capture is not None and self._capture.index is None:
             self._late.append(now + LATE_ANSWER)
-        self._end_capture(False, f'{self._link_failure}; the image may have been taken')
+        self._end_requests(self._link_failure)
+
+    def close(self, reason: str) -> None:
+        """Answer all requests, those after this call too, with the reason."""
+        self._closed = reason
+        self._end_requests(reason)
+
+    def _end_requests(self, reason: str) -> None:
+        requests, self._ping_requests = self._ping_requests, []
+        for request in requests:
+            request.done(False, reason)
+        self._end_capture(False, f'{reason}; the image may have been taken')
 
     # Liveness
 
@@ -238,8 +248,8 @@ class Camera:
 
     def ping(self, now: float, done: Done) -> None:
         """Measure the round trip through the camera."""
-        if not self._link_open:
-            done(False, 'the link is not open')
+        if self._closed or not self._link_open:
+            done(False, self._closed or 'the link is not open')
             return
         self._ping_requests.append(_PingRequest(now, done))
         self._send_ping(now)
@@ -283,7 +293,9 @@ class Camera:
 
     def capture(self, shot: rededge.Shot, now: float, done: Done) -> None:
         """Take an image; succeed only after its CAMERA_FEEDBACK."""
-        if not self._connected:
+        if self._closed:
+            done(False, self._closed)
+        elif not self._connected:
             done(False, self._loss(now) or 'no camera connected: none heard yet')
         elif self._capture is not None:
             done(False, 'another capture is under way')

@@ -72,7 +72,7 @@ class RedEdgeClient(Payload):
     ) -> None:
         self.settings = settings
         self.events: Listeners[CameraEvent | InputChanged] = Listeners()
-
+        self._commands = commands
         self.camera = Camera(
             commands.address, settings.heartbeat_timeout, commands.send, self.events.emit,
             sequence=random.getrandbits(32) if sequence is None else sequence)
@@ -105,6 +105,10 @@ class RedEdgeClient(Payload):
             self.camera.take_status(message, now)
         elif isinstance(message, rededge.CameraFeedback):
             self.camera.take_feedback(message, now)
+
+    def close(self, now: float) -> None:
+        """See :meth:`Payload.close`."""
+        self.camera.close(self._commands.refusal)
 
     def poll(self, now: float) -> None:
         """See :meth:`Payload.poll`."""

@@ -42,10 +42,10 @@ from .parameters import (
     LinkParameters,
     ParameterError,
 )
-from .payload import Host, RosPayload, ServedPayload
+from .payload import Host, RosPayload, ServedPayload, ShutdownReport
 from .payload_node import PayloadNode
 from .throttled_log import LogForwarder, NodeLog
-from ..mavlink.command_sender import CommandSender, format_seconds
+from ..mavlink.command_sender import CommandSender
 from ..mavlink.component import Component
 from ..mavlink.link import Link
 from ..mavlink.link_state import LinkEvent
@@ -112,6 +112,7 @@ class Bridge:
         # Set if there is work before the next tick.
         self._wake = threading.Event()
         self._ended = threading.Event()
+        self._ending = threading.Lock()
         self._closed = threading.Event()
         self._housekeeping = threading.Thread(
             target=self._keep_house, name='housekeeping', daemon=True)
@@ -149,10 +150,11 @@ class Bridge:
 
     def run(self) -> None:
         """Serve until :meth:`end` is called or the context is shut down."""
-        self._start(self._housekeeping.start)
-        self._start(self.link.start)
-        self._executor.run()
-        if not self._ended.is_set():
+        try:
+            self._start(self._housekeeping.start)
+            self._start(self.link.start)
+            self._executor.run()
+        finally:
             self.end()
         self._closed.wait(OFF_LIMIT + STOP_LIMIT)
         self._nodes.end()
@@ -169,9 +171,12 @@ class Bridge:
         Bring the devices into their final state, and make :meth:`run` return.
 
         Does not need the executor, which may be busy. Takes 0.75 s at most; callable from any
-        thread, once.
+        thread. Another call while it runs, or later, returns at once.
         """
-        self._ended.set()
+        with self._ending:
+            if self._ended.is_set():
+                return
+            self._ended.set()
         if self.link.is_running():
             self._shut_down_devices()
         self.link.stop(STOP_LIMIT)
@@ -207,32 +212,32 @@ class Bridge:
                 self._ended.wait(START_RETRY)
 
     def _shut_down_devices(self) -> None:
-        reports: queue.SimpleQueue[tuple[NodeLog, Hashable, int, str]] = queue.SimpleQueue()
-        expected: queue.SimpleQueue[dict[tuple[NodeLog, Hashable], str]] = queue.SimpleQueue()
+        reports: queue.SimpleQueue[tuple[NodeLog, Hashable, int | None, str]] = queue.SimpleQueue()
+
+        def reporter(log: NodeLog) -> ShutdownReport:
+            return lambda key, severity, text: reports.put((log, key, severity, text))
 
         def start(now: float) -> None:
-            late: dict[tuple[NodeLog, Hashable], str] = {}
+            self._component.close(now)
             for log, payload in zip(self._logs, self._payloads, strict=True):
-                texts = payload.shut_down(
-                    now, lambda *outcome, log=log: reports.put((log, *outcome)))
-                late |= {(log, key): text for key, text in texts.items()}
-            expected.put(late)
+                payload.shut_down(now, reporter(log))
+            reports.put((self.log, None, logging.DEBUG, 'the link answers'))
 
         deadline = time.monotonic() + OFF_LIMIT
         self.link.call(start)
-        try:
-            late = expected.get(timeout=OFF_LIMIT)
-        except queue.Empty:
-            late = {(self.log, None):
-                    'the link did not answer, devices may still be on: no confirmation'}
+        late: dict[tuple[NodeLog, Hashable], str] = {
+            (self.log, None): 'the link does not answer: devices may still be on'}
         with contextlib.suppress(queue.Empty):
             while late:
                 log, key, severity, text = reports.get(
                     timeout=max(deadline - time.monotonic(), 0.0))
-                late.pop((log, key), None)
-                log.write(severity, text)
+                if severity is None:
+                    late[log, key] = text
+                else:
+                    late.pop((log, key), None)
+                    log.write(severity, text)
         for (log, _), text in late.items():
-            log.error(f'{text} within {format_seconds(OFF_LIMIT)}')
+            log.error(text)
 
     def _keep_house(self) -> None:
         graph_due, shared, unheard = 0.0, frozenset[str](), frozenset[str]()

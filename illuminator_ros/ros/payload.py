@@ -16,7 +16,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Hashable, Mapping, Set
+from collections.abc import Callable, Hashable, Set
 from dataclasses import dataclass, field
 from typing import Any, NamedTuple
 
@@ -30,8 +30,9 @@ from ..mavlink.command_sender import CommandSender
 from ..mavlink.component import Payload
 from ..mavlink.link import Link
 
-# Takes the outcome of the shutdown of one device: its key, the severity (logging) and a line.
-ShutdownReport = Callable[[Hashable, int, str], None]
+# Takes a device's key, a severity (logging) and a line on its end. With None for the severity the
+# bridge waits for the device: if no other line replaces this one in time, it is an error.
+ShutdownReport = Callable[[Hashable, int | None, str], None]
 
 
 class Host(NamedTuple):
@@ -70,14 +71,12 @@ class ServedPayload:
         """
         return None
 
-    def shut_down(self, now: float, report: ShutdownReport) -> Mapping[Hashable, str]:
+    def shut_down(self, now: float, report: ShutdownReport) -> None:
         """
         Bring devices into their final state, because the bridge ends.
 
-        :param report: called once for each device with its outcome, at once or later.
-        :return: by the keys of the devices, the line for a device that is not reported in time.
+        The component has been closed, see :meth:`~..mavlink.component.Component.close`.
         """
-        return {}
 
     def close(self) -> None:
         """Remove data that other programs would go on to show, before the nodes are destroyed."""

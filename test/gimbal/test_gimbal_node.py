@@ -390,7 +390,7 @@ def test_control_is_released_when_the_node_ends_and_taken_at_the_start_if_asked(
 
 @pytest.mark.parametrize(('start', 'link', 'line'), [
     (start_slow_bridge, SlowLink, 'gimbal 1/154: control released'),
-    (start_bridge, Link, 'this node may still control gimbal 1/154: no confirmation within ')])
+    (start_bridge, Link, 'this node may still control gimbal 1/154: no confirmation in time')])
 def test_the_release_at_the_end_is_in_the_log_of_the_node_of_the_gimbal(
         start: Callable[..., Program], link: type[Link], line: str, own_ros: Ros) -> None:
     port = free_port()

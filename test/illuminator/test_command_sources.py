@@ -414,19 +414,6 @@ def test_a_requested_state_that_the_light_refuses_is_reported() -> None:
             if isinstance(one, DesiredStateFailed)] == ['autonomy']
 
 
-def test_the_last_switch_before_the_end_is_sent_whatever_holds_the_light() -> None:
-    shared = Shared(timeout=TIMEOUT)
-    shared.enable('safety', True)
-    shared.enable('autonomy', True)
-    shared.pair.run(1.0)
-    answer = Answer(shared.pair.now)
-    shared.pair.light.shut_down(shared.pair.now, answer)
-    shared.pair.run(TIMEOUT + 1.0)
-
-    assert answer.result.success
-    assert shared.sent(ON_OFF)[-1] == 0.0
-
-
 class Model:
     """An independent, simple implementation of the rules."""
 

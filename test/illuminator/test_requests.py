@@ -413,9 +413,9 @@ def test_a_status_is_requested_unless_it_follows_the_acknowledgement_at_once(
     assert len(queue) == 0
 
 
-# Cancelling
+# The end
 
-def test_cancelling_ends_each_request_once_and_sends_nothing_that_waited(
+def test_the_end_answers_each_request_once_and_sends_nothing_that_waited(
     fake: FakeLight, faked: Pair,
 ) -> None:
     fake.results |= {ON_OFF: IN_PROGRESS, CONFIGURE: None}
@@ -424,9 +424,9 @@ def test_cancelling_ends_each_request_once_and_sends_nothing_that_waited(
     faked.light.set_desired({'strobe_period': 1.0}, faked.now)
     faked.run(0.1)
     sent = len(faked.commands(ON_OFF, CONFIGURE))
-    faked.light.cancel(faked.now)
+    faked.controller.close(faked.now)
     assert [(answer.result.success, answer.result.message) for answer in answers] == [
-        (False, 'cancelled')] * 3
+        (False, 'the bridge is ending')] * 3
     faked.run(60.0)
     assert [len(answer.results) for answer in answers] == [1, 1, 1]
     assert len(faked.commands(ON_OFF, CONFIGURE)) == sent

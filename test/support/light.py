@@ -152,9 +152,9 @@ class ServedLight:
         """Forget the commands received so far."""
         self.fake.received.clear()
 
-    def commands(self, command: int) -> list[Any]:
-        """Return the received commands of one kind."""
-        return [message for message in list(self.fake.received) if message.command == command]
+    def commands(self, *kinds: int) -> list[Any]:
+        """Return the received commands of some kinds."""
+        return [message for message in list(self.fake.received) if message.command in kinds]
 
     def wait_for(self, command: int, count: int = 1) -> list[Any]:
         """Wait until a command has arrived ``count`` times, and return the received ones."""

@@ -17,13 +17,24 @@
 from collections.abc import Callable, Iterator
 import contextlib
 import signal
+import threading
+from unittest import mock
 
+from illuminator_ros.mavlink.link import Link
+from illuminator_ros.ros.bridge import Bridge
+from illuminator_ros.ros.executor import NodeExecutor
 import pytest
 from rcl_interfaces.srv import GetParameters
-from support.light import Address, MavResult, ON_OFF, ServedLight
+import rclpy
+from std_msgs.msg import Bool
+from support.embedded import embedded_bridge
+from support.light import Address, CONFIGURE, MavResult, ON_OFF, ServedLight
 from support.processes import Program
 from support.ros import Parameters, Ros, start_bridge, start_slow_bridge
 from support.waiting import eventually
+
+# s between messages of a publisher.
+PERIOD = 0.002
 
 
 @contextlib.contextmanager
@@ -43,6 +54,24 @@ def lit(
 def assert_goes_off(light: ServedLight) -> None:
     # The light may go off after the end of the bridge.
     eventually(lambda: light.fake.fields['enable'] == 0)
+
+
+@contextlib.contextmanager
+def repeated_on(ros: Ros, topic: str) -> Iterator[None]:
+    """Publish ON again and again."""
+    publisher, ended = ros.publisher(Bool, topic), threading.Event()
+
+    def publish() -> None:
+        while not ended.wait(PERIOD):
+            publisher.publish(Bool(data=True))
+
+    thread = threading.Thread(target=publish)
+    thread.start()
+    try:
+        yield
+    finally:
+        ended.set()
+        thread.join()
 
 
 def assert_ends(program: Program, number: int = signal.SIGTERM) -> None:
@@ -74,7 +103,7 @@ def test_light_is_left_on_with_a_warning_without_the_parameter(own_ros: Ros, por
 
 @pytest.mark.parametrize(('start', 'result', 'line'), [
     (start_slow_bridge, MavResult.DENIED, 'refused: MAV_RESULT_DENIED (1 try, '),
-    (start_bridge, None, 'no confirmation within '),
+    (start_bridge, None, 'no confirmation in time'),
 ])
 def test_light_that_is_not_confirmed_off_is_an_error_that_does_not_delay_the_end(
     own_ros: Ros, port: int, start: Callable[..., Program], result: int | None, line: str,
@@ -95,4 +124,58 @@ def test_busy_executor_does_not_prevent_it(own_ros: Ros, port: int) -> None:
 
         assert_ends(program)
 
+        assert_goes_off(light)
+
+
+@pytest.mark.parametrize('number', [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])
+def test_off_is_the_last_change_whatever_is_requested_at_the_end(
+    own_ros: Ros, port: int, number: int,
+) -> None:
+    with (ServedLight(port, link=Link, enable=1) as light,
+          ServedLight(port, link=Link, source=Address(1, 244), enable=1) as other):
+        program = start_bridge(
+            own_ros.domain, port, off_on_shutdown=True,
+            target_component=light.fake.source.component)
+        try:
+            for node in ('/illuminator', '/illuminator_1_244'):
+                Parameters(own_ros, node).wait(brightness=100.0)
+            with (repeated_on(own_ros, '/illuminator/cmd/enable'),
+                  repeated_on(own_ros, '/illuminator_1_244/cmd/enable')):
+                eventually(lambda: all(one.commands(ON_OFF) for one in (light, other)))
+                own_ros.start_enable()
+                Parameters(own_ros).start_set(brightness=20.0)
+                assert_ends(program, number)
+        finally:
+            program.kill()
+
+        for one in (light, other):
+            assert_goes_off(one)
+            changes = one.commands(ON_OFF, CONFIGURE)
+            assert (changes[-1].command, changes[-1].param1) == (ON_OFF, 0.0)
+
+
+def shut_down_context(bridge: Bridge, ros: Ros) -> None:
+    """End as a program does that embeds the bridge."""
+    rclpy.try_shutdown(context=bridge.node.context)
+
+
+def fail(bridge: Bridge, ros: Ros) -> None:
+    """Have the executor fail with the next request."""
+    with mock.patch.object(NodeExecutor, 'spin_once', side_effect=SystemExit) as spin:
+        ros.start_enable()
+        eventually(lambda: spin.called)
+
+
+@pytest.mark.filterwarnings('ignore::pytest.PytestUnhandledThreadExceptionWarning')
+@pytest.mark.parametrize('end', [shut_down_context, fail])
+def test_every_other_end_of_the_node_switches_the_light_off_too(
+    own_ros: Ros, port: int, end: Callable[[Bridge, Ros], None],
+) -> None:
+    with (ServedLight(port, enable=1) as light,
+          embedded_bridge(own_ros.domain, port, off_on_shutdown=True) as bridge):
+        Parameters(own_ros).wait(brightness=100.0)
+
+        end(bridge, own_ros)
+
+        eventually(lambda: [one.param1 for one in light.commands(ON_OFF)][-1:] == [0.0])
         assert_goes_off(light)

@@ -28,7 +28,6 @@ import threading
 from illuminator_ros.cli import termination
 from illuminator_ros.mavlink.link import Link
 from illuminator_ros.ros import bridge
-from illuminator_ros.ros.executor import ENDED
 import pytest
 from support.light import CONFIGURE, ON_OFF, ServedLight
 from support.ports import free_port
@@ -39,6 +38,7 @@ from support.waiting import eventually
 SIGNALS = [signal.SIGINT, signal.SIGTERM, signal.SIGHUP]
 # Programs at a time; with more, each would mostly wait for the others.
 AT_ONCE = 3
+ENDING = 'the bridge is ending'
 # s; the default of Fast DDS.
 LEASE = 20.0
 
@@ -174,8 +174,8 @@ def test_requests_that_wait_are_refused_when_the_bridge_ends(ros: Ros, port: int
 
         program.send(signal.SIGTERM)
 
-        assert (switched.result().success, switched.result().message) == (False, ENDED)
-        assert [one.reason for one in changed.result().results] == [ENDED]
+        assert (switched.result().success, switched.result().message) == (False, ENDING)
+        assert [one.reason for one in changed.result().results] == [ENDING]
 
 
 def test_last_line_is_written_on_a_busy_machine() -> None:

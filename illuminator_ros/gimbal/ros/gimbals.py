@@ -16,7 +16,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Hashable, Mapping, Set
+from collections.abc import Callable, Set
 import functools
 import logging
 import re
@@ -108,17 +108,17 @@ class Gimbals(ServedPayload):
         """See :meth:`ServedPayload.poll`."""
         self._nodes.poll(now)
 
-    def shut_down(self, now: float, report: ShutdownReport) -> Mapping[Hashable, str]:
+    def shut_down(self, now: float, report: ShutdownReport) -> None:
         """See :meth:`ServedPayload.shut_down`: release all gimbals under our control."""
         def done(key: GimbalKey, result: Result, now: float) -> None:
             severity = logging.INFO if result.success else logging.ERROR
             report(key, severity, f'gimbal {key}: {result.message}')
 
-        controlled = [one for one in self._client.gimbals.values() if one.has_any_control]
-        for gimbal in controlled:
-            gimbal.release_control(now, functools.partial(done, gimbal.key))
-        return {one.key: f'this node may still control gimbal {one.key}: no confirmation'
-                for one in controlled}
+        for gimbal in self._client.gimbals.values():
+            if gimbal.has_any_control:
+                report(gimbal.key, None, f'this node may still control gimbal {gimbal.key}: '
+                                         'no confirmation in time')
+                gimbal.release_control(now, functools.partial(done, gimbal.key))
 
 
 GIMBAL = RosPayload(

@@ -16,7 +16,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Hashable, Mapping
 import functools
 import math
 
@@ -216,10 +215,9 @@ class ManagerNode(ServedPayload):
         """See :meth:`ServedPayload.poll`."""
         self._gimbals.poll(now)
 
-    def shut_down(self, now: float, report: ShutdownReport) -> Mapping[Hashable, str]:
-        """See :meth:`ServedPayload.shut_down`: end rates, since no manager does it later."""
-        self._manager.stop(now)
-        return self._gimbals.shut_down(now, report)
+    def shut_down(self, now: float, report: ShutdownReport) -> None:
+        """See :meth:`ServedPayload.shut_down`."""
+        self._gimbals.shut_down(now, report)
 
     # Diagnostics
 

@@ -16,8 +16,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Hashable, Mapping, Set
-import functools
+from collections.abc import Set
 import logging
 import math
 
@@ -142,26 +141,26 @@ class Lights(ServedPayload):
         """See :meth:`ServedPayload.further_parameters`."""
         return parameters.OF_FURTHER_LIGHTS if self._names.may_name(name) else None
 
-    def shut_down(self, now: float, report: ShutdownReport) -> Mapping[Hashable, str]:
+    def shut_down(self, now: float, report: ShutdownReport) -> None:
         """See :meth:`ServedPayload.shut_down`: switch all off, or name the lights that stay on."""
-        lights = self._client.lights_by_address
         if not self._host.values['off_on_shutdown']:
-            on = [light for light in lights if light.status and light.status.enabled]
-            for light in on:
-                report(light.address, logging.WARNING, f'light {light.address} is left on')
-            return {light.address: '' for light in on}
+            for light in self._client.lights_by_address:
+                if light.may_stay_on(now):
+                    known = light.status and light.status.enabled
+                    report(light.address, logging.WARNING,
+                           f'light {light.address} {"is" if known else "may be"} left on')
+            return
 
-        def done(address: Address, result: Result, now: float) -> None:
+        def take(light: Light, result: Result, now: float) -> None:
             if result.success:
-                report(address, logging.INFO, f'light {address} is off: {result.message}')
+                report(light.address, logging.INFO,
+                       f'light {light.address} is off: {result.message}')
             else:
-                report(address, logging.ERROR, f'light {address} may still be on: '
-                                               f'{result.message}')
+                report(light.address, logging.ERROR if result.permanent else None,
+                       f'light {light.address} may still be on: '
+                       f'{result.message or "no confirmation in time"}')
 
-        for light in lights:
-            light.shut_down(now, functools.partial(done, light.address))
-        return {light.address: f'light {light.address} may still be on: no confirmation'
-                for light in lights}
+        self._client.switch_off_finally(now, take)
 
     def close(self) -> None:
         """See :meth:`ServedPayload.close`."""

@@ -1,0 +1,118 @@
+# Copyright 2026 The illuminator_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""The last change of a device before the process ends, which is repeated until it is shown."""
+
+from __future__ import annotations
+
+import math
+from typing import Generic, TypeVar
+
+from .request import Change, Done, PERMANENT_RESULTS, Result, StatusReport, Target
+from ..mavlink.command_sender import CommandResult, format_seconds
+
+# s between commands that are not confirmed, and from a status that is too old to the request for
+# the next one.
+INTERVAL = 0.1
+ASK_INTERVAL = 0.005
+
+S = TypeVar('S')
+
+
+class LastChange(Generic[S]):
+    """
+    A change that is made again whenever the device does not have it. No I/O; times are s.
+
+    Unlike a :class:`~.request.Request` it needs no acknowledgement: no later command of ours can
+    undo it. Only a status that was sent after the first try shows it.
+
+    :param report: called with a failure that is not permanent when a command is sent or has
+        failed, and with a success or a permanent failure when no other command is necessary.
+    :param counts_from: the time until which an earlier command may still reach the device and undo
+        the change: only a later status shows it.
+    """
+
+    def __init__(
+        self, target: Target, change: Change[S], report: Done, *, counts_from: float = -math.inf,
+    ) -> None:
+        self._target = target
+        self._change = change
+        self._report = report
+        self._counts_from = counts_from
+        self._begun_at = math.inf
+        self._send_due = self._ask_due = -math.inf
+        self._is_under_way = self._is_confirmed = False
+        self._reason = ''
+        self._shown_by: set[int] = set()
+        self._shown_since = math.inf
+
+    def _again(self, reason: str, now: float) -> None:
+        self._reason = reason
+        self._report(Result(False, reason), now)
+
+    def _answered(self, outcome: CommandResult, now: float) -> None:
+        self._is_under_way = False
+        if self._is_confirmed:
+            return
+        if outcome.refused and outcome.result in PERMANENT_RESULTS:
+            self._send_due = self._ask_due = math.inf
+            self._report(Result(
+                False, f'{outcome.describe_failure()} ({outcome.timing()})', permanent=True), now)
+        elif outcome.accepted:
+            self._ask_due = now
+            self._again(f'{self._change.goal} not confirmed: {outcome}', now)
+        else:
+            self._again(f'{outcome.describe_failure()} ({outcome.timing()})', now)
+
+    def take(self, report: StatusReport[S], now: float) -> None:
+        """Take a status that is newer than all before."""
+        delay = (self._target.shortest_round_trip(now) if report.has_clock
+                 else self._target.status_delay)
+        if not self._change.shown_by(report.status):
+            self._shown_by.clear()
+            self._shown_since = math.inf
+            if self._is_confirmed:
+                self._is_confirmed = False
+                self._send_due = now
+                self._again(f'it shows {self._change.actual(report.status)} again', now)
+        elif report.sent_by - delay < max(self._begun_at, self._counts_from):
+            self._ask_due = min(self._ask_due, now + ASK_INTERVAL)
+        elif not self._is_confirmed:
+            # Each of several devices that report in turn must show it.
+            self._shown_by.add(report.sender)
+            self._shown_since = min(self._shown_since, now)
+            if report.senders <= self._shown_by and now >= self._shown_since + report.span:
+                self._is_confirmed = True
+                self._send_due = self._ask_due = math.inf
+                self._report(Result(True, (
+                    f'{self._change.goal}, {self._change.evidence(report.status)} '
+                    f'({format_seconds(now - self._begun_at)})')), now)
+
+    def poll(self, now: float) -> None:
+        """Send the command or ask for a status, if that is due; the device must be connected."""
+        if now >= self._send_due:
+            self._send_due = now + INTERVAL
+            self._begun_at = min(self._begun_at, now)
+            if not self._is_under_way:
+                self._is_under_way = True
+                self._again(self._reason, now)
+                self._target.send(self._change.command, self._change.params, now, self._answered,
+                                  overtake=True)
+        if now >= self._ask_due:
+            self._ask_due = now + INTERVAL
+            self._target.request_status(now)
+
+    def next_deadline(self) -> float:
+        """Return when :meth:`poll` has something to do."""
+        return min(self._send_due, self._ask_due)

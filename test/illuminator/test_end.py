@@ -1,0 +1,339 @@
+# Copyright 2026 The illuminator_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""From the moment the end begins only an OFF changes a light, and it is the last change."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+import random
+
+from illuminator_ros.illuminator.client import enable_all
+from illuminator_ros.illuminator.light import Light, Settings
+from illuminator_ros.illuminator.model import SafetyLimits
+from illuminator_ros.illuminator.simulated_properties import (
+    IlluminatorBehaviour,
+    IlluminatorProperties,
+)
+from illuminator_ros.mavlink.messages import Address, MavCmd, MavResult
+from illuminator_ros.payload.command_sources import SourceSettings
+from illuminator_ros.payload.request import Result
+import pytest
+from support.back_to_back import Pair
+from support.fake_light import FakeLight
+from support.faulty_wire import Faults
+from support.records import Answer
+from support.shared_address import SharedAddress
+
+ON_OFF, CONFIGURE = MavCmd.ILLUMINATOR_ON_OFF, MavCmd.DO_ILLUMINATOR_CONFIGURE
+ENDING = 'the bridge is ending'
+# s that the bridge waits for the lights.
+LIMIT = 0.6
+SOURCES = ('safety', 'default', 'autonomy')
+LATE = Address(1, 250)
+
+
+class Ending:
+    """
+    Lights and their users, and the end.
+
+    :ivar reports: the last result that was reported for each light, by address.
+    """
+
+    def __init__(self, pair: Pair) -> None:
+        self.pair = pair
+        self.reports: dict[Address, Result] = {}
+        self.before, self.ended_at = 0, 0.0
+
+    def begin(self, *, off: bool = True) -> None:
+        """Do what the bridge does at its end, in one turn."""
+        self.before = len(self.pair.near.sent)
+        self.ended_at = self.pair.now
+        self.pair.controller.close(self.pair.now)
+        if off:
+            self.pair.controller.client.switch_off_finally(self.pair.now, self._report)
+        self.pair.turn()
+
+    def _report(self, light: Light, result: Result, now: float) -> None:
+        self.reports[light.address] = result
+
+    def changes(self, address: Address | None = None) -> list[tuple[int, float]]:
+        """Return the commands that were sent since the end began and change a light."""
+        return [(message.command, message.param1) for _, message in
+                self.pair.near.sent[self.before:]
+                if getattr(message, 'command', 0) in (ON_OFF, CONFIGURE)
+                and (address is None or address.component == message.target_component)]
+
+
+class Users:
+    """Everything that may change a light, at random."""
+
+    def __init__(self, pair: Pair, draw: random.Random) -> None:
+        self.pair = pair
+        self.draw = draw
+        self.answers: list[Answer] = []
+        self.is_open = True
+
+    def act(self) -> None:
+        """Take one random action."""
+        self.draw.choice([*(self.enable, self.configure, self.dim) * 4, self.enable_all,
+                          self.refresh, self.desire, self.release, self.restart, self.press,
+                          self.cut, self.open, self.open])()
+        self.pair.turn()
+
+    def light(self) -> Light | None:
+        lights: list[Light | None] = [*self.pair.controller.lights.values()]
+        return self.draw.choice(lights or [None])
+
+    def answer(self) -> Answer:
+        """Return a new answer."""
+        self.answers.append(answer := Answer(self.pair.now))
+        return answer
+
+    def enable(self) -> None:
+        if light := self.light():
+            light.enable(self.draw.random() < 0.8, self.pair.now, self.answer(),
+                         source=self.draw.choice(SOURCES), is_stream=self.draw.random() < 0.5)
+
+    def enable_all(self) -> None:
+        if lights := [*self.pair.controller.lights.values()]:
+            enable_all(lights, True, self.pair.now, self.answer(), name=str)
+
+    def configure(self) -> None:
+        if light := self.light():
+            light.configure({'brightness': float(self.draw.randrange(81)), 'strobe_period': 1.0},
+                            self.pair.now, self.answer())
+
+    def dim(self) -> None:
+        if light := self.light():
+            light.set_brightness(float(self.draw.randrange(101)), self.pair.now,
+                                 source=self.draw.choice(SOURCES))
+
+    def refresh(self) -> None:
+        if light := self.light():
+            light.refresh(self.pair.now, self.answer())
+
+    def desire(self) -> None:
+        if light := self.light():
+            light.set_desired({'strobe_duty_cycle': 30.0}, self.pair.now)
+
+    def release(self) -> None:
+        if light := self.light():
+            light.release(self.draw.choice(SOURCES), self.pair.now)
+
+    def restart(self) -> None:
+        self.draw.choice(self.pair.devices).restart(self.pair.now)
+
+    def press(self) -> None:
+        """Let another sender change a light, which the bridge may undo."""
+        device = self.draw.choice(self.pair.devices)
+        device.apply(device.device.press(
+            self.pair.now, enabled=False, brightness=100.0), self.pair.now)
+
+    def cut(self) -> None:
+        if self.draw.random() < 0.2:
+            self.pair.close()
+            self.is_open = False
+
+    def open(self) -> None:  # noqa: A003
+        if not self.is_open:
+            self.pair.open()
+            self.is_open = True
+
+
+def lights(draw: random.Random) -> list[IlluminatorProperties]:
+    """Return three lights, one of which is heard only later."""
+    return [IlluminatorProperties(
+        address=address, behaviour=IlluminatorBehaviour(
+            brightness_is_switch=draw.random() < 0.3,
+            silence=5.0 if address == LATE else 0.0))
+        for address in (Address(1, 243), Address(1, 244), LATE)]
+
+
+@pytest.mark.parametrize('seed', range(60))
+def test_whatever_is_under_way_and_comes_an_off_is_the_last_change_and_reports_are_true(
+    seed: int,
+) -> None:
+    draw = random.Random(seed)
+    faults = Faults(drop=draw.choice((0.0, 0.3)))
+    pair = Pair(lights(draw), seed=seed, there=faults, uptime=0.0, settings=Settings(
+        reassert=draw.random() < 0.5, off_after_silence=draw.choice((0.0, 0.5)),
+        limits=SafetyLimits(max_brightness=80.0), off_on_release=draw.random() < 0.5,
+        sources=draw.choice((None, SourceSettings(SOURCES, draw.choice((0.3, 60.0)))))))
+    users, ending = Users(pair, draw), Ending(pair)
+    pair.run(draw.choice((0.1, 4.0, 5.0)))
+    for _ in range(40):
+        users.act()
+        pair.run(draw.choice((0.0, 0.001, 0.01, 0.1)))
+    begun = len(users.answers)
+    ending.begin()
+    assert all(answer.results for answer in users.answers[:begun])
+
+    while pair.now < ending.ended_at + LIMIT:
+        users.act()
+        pair.run(draw.choice((0.0, 0.001, 0.01, 0.1)))
+
+    assert set(ending.changes()) <= {(ON_OFF, 0.0)}
+    assert {len(answer.results) for answer in users.answers} <= {1}
+    assert all(not answer.result.success and ENDING in answer.result.message
+               for answer in users.answers[begun:])
+    for address in pair.controller.lights:
+        sent = ending.changes(address)
+        assert sent or 'lost' in ending.reports[address].message, address
+    for device in pair.devices:
+        if device.address in pair.controller.lights:
+            report = ending.reports[device.address]
+            assert not (report.success and device.device.enabled), (device.address, report)
+
+
+@pytest.fixture
+def light() -> FakeLight:
+    """Return a light that is on."""
+    return FakeLight(enable=1)
+
+
+@pytest.fixture
+def ending(light: FakeLight) -> Ending:
+    """Return the end of a bridge with that light."""
+    return Ending(Pair(light).settle())
+
+
+@pytest.mark.parametrize('off', [True, False])
+def test_a_closed_bridge_sends_no_change_but_off_where_that_is_asked_for(
+    ending: Ending, off: bool,
+) -> None:
+    pair = ending.pair
+    under_way = [pair.ask_enable(True), pair.ask_configure(brightness=20.0), pair.ask_refresh()]
+    ending.begin(off=off)
+    later = [pair.ask_enable(True), pair.ask_enable(False), pair.ask_configure(brightness=30.0),
+             pair.ask_refresh()]
+    pair.light.set_brightness(40.0, pair.now)
+    pair.light.set_desired({'brightness': 50.0}, pair.now)
+    pair.run(LIMIT)
+
+    assert {answer.result.message for answer in under_way + later} == {ENDING}
+    assert set(ending.changes()) == ({(ON_OFF, 0.0)} if off else set())
+    assert pair.recorder.failed_setpoints == []
+
+
+def test_an_on_that_the_off_overtakes_on_the_way_is_followed_by_another_off(
+    ending: Ending, light: FakeLight,
+) -> None:
+    pair, wire = ending.pair, ending.pair.near.wire
+    assert pair.enable(False).success
+    wire.faults, prompt = replace(wire.faults, latency=0.15), wire.faults
+    pair.ask_enable(True)
+    wire.faults = prompt
+    ending.begin()
+    pair.run_until(lambda: ending.reports[light.source].success, within=LIMIT)
+    pair.run(LIMIT)
+
+    assert light.fields['enable'] == 0
+    assert light.shone
+
+
+def test_an_end_without_an_on_under_way_is_as_short_as_the_round_trip(
+    ending: Ending, light: FakeLight,
+) -> None:
+    assert ending.pair.enable(True).success
+    ending.begin()
+    ending.pair.run_until(lambda: ending.reports[light.source].success, within=0.02)
+
+    assert ending.changes() == [(ON_OFF, 0.0)]
+
+
+def _restart(pair: Pair, light: FakeLight) -> None:
+    light.restart(pair.now, enable=1)
+
+
+def _reconnect(pair: Pair, light: FakeLight) -> None:
+    light.fields['enable'] = 1
+    pair.close()
+    pair.run(0.1)
+    pair.open()
+
+
+def _switch_by_another(pair: Pair, light: FakeLight) -> None:
+    light.fields['enable'] = 1
+    light.send(light.status(pair.now))
+    pair.turn()
+
+
+@pytest.mark.parametrize('happens', [_restart, _reconnect, _switch_by_another])
+@pytest.mark.parametrize('confirmed', [True, False])
+def test_a_light_that_goes_on_again_during_the_end_is_switched_off_again(
+    ending: Ending, light: FakeLight, happens: Callable[[Pair, FakeLight], None], confirmed: bool,
+) -> None:
+    ending.begin()
+    if confirmed:
+        ending.pair.run_until(lambda: ending.reports[light.source].success)
+    happens(ending.pair, light)
+    ending.pair.run(0.3)
+
+    assert light.fields['enable'] == 0
+    assert ending.reports[light.source].success
+
+
+def test_a_light_that_is_found_or_heard_again_during_the_end_is_switched_off() -> None:
+    pair = Pair([IlluminatorProperties(
+        address=Address(1, number), behaviour=IlluminatorBehaviour(silence=silence))
+        for number, silence in ((243, 8.0), (244, 0.0))], uptime=0.0)
+    found, heard = pair.devices
+    pair.settle(3.5)
+    heard.behave(replace(heard.behaviour, silence=4.2), pair.now)
+    pair.run(4.0)
+    found.device.enabled = heard.device.enabled = True
+    ending = Ending(pair)
+    ending.begin()
+    assert [report.message.partition(':')[0] for report in ending.reports.values()] == [
+        'light 1/244 is lost']
+    pair.run(LIMIT)
+
+    assert not (found.device.enabled or heard.device.enabled)
+    assert all(ending.reports[one.address].success for one in (found, heard))
+
+
+def test_of_lights_that_share_an_address_each_must_show_off() -> None:
+    lights = FakeLight(enable=1), FakeLight(enable=1)
+    ending = Ending(Pair(SharedAddress(*lights, offset=0.05)))
+    lights[1].boot = -50.0
+    ending.pair.settle(10.0)
+    lights[1].applies = False
+    ending.begin()
+    ending.pair.run(LIMIT)
+
+    assert (lights[0].fields['enable'], lights[1].fields['enable']) == (0, 1)
+    assert not ending.reports[lights[0].source].success
+
+
+@pytest.mark.parametrize(('results', 'sends_status', 'reason', 'is_permanent'), [
+    (MavResult.DENIED, True, 'refused: MAV_RESULT_DENIED (1 try, ', True),
+    (MavResult.FAILED, True, 'refused: MAV_RESULT_FAILED (1 try, ', False),
+    (None, True, '', False),
+    (MavResult.ACCEPTED, False, 'off not confirmed: MAV_RESULT_ACCEPTED (1 try, ', False)])
+def test_a_light_that_does_not_show_off_is_reported_with_the_reason(
+    ending: Ending, light: FakeLight, results: int | None, sends_status: bool, reason: str,
+    is_permanent: bool,
+) -> None:
+    light.results[ON_OFF] = results
+    light.applies = False
+    if not sends_status:
+        light.answers, light.stream = set(), 0.0
+    ending.begin()
+    ending.pair.run(LIMIT)
+
+    report = ending.reports[light.source]
+    assert (report.success, report.permanent) == (False, is_permanent)
+    assert report.message.startswith(reason) and bool(reason) is bool(report.message)
