@@ -99,12 +99,8 @@ class RedEdgeClient(Payload):
             return
         if isinstance(message, Heartbeat):
             self.camera.take_heartbeat(source, now)
-        elif isinstance(message, rededge.Ping):
-            self.camera.take_ping(message, now)
-        elif isinstance(message, rededge.CameraStatus):
-            self.camera.take_status(message, now)
-        elif isinstance(message, rededge.CameraFeedback):
-            self.camera.take_feedback(message, now)
+        else:
+            self.camera.receive(message, now)
 
     def close(self, now: float) -> None:
         """See :meth:`Payload.close`."""

@@ -70,6 +70,7 @@ class RedEdgeBehaviour(Behaviour):
     """
     The behaviour of a simulated camera; the defaults follow the serial API.
 
+    :param firmware: its software version.
     :param validity: s for which it uses injected state.
     :param injectable: whether it uses injected state at all.
     :param feedback: whether it sends CAMERA_FEEDBACK.
@@ -88,6 +89,7 @@ class RedEdgeBehaviour(Behaviour):
     heartbeat_custom_mode: int = 3
     adopts_system_id: bool = True
     answers_commands: bool = False
+    firmware: rededge.Firmware = rededge.PARAMETERS
     validity: float = 5.0
     injectable: bool = True
     feedback: bool = True
@@ -305,9 +307,8 @@ class SimulatedRedEdge(simulated.SimulatedDevice):
         self, address: Address, *, validity: float = 5.0, interval: float = 0.0,
         own_gps: GeoPoint | None = None, firmware: rededge.Firmware = rededge.PARAMETERS,
     ) -> None:
-        super().__init__(RedEdgeBehaviour(validity=validity))
+        super().__init__(RedEdgeBehaviour(validity=validity, firmware=firmware))
         self.own_gps = own_gps
-        self._firmware = firmware
         self.images: deque[Image] = deque(maxlen=MAX_IMAGES)
         self._component = address.component
         self._first_interval = interval
@@ -357,9 +358,10 @@ class SimulatedRedEdge(simulated.SimulatedDevice):
         if isinstance(message, rededge.DigicamControl):
             return self._control(source, message, now)
         if isinstance(message, rededge.ParamRequestRead):
-            is_known = (self._firmware >= rededge.PARAMETERS
+            firmware = self.behaviour.firmware
+            is_known = (firmware >= rededge.PARAMETERS
                         and message.param_id.rstrip(b'\0') == rededge.VERSION_PARAMETER)
-            return (self._firmware.value(),) if is_known else ()
+            return (firmware.value(),) if is_known else ()
         if self.behaviour.injectable:
             self._inject(message, now)
         return ()
@@ -387,7 +389,7 @@ class SimulatedRedEdge(simulated.SimulatedDevice):
         self, source: Address, control: rededge.DigicamControl, now: float,
     ) -> Iterable[Message]:
         behaviour = self.behaviour
-        if control.shot not in behaviour.shots or self._firmware < rededge.CAPTURES:
+        if control.shot not in behaviour.shots or behaviour.firmware < rededge.CAPTURES:
             return
         self._index = (self._index + behaviour.counts) & 0xFFFF
         is_panel = control.shot == rededge.Shot.PANEL

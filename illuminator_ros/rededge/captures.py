@@ -1,0 +1,168 @@
+# Copyright 2026 The illuminator_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""The images that the camera takes on request, and its reports of all images."""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+import math
+
+from . import messages as rededge
+from .pings import Done
+from ..mavlink.command_sender import format_seconds
+from ..mavlink.messages import Address, Message
+
+# s from DIGICAM_CONTROL to CAMERA_FEEDBACK.
+CAPTURE_TIMEOUT = 5.0
+# s in which the answer to a capture that had none may still come; captures fail meanwhile, since a
+# lost request looks the same.
+LATE_ANSWER = 15.0
+# An image whose index is less than this behind the newest one is older; if it is farther behind,
+# the camera has restarted.
+OLDER_INDICES = 32
+# Requests without an answer that are remembered.
+MAX_LATE = 32
+
+
+@dataclass(frozen=True)
+class _Capture:
+    sent_at: float
+    done: Done
+    index: int | None = None
+    # The time until which the earlier request that may have caused a reported image counts, s.
+    late_until: float | None = None
+
+    @property
+    def due(self) -> float:
+        return self.sent_at + CAPTURE_TIMEOUT
+
+
+class Captures:
+    """
+    Requests one image at a time, and assigns the reports of images to the requests.
+
+    :param send: sends a message.
+    :ivar images: images that were reported since the start.
+    :ivar newest: index of the newest reported image; None before it, and after a loss.
+    """
+
+    def __init__(self, send: Callable[[Message], None]) -> None:
+        self.images = 0
+        self.newest: int | None = None
+        self._send = send
+        self._capture: _Capture | None = None
+        # The ends of the times in which late answers to captures may come, s.
+        self._late: deque[float] = deque(maxlen=MAX_LATE)
+        # The index of the latest image that a request has triggered, and the time until which its
+        # CAMERA_FEEDBACK may still come, s.
+        self._triggered = 0, -math.inf
+
+    def request(self, shot: rededge.Shot, target: Address, now: float, done: Done) -> None:
+        """Take an image; succeed only after its CAMERA_FEEDBACK."""
+        if self._capture is not None:
+            done(False, 'another capture is under way')
+            return
+        self._capture = _Capture(now, done)
+        # The manufacturer recommends 1 for session and zoom_pos.
+        self._send(rededge.DigicamControl(*target, 1, 1, 0, 0, shot, 0, 0, 0.0))
+
+    def forget_count(self) -> None:
+        """Note that the camera is lost: after a restart it counts its images from the start."""
+        self.newest = None
+
+    def stop(self, now: float, reason: str) -> None:
+        """End the request, since the link is closed."""
+        if self._capture is not None and self._capture.index is None:
+            self._late.append(now + LATE_ANSWER)
+        self.end(reason)
+
+    def end(self, reason: str) -> None:
+        """End the request."""
+        self._end(False, f'{reason}; the image may have been taken')
+
+    def take_status(self, message: rededge.CameraStatus, now: float) -> None:
+        """Take CAMERA_STATUS, which reports that an image was triggered."""
+        if message.event_id == rededge.CameraStatusType.TRIGGER:
+            if message.img_idx == self._triggered[0] and self._is_new(message.img_idx):
+                # Each image is triggered once: the camera has restarted and counts from the start.
+                self._triggered = 0, -math.inf
+            self._take_index(message.img_idx, now)
+
+    def take_feedback(self, message: rededge.CameraFeedback, now: float, note: str) -> None:
+        """
+        Take CAMERA_FEEDBACK, which reports that an image was taken.
+
+        :param note: is added to the answer of the request that caused the image.
+        """
+        self.images += 1
+        self._take_index(message.img_idx, now)
+        capture = self._capture
+        if (capture is not None and capture.index == message.img_idx
+                and message.flags == rededge.CameraFeedbackFlags.CLOSEDLOOP):
+            self._end(True, f'image {capture.index} taken, confirmed after '
+                            f'{format_seconds(now - capture.sent_at)}{note}')
+
+    def _is_new(self, index: int) -> bool:
+        """Return whether an image is newer than all others; its index has 16 bits."""
+        return self.newest is None or (self.newest - index) & 0xFFFF >= OLDER_INDICES
+
+    def _take_index(self, index: int, now: float) -> None:
+        """Record an image; a request causes the first new image after it."""
+        if not self._is_new(index):
+            return
+        self.newest = index
+        triggered, until = self._triggered
+        if index == triggered and now < until:
+            # The camera was lost meanwhile.
+            return
+        while self._late and now >= self._late[0]:
+            self._late.popleft()
+        if self._late:
+            # The image may be the late answer to an earlier request.
+            late_until = self._late.popleft()
+            if self._capture is not None:
+                self._capture = replace(self._capture, late_until=late_until)
+        elif self._capture is not None and self._capture.index is None:
+            self._capture = replace(self._capture, index=index)
+            self._triggered = index, self._capture.due + LATE_ANSWER
+
+    def _end(self, success: bool, text: str) -> None:
+        capture, self._capture = self._capture, None
+        if capture is not None:
+            capture.done(success, text)
+
+    def poll(self, now: float) -> None:
+        """See :meth:`Payload.poll`."""
+        capture, limit = self._capture, format_seconds(CAPTURE_TIMEOUT)
+        if capture is None or now < capture.due:
+            return
+        if capture.index is not None:
+            self._end(False, f'image {capture.index} triggered, not confirmed: no CAMERA_FEEDBACK '
+                             f'within {limit}')
+            return
+        text = f'no answer to DIGICAM_CONTROL within {limit}'
+        if capture.late_until is None:
+            self._late.append(now + LATE_ANSWER)
+        else:
+            # A new period here would never end while images are taken.
+            self._late.appendleft(capture.late_until)
+            text += '; an image was reported that an earlier request may have caused'
+        self._end(False, text)
+
+    def next_deadline(self) -> float:
+        """See :meth:`Payload.next_deadline`."""
+        return math.inf if self._capture is None else self._capture.due

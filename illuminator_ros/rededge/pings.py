@@ -1,0 +1,124 @@
+# Copyright 2026 The illuminator_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""The round trip through the camera: PING and its replies."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+import math
+from typing import NamedTuple
+
+from . import messages as rededge
+from ..mavlink.messages import Address, Message, target_of
+
+# s between PINGs, and the wait for a reply; a requested PING is tried twice.
+PING_INTERVAL = 2.0
+PING_TIMEOUT = 1.0
+PING_TRIES = 2
+
+# Takes success and a message for people, once.
+Done = Callable[[bool, str], None]
+
+
+class _Request(NamedTuple):
+    since: float
+    done: Done
+
+    @property
+    def until(self) -> float:
+        return self.since + PING_TRIES * PING_TIMEOUT
+
+
+class Pings:
+    """
+    Sends a PING at an interval, and on request, while the link is open.
+
+    :param own: the address of this component.
+    :param send: sends a message.
+    :param sequence: the sequence number before the first PING.
+    :ivar round_trip: of the last answered PING, s; None if no PING was answered.
+    :ivar unanswered: PINGs without a reply since the last reply.
+    """
+
+    def __init__(
+        self, own: Address, send: Callable[[Message], None], sequence: int,
+    ) -> None:
+        self.round_trip: float | None = None
+        self.unanswered = 0
+        self._own = own
+        self._send = send
+        self._sequence = sequence
+        # When each unanswered PING was sent, by sequence number, s.
+        self._sent: dict[int, float] = {}
+        self._due = math.inf
+        self._requests: list[_Request] = []
+
+    def start(self, now: float) -> None:
+        """Begin to send."""
+        self._due = now
+
+    def stop(self, reason: str) -> None:
+        """Send no more, and end all requests."""
+        self._due = math.inf
+        self._sent.clear()
+        self.end(reason)
+
+    def end(self, reason: str) -> None:
+        """End all requests."""
+        requests, self._requests = self._requests, []
+        for request in requests:
+            request.done(False, reason)
+
+    def request(self, now: float, done: Done) -> None:
+        """Measure the round trip."""
+        self._requests.append(_Request(now, done))
+        self._ping(now)
+
+    def _ping(self, now: float) -> None:
+        self._due = now + (PING_TIMEOUT if self._requests else PING_INTERVAL)
+        self._sequence = (self._sequence + 1) & 0xFFFFFFFF
+        self._sent[self._sequence] = now
+        self._send(rededge.Ping(int(now * 1e6), self._sequence, 0, 0))
+
+    def take(self, message: rededge.Ping, now: float) -> None:
+        """Take a PING of the camera, which is a reply if its target is our address."""
+        if target_of(message) != self._own:
+            return
+        sent_at = self._sent.pop(message.seq, None)
+        if sent_at is None:
+            return
+        self.round_trip = now - sent_at
+        self.unanswered = 0
+        answered = [one for one in self._requests if one.since <= sent_at]
+        self._requests = [one for one in self._requests if one.since > sent_at]
+        for request in answered:
+            request.done(True, f'{self.round_trip * 1000:.1f} ms round trip')
+
+    def poll(self, now: float) -> None:
+        """See :meth:`Payload.poll`."""
+        for sequence, sent_at in list(self._sent.items()):
+            if now >= sent_at + PING_TIMEOUT:
+                del self._sent[sequence]
+                self.unanswered += 1
+        for request in [one for one in self._requests if now >= one.until]:
+            self._requests.remove(request)
+            request.done(False, f'no reply to {PING_TRIES} PINGs')
+        if now >= self._due:
+            self._ping(now)
+
+    def next_deadline(self) -> float:
+        """See :meth:`Payload.next_deadline`."""
+        return min(self._due, min(self._sent.values(), default=math.inf) + PING_TIMEOUT,
+                   min((one.until for one in self._requests), default=math.inf))
