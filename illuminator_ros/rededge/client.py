@@ -21,7 +21,8 @@ import random
 
 from . import messages as rededge
 from .camera import Camera, CameraEvent, CameraSnapshot
-from .feeder import Feeder, FeederSettings, FeederSnapshot, InputChanged
+from .feeder import Feeder, FeederSnapshot
+from .input_states import FeederSettings, InputChanged
 from ..mavlink.command_sender import CommandSender
 from ..mavlink.component import Payload
 from ..mavlink.messages import Address, Heartbeat, Message

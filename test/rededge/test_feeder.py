@@ -25,8 +25,8 @@ from illuminator_ros.mavlink.messages import Address, Message
 from illuminator_ros.payload.messages import Attitude, GlobalPositionInt, SystemTime
 from illuminator_ros.payload.rotation import Quaternion, Vector
 from illuminator_ros.rededge.conversions import mount_angles, MountFrame, Position
-from illuminator_ros.rededge.feeder import (
-    Feeder,
+from illuminator_ros.rededge.feeder import Feeder
+from illuminator_ros.rededge.input_states import (
     FeederSettings,
     Input,
     InputChanged,
@@ -72,12 +72,12 @@ class Rig:
 
     def imu(self, orientation: Quaternion | None = LEVEL, age: float = 0.0,
             name: Input = Input.IMU) -> list[Message]:
-        self.feeder.take_attitude(name, orientation, RATES, self.stamp(age), self.now)
+        self.feeder.orientation.take_attitude(name, orientation, RATES, self.stamp(age), self.now)
         return self.take()
 
     def mount(self, orientation: Quaternion = NADIR, age: float = 0.0,
               frame_id: str = 'base_link') -> list[Message]:
-        self.feeder.take_mount(orientation, frame_id, self.stamp(age), self.now)
+        self.feeder.orientation.take_mount(orientation, frame_id, self.stamp(age), self.now)
         return self.take()
 
     def reference(self, utc: float, age: float = 0.0) -> None:
@@ -367,22 +367,22 @@ def test_a_fixed_mount_is_sent_each_second_without_attitude_and_after_a_change_r
     rig.run(0.1)
     rig.feeder.link_opened(rig.now)
     assert rig.run(3.4) == [MountStatus(*CAMERA, 0, 0, 0)] * 3
-    rig.feeder.set_fixed_mount((1.0, -2.0, 3.5), rig.now)
+    rig.feeder.orientation.set_fixed_mount((1.0, -2.0, 3.5), rig.now)
     assert rig.run(0.0) == [MountStatus(*CAMERA, -200, 100, 350)]
     rig.feeder.link_closed()
-    rig.feeder.set_fixed_mount((1.0, -2.0, 3.5), rig.now)
+    rig.feeder.orientation.set_fixed_mount((1.0, -2.0, 3.5), rig.now)
     assert rig.run(3.0) == []
 
 
 def test_a_fixed_mount_is_not_sent_before_its_time_nor_an_attitude_re_26_re_27() -> None:
     rig = Rig()
-    rig.feeder.set_fixed_mount((1.0, -2.0, 3.5), rig.now + 2.0)
+    rig.feeder.orientation.set_fixed_mount((1.0, -2.0, 3.5), rig.now + 2.0)
     rig.feeder.link_opened(rig.now)
     assert rig.imu() + rig.run(1.9) + rig.imu() == []
     assert rig.run(0.1) == [MountStatus(*CAMERA, -200, 100, 350)]
     assert classes(rig.imu()) == [Attitude, MountStatus]
     # A gimbal is not waited for.
-    rig.feeder.set_fixed_mount((0.0, 0.0, 0.0), rig.now + 2.0)
+    rig.feeder.orientation.set_fixed_mount((0.0, 0.0, 0.0), rig.now + 2.0)
     rig.run(0.1)
     assert classes(rig.imu() + rig.mount()) == [Attitude, MountStatus]
 
@@ -467,7 +467,8 @@ def test_mounts_in_different_frames_are_not_mixed() -> None:
     assert rig.imu(age=0.05) == []
 
 
-@pytest.mark.parametrize('expected', [Rig.mount, lambda rig: rig.feeder.expect_mount()])
+@pytest.mark.parametrize('expected', [
+    Rig.mount, lambda rig: rig.feeder.orientation.expect_mount()])
 def test_without_its_moving_mount_no_attitude_is_sent_and_no_fixed_mount_re_29_re_30(
         expected: Callable[[Rig], Any]) -> None:
     rig = Rig()
@@ -475,7 +476,7 @@ def test_without_its_moving_mount_no_attitude_is_sent_and_no_fixed_mount_re_29_r
     expected(rig)
     assert rig.feeder.next_deadline() > rig.now
     rig.feeder.link_opened(rig.now)
-    rig.feeder.set_fixed_mount((0.0, 0.0, 0.0), rig.now)
+    rig.feeder.orientation.set_fixed_mount((0.0, 0.0, 0.0), rig.now)
     rig.take()
     rig.run(0.6)
     assert rig.imu() == []

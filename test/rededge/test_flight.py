@@ -30,7 +30,13 @@ from illuminator_ros.payload.rotation import enu_flu, flip, Quaternion
 from illuminator_ros.payload.simulated import Description, SimulatedComponents
 from illuminator_ros.rededge.client import RedEdgeClient, Settings
 from illuminator_ros.rededge.conversions import Position
-from illuminator_ros.rededge.feeder import FeederSettings, Input, PositionSource, Stamp, UNKNOWN
+from illuminator_ros.rededge.input_states import (
+    FeederSettings,
+    Input,
+    PositionSource,
+    Stamp,
+    UNKNOWN,
+)
 from illuminator_ros.rededge.simulated import COLUMNS, SimulatedRedEdge
 import pytest
 from support.virtual_link import START, VirtualLink
@@ -97,9 +103,9 @@ class Rig:
 
     def attitude(self, time: float) -> None:
         truth, feeder, now = self.flight.truth(time), self.client.feeder, self.link.now
-        feeder.take_attitude(
+        feeder.orientation.take_attitude(
             Input.IMU, enu_flu(truth.vehicle), UNKNOWN, self.stamp(time), now)
-        feeder.take_mount(
+        feeder.orientation.take_mount(
             flip(truth.vehicle.inverse() * truth.camera * LENS), 'base_link',
             self.stamp(time), now)
 

@@ -23,7 +23,7 @@ from typing import Any
 from builtin_interfaces.msg import Time
 from geometry_msgs.msg import Quaternion, Vector3
 from illuminator_ros.rededge.conversions import Position
-from illuminator_ros.rededge.feeder import Stamp
+from illuminator_ros.rededge.input_states import Stamp
 from illuminator_ros.rededge.ros import inputs
 from illuminator_ros.rededge.ros.inputs import StampReader
 import pytest

@@ -32,7 +32,14 @@ from .inputs import subscriptions
 from ..camera import CameraConnected, CameraEvent, CameraLost, ImageTaken
 from ..client import RedEdgeClient, Settings
 from ..conversions import image_attitude, image_position, MountFrame
-from ..feeder import FeederSettings, Input, InputChanged, InputState, PositionSource, Stamp
+from ..input_states import (
+    FeederSettings,
+    Input,
+    InputChanged,
+    InputState,
+    PositionSource,
+    Stamp,
+)
 from ..messages import CameraFeedback, MAV_COMP_ID_CAMERA, Shot
 from ...mavlink.command_sender import CommandSender
 from ...payload.rotation import Vector
@@ -113,7 +120,8 @@ class CameraNode(ServedPayload):
         angles = {spec.name: spec.check(given.get(spec.name, spec.default))
                   for spec in MOUNT_PARAMETERS}
         self._parameters.show(angles)
-        client.feeder.set_fixed_mount(_angles(angles), host.link.clock() + DISCOVERY_TIME)
+        client.feeder.orientation.set_fixed_mount(
+            _angles(angles), host.link.clock() + DISCOVERY_TIME)
         ParameterServices(
             host.node, host.link, host.log, self._parameters, configure=self._set_mount)
         host.diagnostics.add(DiagnosticsSource(
@@ -140,22 +148,22 @@ class CameraNode(ServedPayload):
     def _set_mount(
         self, changes: Mapping[str, object], now: float, answer: Callable[[str], None],
     ) -> None:
-        feeder = self._client.feeder
-        if not feeder.mount_is_fixed:
+        orientation = self._client.feeder.orientation
+        if not orientation.mount_is_fixed:
             answer('the mount is not fixed: ~/mount has or had a publisher; restart the node for '
                    'a fixed one')
             return
         node, specs = self._host.node, self._parameters.specs
         angles = {name: specs[name].check(changes.get(name, node.get_parameter(name).value))
                   for name in specs}
-        feeder.set_fixed_mount(_angles(angles), now)
+        orientation.set_fixed_mount(_angles(angles), now)
         answer(self._parameters.show(angles))
 
     def poll(self, now: float) -> None:
         """See :meth:`ServedPayload.poll`."""
-        if (self._client.feeder.mount_is_fixed
-                and self._host.node.count_publishers(self._mount_topic)):
-            self._client.feeder.expect_mount()
+        orientation = self._client.feeder.orientation
+        if orientation.mount_is_fixed and self._host.node.count_publishers(self._mount_topic):
+            orientation.expect_mount()
             self._host.log.info('~/mount has a publisher: the mount is not fixed')
 
     # Events

@@ -21,7 +21,8 @@ import math
 
 from ..camera import CameraSnapshot
 from ..client import ClientSnapshot
-from ..feeder import FeederSnapshot, Input, InputSnapshot, InputState
+from ..feeder import FeederSnapshot
+from ..input_states import Input, InputSnapshot, InputState
 from ..messages import MAV_COMP_ID_CAMERA
 from ...mavlink.command_sender import format_seconds
 from ...ros.diagnostics import (

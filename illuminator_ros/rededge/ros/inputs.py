@@ -30,7 +30,8 @@ from sensor_msgs.msg import Imu, NavSatFix, TimeReference
 from std_msgs.msg import Header, UInt32
 
 from ..conversions import Position, standard_deviations
-from ..feeder import Feeder, Input, Stamp, UNKNOWN
+from ..feeder import Feeder
+from ..input_states import Input, Stamp, UNKNOWN
 from ...mavlink.link import Link
 from ...payload.rotation import Quaternion, Vector
 from ...ros.conversions import NO_VALUE, read_orientation, read_quaternion, read_vector
@@ -112,13 +113,13 @@ def subscriptions(node: Node, link: Link, feeder: Feeder) -> Iterable[AnyCommand
               feeder.take_velocity),
         CommandTopic(Input.SATELLITES.value, UInt32, feeder.take_satellites),
         topic(Input.IMU, Imu, orientation_and_rates,
-              functools.partial(feeder.take_attitude, Input.IMU)),
+              functools.partial(feeder.orientation.take_attitude, Input.IMU)),
         topic(Input.ATTITUDE, QuaternionStamped,
               lambda one: (read_quaternion(one.quaternion), UNKNOWN),
-              functools.partial(feeder.take_attitude, Input.ATTITUDE)),
+              functools.partial(feeder.orientation.take_attitude, Input.ATTITUDE)),
         topic(Input.MOUNT, QuaternionStamped,
               lambda one: (read_quaternion(one.quaternion), one.header.frame_id),
-              feeder.take_mount),
+              feeder.orientation.take_mount),
         topic(Input.TIME_REFERENCE, TimeReference,
               lambda one: (one.time_ref.sec * 1_000_000_000 + one.time_ref.nanosec,),
               feeder.take_time_reference),

@@ -1,0 +1,239 @@
+# Copyright 2026 The illuminator_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""The inputs of a camera: their messages are accepted or refused, and they become stale."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping
+import contextlib
+from dataclasses import dataclass
+from enum import Enum
+import math
+from typing import NamedTuple
+
+from .conversions import MountFrame
+from ..mavlink.command_sender import format_seconds
+from ..payload.rotation import Vector
+
+# s for which the offset of UTC from ROS time holds.
+TIME_REFERENCE_LIFETIME = 60.0
+UNKNOWN: Vector = (math.nan, math.nan, math.nan)
+
+
+class Input(Enum):
+    """The inputs, named after their topics."""
+
+    FIX = 'fix'
+    VELOCITY = 'velocity'
+    SATELLITES = 'satellites'
+    IMU = 'imu'
+    ATTITUDE = 'attitude'
+    MOUNT = 'mount'
+    TIME_REFERENCE = 'time_reference'
+
+
+class InputState(Enum):
+    """The state of an input."""
+
+    MISSING = 'missing'
+    OK = 'ok'
+    STALE = 'stale'
+    REFUSED = 'refused'
+
+
+class PositionSource(Enum):
+    """The messages by which the camera gets position and UTC; only one kind may be sent."""
+
+    RAW = 'raw'
+    FUSED = 'fused'
+
+
+@dataclass(frozen=True)
+class FeederSettings:
+    """
+    The settings of the inputs.
+
+    :param geoid_separation: height of mean sea level above the ellipsoid, m.
+    :param mount_frame: the axes of the camera's frame in ``~/mount``.
+    :param attitude_rate: the highest rate of attitudes, Hz.
+    :param position_timeout: age, s, at which a fix, a velocity or satellites are stale.
+    :param attitude_timeout: likewise for an attitude or a mount.
+    """
+
+    position_source: PositionSource = PositionSource.RAW
+    geoid_separation: float = 0.0
+    mount_frame: MountFrame = MountFrame.CAMERA
+    attitude_rate: float = 20.0
+    position_timeout: float = 1.0
+    attitude_timeout: float = 0.5
+    send_gps_status: bool = False
+
+    def timeout(self, name: Input) -> float:
+        """Return the age at which an input is stale, s."""
+        if name is Input.TIME_REFERENCE:
+            return TIME_REFERENCE_LIFETIME
+        return (self.attitude_timeout if name in (Input.IMU, Input.ATTITUDE, Input.MOUNT)
+                else self.position_timeout)
+
+
+class Stamp(NamedTuple):
+    """
+    The stamp of a message.
+
+    :param time: ROS time, ns.
+    :param age: its age on reception by the ROS clock, s; negative for a stamp in the future.
+    :param simulated: whether ROS time is simulated, so that it is not UTC.
+    """
+
+    time: int
+    age: float
+    simulated: bool = False
+
+    def check_age(self, timeout: float) -> None:
+        """Raise ValueError if the stamp is too old, or too far in the future."""
+        if self.age > timeout:
+            raise ValueError(f'its stamp is {format_seconds(self.age)} old by the ROS clock')
+        if self.age < -timeout:
+            raise ValueError(f'its stamp is {format_seconds(-self.age)} ahead of the ROS clock')
+
+    def check_newer(self, last: int | None) -> None:
+        """Raise ValueError if the message is repeated or overtaken; the last stamp is in ns."""
+        if last is not None and self.time <= last:
+            raise ValueError('its stamp is not newer than the last')
+
+
+@dataclass(frozen=True)
+class InputSnapshot:
+    """
+    An input at one moment.
+
+    :param age: since the last accepted message, s; None if there was none.
+    :param refusal: why the last refused message was refused, '' if no message was.
+    :param refused_age: the time since that message, s; None if no message was refused.
+    :param refused: the number of refused messages.
+    """
+
+    state: InputState
+    age: float | None
+    refusal: str
+    refused_age: float | None
+    refused: int
+
+
+@dataclass(frozen=True)
+class InputChanged:
+    """
+    The state of an input has changed.
+
+    :param text: the reason, for people.
+    """
+
+    input: Input  # noqa: A003 - the field's term
+    state: InputState
+    text: str
+
+
+@dataclass
+class _Tracker:
+    """Tracks whether an input is missing, used, stale or refused."""
+
+    name: Input
+    timeout: float
+    emit: Callable[[InputChanged], None]
+    accepted_at: float = -math.inf
+    refused_at: float = -math.inf
+    refusal: str = ''
+    refused: int = 0
+    reported: InputState = InputState.MISSING
+
+    def refuse(self, reason: str, now: float) -> None:
+        self.refused += 1
+        self.refused_at, self.refusal = now, reason
+
+    def state(self, now: float) -> InputState:
+        if now < self.accepted_at + self.timeout:
+            return InputState.OK
+        if now < self.refused_at + self.timeout:
+            return InputState.REFUSED
+        if max(self.accepted_at, self.refused_at) > -math.inf:
+            return InputState.STALE
+        return InputState.MISSING
+
+    def report(self, now: float) -> None:
+        """Emit the state if it has changed since the last call."""
+        state = self.state(now)
+        if state is not self.reported:
+            self.reported = state
+            self.emit(InputChanged(self.name, state, {
+                InputState.OK: 'received', InputState.REFUSED: self.refusal}.get(
+                    state, f'nothing for {format_seconds(self.timeout)}')))
+
+    def next_change(self) -> float:
+        """Return when the reported state ends by itself, s."""
+        if self.reported in (InputState.MISSING, InputState.STALE):
+            return math.inf
+        return self.timeout + (
+            self.accepted_at if self.reported is InputState.OK else self.refused_at)
+
+    def snapshot(self, now: float) -> InputSnapshot:
+        accepted, refused = (now - at if at > -math.inf else None
+                             for at in (self.accepted_at, self.refused_at))
+        return InputSnapshot(self.state(now), accepted, self.refusal, refused, self.refused)
+
+
+class InputStates:
+    """
+    The states of all inputs.
+
+    :param emit: takes the changes of inputs.
+    """
+
+    def __init__(
+        self, settings: FeederSettings, emit: Callable[[InputChanged], None],
+    ) -> None:
+        self._trackers = {name: _Tracker(name, settings.timeout(name), emit) for name in Input}
+
+    @contextlib.contextmanager
+    def take(self, name: Input, now: float, age: float = 0.0) -> Iterator[None]:
+        """
+        Take a message in the context, which raises ValueError with the reason to refuse it.
+
+        :param age: of a message that is used later, s.
+        """
+        tracker = self._trackers[name]
+        try:
+            yield
+        except ValueError as error:
+            tracker.refuse(str(error), now)
+        else:
+            tracker.accepted_at = now - max(0.0, age)
+        tracker.report(now)
+
+    def is_fresh(self, name: Input, now: float) -> bool:
+        """Return whether an input can be used."""
+        return self._trackers[name].state(now) is InputState.OK
+
+    def snapshot(self, now: float) -> Mapping[Input, InputSnapshot]:
+        """Return all inputs at this moment."""
+        return {name: one.snapshot(now) for name, one in self._trackers.items()}
+
+    def poll(self, now: float) -> None:
+        """See :meth:`Payload.poll`."""
+        for tracker in self._trackers.values():
+            tracker.report(now)
+
+    def next_deadline(self) -> float:
+        """See :meth:`Payload.next_deadline`."""
+        return min(one.next_change() for one in self._trackers.values())

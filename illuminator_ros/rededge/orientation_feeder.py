@@ -1,0 +1,219 @@
+# Copyright 2026 The illuminator_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Attitude of the vehicle and mount of the camera, as pairs of one instant."""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Callable
+from dataclasses import dataclass, field
+import math
+from typing import NamedTuple
+
+from . import conversions
+from .conversions import MountParent
+from .input_states import FeederSettings, Input, InputStates, Stamp, UNKNOWN
+from ..mavlink.messages import Address, Message, time_boot_ms
+from ..payload.rotation import Quaternion, Vector
+
+# s between messages about a fixed mount while there is no attitude; the camera uses it for 5 s.
+MOUNT_INTERVAL = 1.0
+# Attitudes, and mounts, that are kept to find a pair of one instant.
+MAX_SAMPLES = 256
+
+
+class _Sample(NamedTuple):
+    time: int
+    rotation: Quaternion
+    rates: Vector
+
+
+@dataclass
+class _History:
+    """Rotations of one input in the order of their stamps; a pair may be ``timeout`` s apart."""
+
+    timeout: float
+    samples: deque[_Sample] = field(default_factory=lambda: deque(maxlen=MAX_SAMPLES))
+
+    def add(self, rotation: Quaternion, rates: Vector, stamp: Stamp) -> None:
+        """Add a rotation of any norm, or raise ValueError."""
+        stamp.check_age(self.timeout)
+        stamp.check_newer(self.samples[-1].time if self.samples else None)
+        self.samples.append(_Sample(stamp.time, rotation.normalized(), rates))
+
+    def at(self, time: int) -> _Sample | None:
+        """Return the rotation at a time, interpolated; None if it is not known."""
+        newer: _Sample | None = None
+        for sample in reversed(self.samples):
+            if sample.time <= time:
+                if newer is None or sample.time == time:
+                    return sample if sample.time == time else None
+                if newer.time - sample.time > self.timeout * 1e9:
+                    return None
+                share = (time - sample.time) / (newer.time - sample.time)
+                return _Sample(time, conversions.interpolate(
+                    sample.rotation, newer.rotation, share), newer.rates)
+            newer = sample
+        return None
+
+
+class OrientationFeeder:
+    """
+    Sends pairs of attitude and mount, and repeats a fixed mount.
+
+    :param send: sends a message.
+    :param target: returns the address of the camera.
+    :ivar sent: sent pairs; pairs that are made while the link is closed are dropped.
+    """
+
+    def __init__(
+        self, settings: FeederSettings, send: Callable[[Message], None],
+        target: Callable[[], Address], inputs: InputStates,
+    ) -> None:
+        self.sent = 0
+        self._settings = settings
+        self._send = send
+        self._target = target
+        self._inputs = inputs
+        self._histories = {name: _History(settings.attitude_timeout)
+                           for name in (Input.IMU, Input.ATTITUDE, Input.MOUNT)}
+        self._mount_parent = MountParent.VEHICLE
+        # Roll, pitch and yaw of a fixed mount, degrees; None if ~/mount has a publisher.
+        self._fixed_mount: Vector | None = (0.0, 0.0, 0.0)
+        self._fixed_since = -math.inf
+        # When mount angles were sent last, s; infinity while the link is closed.
+        self._mount_sent_at = math.inf
+        self._pair_due = -math.inf
+        self._pair_time = 0
+
+    def take_attitude(
+        self, name: Input, orientation: Quaternion | None, rates: Vector, stamp: Stamp,
+        now: float,
+    ) -> None:
+        """
+        Take the orientation of the vehicle's FLU body in ENU.
+
+        :param name: IMU or ATTITUDE; IMU takes precedence while it is received.
+        :param orientation: of any norm; None if the message has none.
+        :param rates: of the body, FLU, rad/s; NaN if unknown.
+        """
+        with self._inputs.take(name, now):
+            if orientation is None:
+                raise ValueError('it has no orientation: its covariance begins with -1')
+            self._histories[name].add(orientation, rates, stamp)
+        self._send_pair(now)
+
+    def take_mount(
+        self, orientation: Quaternion, frame_id: str, stamp: Stamp, now: float,
+    ) -> None:
+        """
+        Take the orientation of the camera; the mount is then not fixed.
+
+        :param frame_id: the frame of the orientation, see :class:`~.conversions.MountParent`.
+        """
+        mounts = self._histories[Input.MOUNT]
+        self.expect_mount()
+        with self._inputs.take(Input.MOUNT, now):
+            parent = MountParent.of(frame_id)
+            if parent is not self._mount_parent:
+                self._mount_parent = parent
+                mounts.samples.clear()
+            mounts.add(orientation, UNKNOWN, stamp)
+        self._send_pair(now)
+
+    @property
+    def mount_is_fixed(self) -> bool:
+        """Return whether the mount is given by parameters, and not by ``~/mount``."""
+        return self._fixed_mount is not None
+
+    def expect_mount(self) -> None:
+        """Stop sending the fixed mount, since ``~/mount`` has a publisher."""
+        self._fixed_mount = None
+
+    def set_fixed_mount(self, angles: Vector, since: float) -> None:
+        """
+        Set roll, pitch and yaw of a fixed mount, degrees; no effect with ``~/mount``.
+
+        :param since: when it may be sent first, s.
+        """
+        if self._fixed_mount is not None:
+            self._fixed_mount, self._fixed_since = angles, since
+            if self._link_open:
+                self._mount_sent_at = -math.inf
+
+    def _send_pair(self, now: float) -> None:
+        """Send the newest known attitude and mount of one instant, back to back."""
+        is_fresh, mounts = self._inputs.is_fresh, self._histories[Input.MOUNT]
+        name = Input.IMU if is_fresh(Input.IMU, now) else Input.ATTITUDE
+        history = self._histories[name]
+        if now < self._pair_due or not (is_fresh(name, now) and history.samples):
+            return
+        time, angles = history.samples[-1].time, self._fixed_mount
+        if angles is None:
+            if not (is_fresh(Input.MOUNT, now) and mounts.samples):
+                return
+            time = min(time, mounts.samples[-1].time)
+        elif now < self._fixed_since:
+            return
+        mount, sample = mounts.at(time), history.at(time)
+        if sample is None or time <= self._pair_time:
+            return
+        if angles is None:
+            if mount is None:
+                return
+            angles = conversions.mount_angles(
+                conversions.in_vehicle(mount.rotation, self._mount_parent, sample.rotation),
+                self._settings.mount_frame)
+        self._pair_time = time
+        interval = 1 / self._settings.attitude_rate
+        self._pair_due = max(self._pair_due + interval, now + interval / 2)
+        self._send(conversions.attitude(sample.rotation, sample.rates, time_boot_ms(now)))
+        self._send_mount(angles, now)
+        self.sent += self._link_open
+
+    def _send_mount(self, angles: Vector, now: float) -> None:
+        self._send(conversions.mount_status(angles, self._target()))
+        if self._link_open:
+            self._mount_sent_at = now
+
+    def clock_jumped(self) -> None:
+        """Forget everything that depends on ROS time."""
+        self._pair_time = 0
+        for history in self._histories.values():
+            history.samples.clear()
+
+    def link_opened(self, now: float) -> None:
+        """Let the next :meth:`poll` send the fixed mount."""
+        # The link repeats the call while it hears no peer.
+        if not self._link_open:
+            self._mount_sent_at = -math.inf
+
+    def link_closed(self) -> None:
+        """Stop repeating the fixed mount until the link is open again."""
+        self._mount_sent_at = math.inf
+
+    @property
+    def _link_open(self) -> bool:
+        return self._mount_sent_at < math.inf
+
+    def poll(self, now: float) -> None:
+        """See :meth:`Payload.poll`."""
+        if self._fixed_mount is not None and now >= self.next_deadline():
+            self._send_mount(self._fixed_mount, now)
+
+    def next_deadline(self) -> float:
+        """See :meth:`Payload.next_deadline`."""
+        return math.inf if self._fixed_mount is None else max(
+            self._fixed_since, self._mount_sent_at + MOUNT_INTERVAL)
