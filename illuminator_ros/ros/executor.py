@@ -15,36 +15,43 @@
 """
 An executor that keeps its wait set, and services that answer later.
 
-For each callback rclpy makes new lists, a wait set, a task and three coroutines, and does so
-twice more afterwards. That takes 0.2 ms before and 0.2 ms after the callback of a service, which
-itself takes 0.01 ms.
+For each callback rclpy makes new lists, a wait set, a task and coroutines, and does so again
+afterwards: with rclpy's executor ``~/enable`` takes a third longer, and with 100 nodes five times
+as long (doc/performance.md). The EventsExecutor of rclpy 7.1.6 spins and answers no service; one
+that answers would replace this one.
 """
 
 from __future__ import annotations
 
-from collections import deque
 from collections.abc import Callable
 import contextlib
 import functools
+import heapq
+import itertools
 import math
 import threading
 import time
 from typing import Any
 
+from rclpy.callback_groups import ReentrantCallbackGroup
 from rclpy.context import Context
 from rclpy.exceptions import InvalidHandle
 from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
 from rclpy.guard_condition import GuardCondition
 from rclpy.impl.implementation_singleton import rclpy_implementation as _rclpy
 from rclpy.node import Node
+from rclpy.qos import QoSProfile
 from rclpy.service import Service
 from rclpy.subscription import Subscription
+from rclpy.task import Future
 
-from .answer_queue import AnswerQueue, MAX_SPREAD
+from .answer_spacing import AnswerSpacing, MAX_SPREAD
 from .throttled_log import NodeLog
 
 # s between checks for calls while rclpy's own loop runs.
 FALLBACK_PERIOD = 0.1
+# Answers that wait for their time; more would fill the memory and come too late.
+MAX_WAITING = 250
 # The answer to requests that wait at the end.
 ENDED = 'the bridge ended first; the device may have executed the request'
 
@@ -56,25 +63,38 @@ Take = Callable[[Any, Respond], None]
 
 class DeferredService:
     """
-    The callback of a service that answers later; only a :class:`NodeExecutor` calls it.
+    A service that answers later.
 
     :param take: called with the request, and with the function that sends the response.
     :param refuse_waiting: called with the reason when the executor ends; answers what waits.
     :param spread: s within which the answers to requests that came together are sent.
-    :ivar answers: paces its answers.
     """
 
     def __init__(
-        self, take: Take, refuse_waiting: Callable[[str], None] = lambda reason: None,
-        spread: float = MAX_SPREAD,
+        self, node: Node, type_: type[Any], name: str, take: Take,
+        refuse_waiting: Callable[[str], None] = lambda reason: None,
+        spread: float = MAX_SPREAD, qos: QoSProfile | None = None,
     ) -> None:
         self.take = take
         self.refuse_waiting = refuse_waiting
-        self.answers = AnswerQueue(spread)
+        self.spacing = AnswerSpacing(spread)
+        self._node = node
+        # In a group of its own: a coroutine that waits would stop the other callbacks of a group.
+        node.create_service(
+            type_, name, self.serve, callback_group=ReentrantCallbackGroup(),
+            **({'qos_profile': qos} if qos else {}))
 
-    def __call__(self, request: object, response: object) -> object:
-        """Fail: another executor cannot wait for the answer."""
-        raise TypeError('a deferred service needs a NodeExecutor')
+    async def serve(self, request: Any, response: Any) -> Any:
+        """Answer in an executor of rclpy; a :class:`NodeExecutor` does not call this."""
+        future = Future()
+
+        def respond(answer: Any) -> None:
+            future.set_result(answer)
+            if executor := self._node.executor:
+                executor.wake()
+
+        self.take(request, respond)
+        return await future
 
 
 class NodeExecutor(SingleThreadedExecutor):
@@ -86,14 +106,15 @@ class NodeExecutor(SingleThreadedExecutor):
 
     def __init__(self, context: Context, log: NodeLog) -> None:
         self._wakeup = GuardCondition(None, None, context)
+        self._stale = threading.Event()
+        self._stale.set()
         super().__init__(context=context)
         self._log = log
         self._entities: _Entities | None = None
-        self._calls: deque[Callable[[], None]] = deque()
-        # Queues with answers that wait; only the executor's thread changes the set.
-        self._queues: set[AnswerQueue] = set()
-        self._stale = threading.Event()
-        self._stale.set()
+        # A heap: the time from which on each is due (s, monotonic), its number, the function.
+        self._calls: list[tuple[float, int, Callable[[], None]]] = []
+        self._numbers = itertools.count()
+        self._calls_lock = threading.Lock()
         self._ended = threading.Event()
 
     def run(self) -> None:
@@ -120,17 +141,21 @@ class NodeExecutor(SingleThreadedExecutor):
         self._ended.set()
         self.call(lambda: None)
 
-    def call(self, function: Callable[[], None]) -> None:
-        """Call a function in the executor's thread; callable from any thread."""
-        self._calls.append(function)
+    def call(self, function: Callable[[], None], due: float = -math.inf) -> None:
+        """
+        Call a function in the executor's thread; callable from any thread.
+
+        :param due: s, monotonic; not before this time.
+        """
+        with self._calls_lock:
+            heapq.heappush(self._calls, (due, next(self._numbers), function))
         self._wakeup.trigger()
 
     def wake(self) -> None:
         """See :meth:`Executor.wake`: an entity or node was added or removed."""
         super().wake()
-        if hasattr(self, '_stale'):
-            self._stale.set()
-            self._wakeup.trigger()
+        self._stale.set()
+        self._wakeup.trigger()
 
     def add_node(self, node: Node) -> bool:
         """See :meth:`Executor.add_node`."""
@@ -158,55 +183,52 @@ class NodeExecutor(SingleThreadedExecutor):
                 self._serve(service)
             for subscription in subscriptions:
                 self._deliver(subscription)
-        self._answer(time.monotonic())
+        self._run_calls(time.monotonic())
         if not self.context.ok():
             raise ExternalShutdownException()
 
-    def _answer(self, now: float) -> None:
-        while self._calls:
-            self._calls.popleft()()
-        for queue in tuple(self._queues):
-            queue.poll(now)
-            if not queue:
-                self._queues.remove(queue)
+    def _timeout(self, timeout: float | None) -> float | None:
+        """Return how long to wait for entities, s, None for ever."""
+        if self._calls:
+            wait = max(self._calls[0][0] - time.monotonic(), 0.0)
+            timeout = wait if timeout is None else min(wait, timeout)
+        return timeout
+
+    def _run_calls(self, now: float) -> None:
+        while self._calls and self._calls[0][0] <= now:
+            with self._calls_lock:
+                _, _, function = heapq.heappop(self._calls)
+            function()
 
     def _refuse_waiting(self) -> None:
         if not self.context.ok():
             return
         for node in self.get_nodes():
             for service in node.services:
-                if isinstance(service.callback, DeferredService):
-                    service.callback.refuse_waiting(ENDED)
-        # No more requests are taken, so this ends; and no answer pauses any more.
-        while self._calls or self._queues:
-            self._answer(math.inf)
+                if deferred := _deferred(service):
+                    deferred.refuse_waiting(ENDED)
+        # No more requests are taken, so this ends; and no answer waits for its time any more.
+        self._run_calls(math.inf)
 
     def _release(self) -> None:
         if self._entities is not None:
             self._entities.close()
             self._entities = None
 
-    def _take_service(self, service: Service) -> object:
-        """See rclpy's Executor, whose loop calls it."""
-        if not isinstance(service.callback, DeferredService):
-            return super()._take_service(service)  # type: ignore[no-untyped-call]
-        with service.handle:
-            self._serve(service)
-        return None
-
     def _serve(self, service: Service) -> None:
-        """Take a request; the caller protects the handle of its service from destruction."""
+        """Take a request; the wait set protects the handle of its service from destruction."""
+        # Untyped: rclpy does not say that the class of a service has these classes.
         type_: Any = service.srv_type
+        callback: Any = service.callback
         request, header = service.handle.service_take_request(type_.Request)
         if header is None:
             return
-        callback: Any = service.callback
-        if isinstance(callback, DeferredService):
-            callback.answers.note_request()
-            take = callback.take
-            respond = functools.partial(self._respond, service, header, callback.answers)
+        if deferred := _deferred(service):
+            deferred.spacing.note_request()
+            take = deferred.take
+            respond = functools.partial(self._respond, service, header, deferred.spacing)
         else:
-            def take(request: object, respond: Callable[[object], None]) -> None:
+            def take(request: Any, respond: Respond) -> None:
                 respond(callback(request, type_.Response()))
 
             respond = functools.partial(_send, service, header)
@@ -218,37 +240,27 @@ class NodeExecutor(SingleThreadedExecutor):
             raise
 
     def _respond(
-        self, service: Service, header: _rclpy.rmw_service_info_t, queue: AnswerQueue,
-        response: object,
+        self, service: Service, header: _rclpy.rmw_service_info_t, spacing: AnswerSpacing,
+        response: Any,
     ) -> None:
-        send = functools.partial(_send, service, header, response)
+        now = time.monotonic()
+        due = spacing.time_of_answer(self._count_clients(service), now)
+        if len(self._calls) >= MAX_WAITING:
+            due = now
         # The middleware waits up to 0.1 s before it sends an answer to a client that it has not
         # discovered yet. The executor's thread then sends the answer, so that the link does not
         # wait.
-        if header.request_id.sequence_number <= 1:
-            send = functools.partial(self.call, send)
-        now = time.monotonic()
-        if not queue.send_or_queue(send, now):
-            self.call(functools.partial(self._queues.add, queue))
-        queue.count_clients(functools.partial(self._count_clients, service), now)
+        if due > now or header.request_id.sequence_number <= 1:
+            self.call(functools.partial(_send, service, header, response), due)
+        else:
+            _send(service, header, response)
 
-    def _count_clients(self, service: Service) -> int | None:
-        """Return how many clients a service has, None if that is unknown."""
+    def _count_clients(self, service: Service) -> int:
+        """Return how many clients a service has, 0 if that is unknown."""
         for node in self.get_nodes():
             with contextlib.suppress(InvalidHandle):
                 return node.count_clients(service.service_name)
-        return None
-
-    def _timeout(self, timeout: float | None) -> float | None:
-        """Return how long to wait for entities, s, None for ever."""
-        if self._calls:
-            # A call before these has failed.
-            return 0.0
-        due = min((queue.next_deadline() for queue in self._queues), default=math.inf)
-        if due < math.inf:
-            wait = max(due - time.monotonic(), 0.0)
-            timeout = wait if timeout is None else min(wait, timeout)
-        return timeout
+        return 0
 
     @staticmethod
     def _deliver(subscription: Subscription) -> None:
@@ -258,7 +270,13 @@ class NodeExecutor(SingleThreadedExecutor):
             subscription.callback(taken[0])
 
 
-def _send(service: Service, header: _rclpy.rmw_service_info_t, response: object) -> None:
+def _deferred(service: Service) -> DeferredService | None:
+    """Return the deferred service of a service of rclpy, None if it is another one."""
+    owner = getattr(service.callback, '__self__', None)
+    return owner if isinstance(owner, DeferredService) else None
+
+
+def _send(service: Service, header: _rclpy.rmw_service_info_t, response: Any) -> None:
     # The node of a forgotten device may be gone.
     with contextlib.suppress(InvalidHandle):
         service.send_response(response, header)
@@ -282,14 +300,9 @@ class _Entities:
             raise
         self._services = {service.handle.pointer: service for service in services}
         self._subscriptions = {one.handle.pointer: one for one in subscriptions}
-        self._wait_set = wait_set = _rclpy.WaitSet(
+        self._guards = guards
+        self._wait_set = _rclpy.WaitSet(
             len(subscriptions), len(guards), 0, 0, len(services), 0, context.handle)
-        # Looked up once: a method is a new object each time.
-        add_service, add_subscription = wait_set.add_service, wait_set.add_subscription
-        self._added = [
-            *((add_service, service.handle) for service in services),
-            *((add_subscription, one.handle) for one in subscriptions),
-            *((wait_set.add_guard_condition, guard.handle) for guard in guards)]
 
     @classmethod
     def of(
@@ -307,8 +320,12 @@ class _Entities:
         """Wait, and return the services and subscriptions that are ready."""
         wait_set = self._wait_set
         wait_set.clear_entities()
-        for add, handle in self._added:
-            add(handle)
+        for service in self._services.values():
+            wait_set.add_service(service.handle)
+        for subscription in self._subscriptions.values():
+            wait_set.add_subscription(subscription.handle)
+        for guard in self._guards:
+            wait_set.add_guard_condition(guard.handle)
         wait_set.wait(-1 if timeout is None else int(timeout * 1e9))
         return ([self._services[one] for one in wait_set.get_ready_entities('service')],
                 [self._subscriptions[one] for one in wait_set.get_ready_entities('subscription')])

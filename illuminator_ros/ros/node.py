@@ -130,10 +130,8 @@ class NodeInterface:
         self._types = {one.name: one.type for one in publications}
         for service in services:
             calls = LinkCalls(link, log, service.limit)
-            node.create_service(
-                service.type, f'~/{service.name}',
-                DeferredService(_taker(service, calls), calls.refuse_waiting),
-                qos_profile=SERVICE_QOS)
+            DeferredService(node, service.type, f'~/{service.name}', _taker(service, calls),
+                            calls.refuse_waiting, qos=SERVICE_QOS)
         for command in commands:
             node.create_subscription(
                 command.type, f'~/{command.name}', _Newest(link, log, command).offer,

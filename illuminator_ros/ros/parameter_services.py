@@ -81,9 +81,8 @@ class ParameterServices:
                          reliability=qos_profile_services_default.reliability)
 
         def serve(type_: type[Any], name: str, take: Take) -> None:
-            node.create_service(
-                type_, f'~/{name}',
-                DeferredService(take, self._calls.refuse_waiting, ANSWER_SPREAD), qos_profile=qos)
+            DeferredService(node, type_, f'~/{name}', take, self._calls.refuse_waiting,
+                            ANSWER_SPREAD, qos)
 
         each = self._each
         serve(srv.DescribeParameters, 'describe_parameters', lambda request, respond: respond(

@@ -22,7 +22,8 @@ import re
 import socket
 import threading
 
-from illuminator_ros.ros import answer_queue
+from illuminator_ros.ros import answer_spacing
+from illuminator_ros.ros import executor as executor_module
 from illuminator_ros.ros.executor import DeferredService, ENDED, NodeExecutor, Respond
 from illuminator_ros.ros.node import SERVICE_QOS
 from illuminator_ros.ros.payload_node import PayloadNode
@@ -163,8 +164,7 @@ MakeClient = Callable[[str], Client]
 @pytest.fixture
 def node(ros: Ros, monkeypatch: pytest.MonkeyPatch) -> Iterator[Node]:
     """Yield a node of an executor that sends spaced answers hours apart."""
-    monkeypatch.setattr(answer_queue, 'PAUSE_PER_CLIENT', 3600.0)
-    monkeypatch.setattr(answer_queue, 'CLIENT_COUNT_INTERVAL', 0.0)
+    monkeypatch.setattr(answer_spacing, 'PAUSE_PER_CLIENT', 3600.0)
     node = PayloadNode('served', context=ros.context)
     executor = NodeExecutor(ros.context, NodeLog(node.get_logger()))
     node.create_service(Trigger, '~/fast', lambda request, response: response)
@@ -204,28 +204,31 @@ def serve_later(node: Node) -> Log[Respond]:
         for respond in waiting:
             respond(Trigger.Response(message=reason))
 
-    node.create_service(
-        Trigger, '~/slow', DeferredService(take, refuse_waiting, spread=math.inf),
-        qos_profile=SERVICE_QOS)
+    DeferredService(
+        node, Trigger, '~/slow', take, refuse_waiting, spread=math.inf, qos=SERVICE_QOS)
     return waiting
 
 
 def call(client: Client, waiting: Log[Respond], count: int) -> list[Call]:
-    """Call a service until that many requests wait for their answers."""
+    """Call a service until that many more requests wait for their answers."""
+    before = len(waiting)
     calls = [Call(client.call_async(Trigger.Request())) for _ in range(count)]
-    waiting.wait_for(lambda one: True, count=count)
+    waiting.wait_for(lambda one: True, count=before + count)
     return calls
 
 
 def test_spaced_answers_do_not_delay_other_services_and_are_bounded(
     node: Node, clients: MakeClient, monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    monkeypatch.setattr(answer_queue, 'MAX_WAITING', 3)
+    monkeypatch.setattr(executor_module, 'MAX_WAITING', 3)
     waiting = serve_later(node)
     slow, fast = clients('slow'), clients('fast')
+    [first] = call(slow, waiting, 1)
+    waiting[0](Trigger.Response())
+    first.result()
     calls = call(slow, waiting, 20)
 
-    for respond in list(waiting):
+    for respond in list(waiting)[1:]:
         respond(Trigger.Response())
 
     eventually(lambda: sum(one.answered for one in calls) == len(calls) - 3)
@@ -238,34 +241,32 @@ def test_answers_are_spaced_where_a_service_has_more_clients_than_are_answered_a
 ) -> None:
     waiting = serve_later(node)
     fast = clients('fast')
-    callers = [clients('slow') for _ in range(answer_queue.MAX_UNSPACED + 1)]
+    callers = [clients('slow') for _ in range(answer_spacing.MAX_UNSPACED + 1)]
     eventually(lambda: node.count_clients('~/slow') == len(callers))
     calls = []
-    # Call in turn: the node counts the clients after the first answer, so the third one waits.
-    for count, caller in enumerate(callers[:3], 1):
-        calls.append(Call(caller.call_async(Trigger.Request())))
-        waiting.wait_for(lambda one: True, count=count)
-        list(waiting)[-1](Trigger.Response())
+    for caller in callers[:2]:
+        calls += call(caller, waiting, 1)
+        waiting[-1](Trigger.Response())
 
-    for answered in calls[:2]:
-        answered.result()
+    calls[0].result()
     Call(fast.call_async(Trigger.Request())).result()
-    assert not calls[2].answered
+    assert not calls[1].answered
 
 
 def test_answer_that_comes_while_the_executor_sends_another_one_does_not_stop_it(
     node: Node, clients: MakeClient, monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    monkeypatch.setattr(answer_queue, 'PAUSE_PER_CLIENT', 0.001)
+    monkeypatch.setattr(answer_spacing, 'PAUSE_PER_CLIENT', 0.001)
     waiting = serve_later(node)
     slow, fast = clients('slow'), clients('fast')
-    calls = call(slow, waiting, answer_queue.MAX_UNSPACED + 2)
+    calls = call(slow, waiting, answer_spacing.MAX_UNSPACED + 2)
     left = list(waiting)
-    genuine = Service.send_response
+    genuine, nested = Service.send_response, Log[int]()
 
     def send_response(service: Service, *arguments: object) -> None:
         genuine(service, *arguments)
-        if left and threading.current_thread().name == EXECUTOR:
+        if not nested and threading.current_thread().name == EXECUTOR:
+            nested.append(1)
             other = threading.Thread(target=left.pop(), args=(Trigger.Response(),))
             other.start()
             other.join()
@@ -273,17 +274,35 @@ def test_answer_that_comes_while_the_executor_sends_another_one_does_not_stop_it
     monkeypatch.setattr(Service, 'send_response', send_response)
     for _ in range(3):
         left.pop()(Trigger.Response())
+    nested.wait_for(lambda one: True)
+    while left:
+        left.pop()(Trigger.Response())
 
     for answered in calls:
         answered.result()
     Call(fast.call_async(Trigger.Request())).result()
 
 
+def test_deferred_service_answers_where_the_loop_of_rclpy_runs_for_the_sake_of_a_timer(
+    node: Node, clients: MakeClient,
+) -> None:
+    ticks: Log[int] = Log()
+    node.create_timer(0.01, lambda: ticks.append(1))
+    waiting = serve_later(node)
+    calls = call(clients('slow'), waiting, 2)
+    Call(clients('fast').call_async(Trigger.Request())).result()
+    ticks.wait_for(lambda one: True, count=2)
+    for respond in list(waiting):
+        respond(Trigger.Response())
+    for answered in calls:
+        answered.result()
+
+
 def test_executor_that_ends_refuses_requests_that_wait_without_a_pause(
     node: Node, clients: MakeClient,
 ) -> None:
     waiting = serve_later(node)
-    calls = call(clients('slow'), waiting, answer_queue.MAX_UNSPACED + 2)
+    calls = call(clients('slow'), waiting, answer_spacing.MAX_UNSPACED + 2)
     executor = node.executor
     assert isinstance(executor, NodeExecutor)
 
