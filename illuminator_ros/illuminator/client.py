@@ -36,10 +36,10 @@ from ..mavlink.messages import (
     MavType,
     Message,
 )
+from ..payload.attempt import Done, Result
 from ..payload.discovery import Discovery
 from ..payload.identity import Identity
 from ..payload.listeners import Listeners
-from ..payload.request import Done, Result
 
 # How many lost lights are asked for a status when the link opens: more would fill a slow line.
 MAX_ASKED = 8

@@ -42,24 +42,24 @@ class Switch(NamedTuple):
 
     @property
     def params(self) -> tuple[float, ...]:
-        """See :class:`~..payload.request.Change`."""
+        """See :class:`~..payload.attempt.Change`."""
         return (float(self.on),)
 
     @property
     def goal(self) -> str:
-        """See :class:`~..payload.request.Change`."""
+        """See :class:`~..payload.attempt.Change`."""
         return 'on' if self.on else 'off'
 
     def shown_by(self, status: Status) -> bool:
-        """See :class:`~..payload.request.Change`."""
+        """See :class:`~..payload.attempt.Change`."""
         return status.enabled is self.on
 
     def evidence(self, status: Status) -> str:
-        """See :class:`~..payload.request.Change`."""
+        """See :class:`~..payload.attempt.Change`."""
         return _despite_heat(status) if self.on else CONFIRMED
 
     def actual(self, status: Status) -> str:
-        """See :class:`~..payload.request.Change`."""
+        """See :class:`~..payload.attempt.Change`."""
         shown = {True: 'on', False: 'off', None: 'neither on nor off'}[status.enabled]
         return _with_flags(shown, status)
 
@@ -82,12 +82,12 @@ class Configure(NamedTuple):
 
     @property
     def params(self) -> tuple[float, ...]:
-        """See :class:`~..payload.request.Change`."""
+        """See :class:`~..payload.attempt.Change`."""
         return self.configuration.params()
 
     @property
     def goal(self) -> str:
-        """See :class:`~..payload.request.Change`."""
+        """See :class:`~..payload.attempt.Change`."""
         return self.configuration.describe(self.names)
 
     def _missing(self, status: Status) -> list[str]:
@@ -102,13 +102,13 @@ class Configure(NamedTuple):
                 if name in different or getattr(status, name) is None]
 
     def shown_by(self, status: Status) -> bool | None:
-        """See :class:`~..payload.request.Change`."""
+        """See :class:`~..payload.attempt.Change`."""
         if self._missing(status):
             return False
         return None if self._hidden(status) else True
 
     def evidence(self, status: Status) -> str:
-        """See :class:`~..payload.request.Change`."""
+        """See :class:`~..payload.attempt.Change`."""
         hidden = self._hidden(status)
         if not hidden:
             return CONFIRMED
@@ -120,6 +120,6 @@ class Configure(NamedTuple):
         return f'accepted (ILLUMINATOR_STATUS shows {", ".join(shown)})'
 
     def actual(self, status: Status) -> str:
-        """See :class:`~..payload.request.Change`."""
+        """See :class:`~..payload.attempt.Change`."""
         reported = status.configuration(self.configuration)
         return _with_flags(reported.describe(self._missing(status)), status)

@@ -17,12 +17,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import dataclass
 from enum import Enum
 import math
 import operator
 
 from .model import DIMMING_FLAGS, Mode, NOTHING, Status, unexpected_differences
-from ..payload.request import StatusReport
+from ..payload.attempt import StatusReport
 
 WRAP_MS = 1 << 32
 # s without progress after which a light has no clock.
@@ -39,6 +40,9 @@ PROVED_BOOT_SLACK = 2.0
 # s between the two statuses that prove a restart, and by how much their clocks may differ.
 RESTART_PROOF_TIME = 0.1
 RESTART_PROOF_ERROR = 0.05
+# s for which an ON waits for the statuses that show whether the light has restarted: long enough
+# for two of a light that sends one each second and none on request.
+RESTART_CHECK_TIME = 2.5
 # The same as RESTART_PROOF_TIME where the light seems to have started before its last status.
 CLOCK_JUMP_PROOF_TIME = 5.0
 # s for which a status is compared with later ones. With an oscillator without a crystal, whose
@@ -214,18 +218,20 @@ CLOCK_STEP = 1.5
 SENDER_TIME = 10.0
 # Returns to a starting time that prove a light.
 ENOUGH_RETURNS = 2
-# Share by which the time between two statuses of one light may vary.
-GAP_MARGIN = 1.2
 
 
+@dataclass
 class _Sender:
-    """A light, identified by a value that its statuses share: sender number or starting time."""
+    """
+    A light, identified by a value that its statuses share.
 
-    def __init__(self, number: int) -> None:
-        self.number = number
-        self.value = 0.0
-        self.seen_at = -math.inf
-        self.returns = 0
+    :param value: a sender number, or a starting time.
+    :param returns: how often statuses have returned to the value.
+    """
+
+    value: float
+    seen_at: float
+    returns: int = 0
 
 
 class _Senders:
@@ -233,14 +239,12 @@ class _Senders:
     Lights that a value distinguishes; a light is proved when statuses return to its value.
 
     :param is_same: whether two values are those of one light.
-    :ivar newest: the number of the light that has sent the newest status.
     """
 
     def __init__(self, is_same: Callable[[float, float], bool]) -> None:
-        self.newest = 0
         self._is_same = is_same
         self._senders: list[_Sender] = []
-        self._count = 0
+        self._newest: _Sender | None = None
 
     def take(self, value: float, now: float) -> None:
         """Take the value of a status."""
@@ -248,23 +252,19 @@ class _Senders:
             self._senders = [one for one in self._senders if now - one.seen_at <= SENDER_TIME]
         for one in self._senders:
             if self._is_same(value, one.value):
+                one.returns += one is not self._newest
                 break
         else:
-            self._count += 1
-            one = _Sender(self._count)
+            one = _Sender(value, now)
             self._senders = [*self._senders[1 - MAX_STATES:], one]
-        one.returns += one.seen_at > -math.inf and one.number != self.newest
         one.seen_at, one.value = now, value
-        self.newest = one.number
+        self._newest = one
 
-    def proved(self, now: float) -> frozenset[int]:
-        """Return the lights that have sent lately; the newest if there are not several."""
-        if len(self._senders) > 1:
-            proved = [one.number for one in self._senders
-                      if one.returns >= ENOUGH_RETURNS and now - one.seen_at <= SENDER_TIME]
-            if len(proved) > 1:
-                return frozenset(proved)
-        return frozenset((self.newest,))
+    def are_several(self, now: float) -> bool:
+        """Return whether several lights have sent lately."""
+        return len(self._senders) > 1 and sum(
+            one.returns >= ENOUGH_RETURNS and now - one.seen_at <= SENDER_TIME
+            for one in self._senders) > 1
 
 
 def _is_same_start(start: float, other: float) -> bool:
@@ -282,21 +282,16 @@ class AddressConflict:
     numbers. Lights of one component with the same state and start time cannot be distinguished.
 
     :ivar detected: whether several lights send.
-    :ivar sender: the light that has sent the newest status.
-    :ivar senders: the lights that have sent lately, as far as they can be distinguished.
     :ivar can_follow: whether the newest status can be followed: it does not go back to a state
         shown before, or it has been repeated.
     """
 
     def __init__(self) -> None:
         self.detected = False
-        self.sender = 0
-        self.senders: frozenset[int] = frozenset()
         self.can_follow = True
         self._evidence = 0
-        # The last one is at the end. Each has the time at which it was shown.
-        self._states: list[tuple[Status, float]] = []
-        self._gaps: list[float] = []
+        # The last one is at the end.
+        self._states: list[Status] = []
         self._by_start = _Senders(_is_same_start)
         self._by_number = _Senders(operator.eq)
         self._recent: list[Status] = []
@@ -322,40 +317,26 @@ class AddressConflict:
         self._recent = [*self._recent[1 - MAX_RECENT:], status]
         self._recent_uptimes = [*self._recent_uptimes[1 - MAX_RECENT:], uptime]
         if not commanded:
-            repeated = self._take_state(status, now)
+            repeated = self._take_state(status)
             self.can_follow = repeated or not self._evidence
         elif not self.detected:
             # Changes by our own commands are not evidence.
             self._states.clear()
             self._evidence = 0
             self.can_follow = True
-        by_start, by_number = self._by_start.proved(now), self._by_number.proved(now)
-        if len(by_number) > len(by_start):
-            self.sender, self.senders = self._by_number.newest, by_number
-        else:
-            self.sender, self.senders = self._by_start.newest, by_start
         self.detected = (self._evidence >= (1 if self.detected else ENOUGH_EVIDENCE)
-                         or len(self.senders) > 1)
+                         or self._by_start.are_several(now) or self._by_number.are_several(now))
 
-    @property
-    def span(self) -> float:
-        """Return s in which each light sends a status; 0 where they can be distinguished."""
-        if not self.detected or len(self.senders) > 1:
-            return 0.0
-        return GAP_MARGIN * max(self._gaps, default=0.0)
-
-    def _take_state(self, status: Status, now: float) -> bool:
+    def _take_state(self, status: Status) -> bool:
         """Return whether a status repeats the last state."""
-        for index, (state, at) in enumerate(reversed(self._states)):
+        for index, state in enumerate(reversed(self._states)):
             if _same_state(state, status):
                 self._evidence += 1 if index else -REPEAT_PENALTY
                 self._evidence = min(max(self._evidence, 0), MAX_EVIDENCE)
-                if index:
-                    self._gaps = [*self._gaps[1 - MAX_RECENT:], now - at]
                 del self._states[-1 - index]
-                self._states.append((status, now))
+                self._states.append(status)
                 return not index
-        self._states = [*self._states[1 - MAX_STATES:], (status, now)]
+        self._states = [*self._states[1 - MAX_STATES:], status]
         return len(self._states) == 1
 
 
@@ -383,31 +364,24 @@ def _shown(status: Status) -> tuple[object, ...]:
 
 class StatusTracker:
     """
-    Puts the statuses of one address in order.
+    Puts the statuses of one address in order, and finds out whether its light has restarted.
 
     :ivar conflict: determines whether they are those of several lights.
+    :ivar check_until: the time until which an ON waits, s, since the light may have restarted.
+    :ivar proof_due: when another status may show whether it has, s; infinity if that is known.
     """
 
     def __init__(self) -> None:
         self.conflict = AddressConflict()
+        self.check_until = -math.inf
+        self.proof_due = math.inf
         self._clock = UptimeClock()
         self._sending_times = SendingTimes()
-
-    @property
-    def is_suspecting(self) -> bool:
-        """Whether another status must soon show whether the light has restarted."""
-        return self._clock.is_suspecting
-
-    def take_uptime(self, status: Status, now: float, *, was_lost: bool) -> Uptime:
-        """
-        Return the meaning of the uptime of a status, which must be passed to :meth:`take`.
-
-        :param was_lost: whether the light was lost since the newest status.
-        """
-        return self._clock.take(status.uptime_ms, now, was_lost=was_lost)
+        # Whether the light was lost since the newest status.
+        self._was_lost = False
 
     def take(
-        self, status: Status, uptime: Uptime, now: float, *, commanded: bool, sender: int = 0,
+        self, status: Status, now: float, *, commanded: bool, sender: int = 0,
     ) -> tuple[StatusReport[Status] | None, bool]:
         """
         Return the report of a status, None if it is late, and whether the light has restarted.
@@ -415,22 +389,35 @@ class StatusTracker:
         :param sender: of the message.
         :param commanded: whether a command of ours may have changed the light.
         """
-        conflict = self.conflict
-        conflict.take(status, now, commanded=commanded, sender=sender)
-        if conflict.detected:
+        uptime = self._clock.take(status.uptime_ms, now, was_lost=self._was_lost)
+        self.proof_due = math.inf
+        self.conflict.take(status, now, commanded=commanded, sender=sender)
+        if self.conflict.detected:
             # The uptimes of several lights cannot be compared.
             self._clock = UptimeClock()
-            return StatusReport(status, now, False, True, conflict.sender, conflict.senders,
-                                conflict.span), False
+            self._was_lost = False
+            return StatusReport(status, now, has_clock=False, shared_address=True), False
         if uptime is Uptime.LATE:
+            if self._clock.is_suspecting:
+                self.proof_due = now + RESTART_PROOF_TIME
+                if now > self.check_until:
+                    self.check_until = now + RESTART_CHECK_TIME
             return None, False
+        self._was_lost = False
         restarted = uptime is Uptime.RESTARTED
         if restarted:
             self._sending_times = SendingTimes()
-        sent_by, has_clock = self._sending_times.take(status, now)
-        return StatusReport(status, sent_by, has_clock, sender=conflict.sender,
-                            senders=conflict.senders), restarted
+        return StatusReport(status, *self._sending_times.take(status, now)), restarted
+
+    def checked(self) -> None:
+        """Note that the configuration is compared with a status: no ON need wait for one."""
+        self.check_until = -math.inf
+
+    def found(self, now: float) -> None:
+        """Note that the light is heard: it may have restarted."""
+        self.check_until = now + RESTART_CHECK_TIME
 
     def lost(self) -> None:
         """Forget the other lights at the address: the light is lost."""
         self.conflict = AddressConflict()
+        self._was_lost = True

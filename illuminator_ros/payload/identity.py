@@ -20,7 +20,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 import math
 
-from .request import Target
+from .attempt import Target
 from ..mavlink.command_sender import CommandResult
 from ..mavlink.messages import ComponentInformationBasic
 

@@ -19,8 +19,8 @@ from __future__ import annotations
 import math
 from typing import Generic, TypeVar
 
-from .request import Change, Done, PERMANENT_RESULTS, Result, StatusReport, Target
-from ..mavlink.command_sender import CommandResult, format_seconds
+from .attempt import Change, Done, PERMANENT_RESULTS, Result, StatusReport, Target
+from ..mavlink.command_sender import Command, CommandResult, format_seconds
 
 # s between commands that are not confirmed, and from a status that is too old to the request for
 # the next one.
@@ -34,7 +34,7 @@ class LastChange(Generic[S]):
     """
     A change that is made again whenever the device does not have it. No I/O; times are s.
 
-    Unlike a :class:`~.request.Request` it needs no acknowledgement: no later command of ours can
+    Unlike an :class:`~.attempt.Attempt` it needs no acknowledgement: no later command of ours can
     undo it. Only a status that was sent after the first try shows it.
 
     :param report: called with a failure that is not permanent when a command is sent or has
@@ -54,8 +54,6 @@ class LastChange(Generic[S]):
         self._send_due = self._ask_due = -math.inf
         self._is_under_way = self._is_confirmed = False
         self._reason = ''
-        self._shown_by: set[int] = set()
-        self._shown_since = math.inf
 
     def _again(self, reason: str, now: float) -> None:
         self._reason = reason
@@ -75,29 +73,22 @@ class LastChange(Generic[S]):
         else:
             self._again(f'{outcome.describe_failure()} ({outcome.timing()})', now)
 
-    def take(self, report: StatusReport[S], now: float) -> None:
+    def reported(self, report: StatusReport[S], now: float) -> None:
         """Take a status that is newer than all before."""
-        delay = (self._target.shortest_round_trip(now) if report.has_clock
-                 else self._target.status_delay)
+        delay = self._target.status_delay(now, has_clock=report.has_clock)
         if not self._change.shown_by(report.status):
-            self._shown_by.clear()
-            self._shown_since = math.inf
             if self._is_confirmed:
                 self._is_confirmed = False
                 self._send_due = now
                 self._again(f'it shows {self._change.actual(report.status)} again', now)
         elif report.sent_by - delay < max(self._begun_at, self._counts_from):
             self._ask_due = min(self._ask_due, now + ASK_INTERVAL)
-        elif not self._is_confirmed:
-            # Each of several devices that report in turn must show it.
-            self._shown_by.add(report.sender)
-            self._shown_since = min(self._shown_since, now)
-            if report.senders <= self._shown_by and now >= self._shown_since + report.span:
-                self._is_confirmed = True
-                self._send_due = self._ask_due = math.inf
-                self._report(Result(True, (
-                    f'{self._change.goal}, {self._change.evidence(report.status)} '
-                    f'({format_seconds(now - self._begun_at)})')), now)
+        elif not (self._is_confirmed or report.shared_address):
+            self._is_confirmed = True
+            self._send_due = self._ask_due = math.inf
+            self._report(Result(True, (
+                f'{self._change.goal}, {self._change.evidence(report.status)} '
+                f'({format_seconds(now - self._begun_at)})')), now)
 
     def poll(self, now: float) -> None:
         """Send the command or ask for a status, if that is due; the device must be connected."""
@@ -107,8 +98,9 @@ class LastChange(Generic[S]):
             if not self._is_under_way:
                 self._is_under_way = True
                 self._again(self._reason, now)
-                self._target.send(self._change.command, self._change.params, now, self._answered,
-                                  overtake=True)
+                self._target.start(
+                    Command(self._target.address, self._change.command, self._change.params),
+                    now, self._answered, overtake=True)
         if now >= self._ask_due:
             self._ask_due = now + INTERVAL
             self._target.request_status(now)

@@ -27,8 +27,10 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from enum import Enum
 import math
-from typing import Generic, NamedTuple, Protocol, TypeVar
+from typing import Generic, Protocol, TypeVar
 
+from .attempt import Done as Done
+from .attempt import Result as Result
 from ..mavlink import command_sender
 from ..mavlink.messages import Address, MavCmd, MavResult
 
@@ -192,31 +194,6 @@ class Change(Protocol[S_contra]):
 
     def actual(self, status: S_contra) -> str:
         """Describe the state that a status shows instead, for people."""
-
-
-class Result(NamedTuple):
-    """
-    The outcome of a request.
-
-    :param success: whether the device accepted it and, if it sends a status, shows it.
-    :param message: the outcome for people.
-    :param refused: whether the device answered with another result than ACCEPTED.
-    :param permanent: whether the same request will fail again.
-    :param contradicted: whether the device accepted it and then showed something else.
-    :param superseded: whether a newer request replaced it.
-    :param note: a change that was not asked for but came with it, for people, '' if none.
-    """
-
-    success: bool
-    message: str
-    refused: bool = False
-    permanent: bool = False
-    contradicted: bool = False
-    superseded: bool = False
-    note: str = ''
-
-
-Done = Callable[[Result, float], None]
 
 
 def at_any_time() -> float:

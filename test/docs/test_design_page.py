@@ -22,7 +22,7 @@ from types import ModuleType
 from illuminator_ros.mavlink import command_sender as command
 from illuminator_ros.mavlink import link_state
 from illuminator_ros.mavlink.messages import MavResult
-from illuminator_ros.payload import request
+from illuminator_ros.payload import attempt
 import pytest
 from support.tables import table
 
@@ -54,7 +54,7 @@ def test_the_layout_names_each_module_once() -> None:
 
 
 @pytest.mark.parametrize(('module', 'first'), [
-    (link_state, 'OPENING'), (request, 'WAITING'), (command, 'SENT ')], ids=str)
+    (link_state, 'OPENING'), (attempt, 'SENT +--ACK'), (command, 'SENT +--TEMP')], ids=str)
 def test_a_diagram_has_the_transitions_of_the_table(module: ModuleType, first: str) -> None:
     [diagram] = re.findall(rf'```\n({first}.*?)```', PAGE, re.DOTALL)
     drawn = re.findall(r'(?=\b([A-Z_]+) +--([A-Z_]+)--> +([A-Z_]+))', diagram)

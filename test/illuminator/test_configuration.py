@@ -19,12 +19,12 @@ from __future__ import annotations
 from dataclasses import astuple, replace
 from typing import Any
 
-from illuminator_ros.illuminator.configuration_manager import RESTORE_INTERVAL
 from illuminator_ros.illuminator.events import ChangeCause
 from illuminator_ros.illuminator.light import Settings
+from illuminator_ros.illuminator.light_configuration import RESTORE_INTERVAL
 from illuminator_ros.illuminator.model import Configuration, float32, Mode, SafetyLimits
 from illuminator_ros.mavlink.messages import CommandAck, MavCmd, MavResult
-from illuminator_ros.payload.request import Result
+from illuminator_ros.payload.attempt import Result
 import pytest
 from support.back_to_back import Pair, START
 from support.fake_light import FakeLight

@@ -28,8 +28,8 @@ from illuminator_ros.illuminator.simulated_properties import (
     IlluminatorProperties,
 )
 from illuminator_ros.mavlink.messages import Address, MavCmd, MavResult
+from illuminator_ros.payload.attempt import Result
 from illuminator_ros.payload.command_sources import SourceSettings
-from illuminator_ros.payload.request import Result
 import pytest
 from support.back_to_back import Pair
 from support.fake_light import FakeLight

@@ -23,8 +23,9 @@ from typing import Any
 
 from illuminator_ros.mavlink import messages as mav
 from illuminator_ros.mavlink.signing import MAX_STREAMS, SigningMode
+from illuminator_ros.payload.attempt import Result
 from illuminator_ros.payload.discovery import MAX_DEVICES
-from illuminator_ros.payload.request import MAX_WAITING, Result
+from illuminator_ros.payload.reconciler import MAX_CALLERS
 import pytest
 from support.attacked_link import ATTACKED, AttackedBridge, AttackedLink, GENUINE
 from support.fake_light import status_message
@@ -155,7 +156,7 @@ def test_a_flood_of_requests_is_refused_beyond_a_limit_and_all_are_answered(
     bridge: AttackedBridge,
 ) -> None:
     light = bridge.controller.lights[GENUINE]
-    answers: list[list[Result]] = [[] for _ in range(10 * MAX_WAITING)]
+    answers: list[list[Result]] = [[] for _ in range(10 * MAX_CALLERS)]
 
     def ask(now: float) -> None:
         for results in answers:
@@ -165,7 +166,7 @@ def test_a_flood_of_requests_is_refused_beyond_a_limit_and_all_are_answered(
     bridge.check_bounds()
     bridge.check_service()
     assert [len(results) for results in answers] == [1] * len(answers)
-    assert [results[0].success for results in answers].count(True) == MAX_WAITING
+    assert [results[0].success for results in answers].count(True) == MAX_CALLERS
 
 
 # Values

@@ -20,9 +20,10 @@ from collections.abc import Callable
 from dataclasses import replace
 from typing import Any
 
-from illuminator_ros.illuminator.light import Light, RESTART_CHECK_TIME, Settings
+from illuminator_ros.illuminator.light import Light, Settings
 from illuminator_ros.illuminator.messages import STATUS_ID
 from illuminator_ros.illuminator.model import SafetyLimits
+from illuminator_ros.illuminator.status_tracker import RESTART_CHECK_TIME
 from illuminator_ros.mavlink.messages import MavCmd, MavResult
 from illuminator_ros.payload.command_sources import SourceSettings
 import pytest
@@ -212,7 +213,7 @@ def test_an_off_is_sent_at_once_and_cancels_the_on_that_waits() -> None:
     assert [one.param1 for one in pair.commands(ON_OFF, since=pair.now)] == [0.0]
     assert pair.wait_for(off).success
     pair.run(10.0)
-    assert on.result.message == 'cancelled by a later request'
+    assert on.result.message == 'superseded by off'
     assert light.shone == []
 
 
@@ -591,7 +592,7 @@ def test_an_on_does_not_wait_for_ever_where_parameters_are_set_without_a_pause()
     answer = on_at_connection(pair)
     sets: list[Answer] = []
     while not answer.results:
-        while sum(not one.results for one in sets) < 2:
+        if not sets or sets[-1].results:
             sets.append(pair.ask_configure(brightness=10 + len(sets) % 20))
             light.answers = {STATUS_ID} if pair.now > answer.asked_at + 0.5 else set()
         pair.run(0.001)

@@ -22,26 +22,16 @@ import re
 from typing import Any
 
 from illuminator_ros.illuminator.client import enable_all
-from illuminator_ros.illuminator.commands import Switch
-from illuminator_ros.illuminator.light import PROGRESS_LIMIT, REFRESH_LIMIT
-from illuminator_ros.illuminator.messages import IlluminatorStatus, STATUS_ID
-from illuminator_ros.illuminator.model import Status
+from illuminator_ros.illuminator.light import REFRESH_LIMIT
+from illuminator_ros.illuminator.messages import STATUS_ID
 from illuminator_ros.illuminator.simulated_properties import IlluminatorProperties
 from illuminator_ros.mavlink import messages as mav
-from illuminator_ros.mavlink.command_sender import CommandSender
+from illuminator_ros.payload.attempt import Result
 from illuminator_ros.payload.identity import Identity
-from illuminator_ros.payload.request import (
-    ASK_DELAY,
-    MAX_WAITING,
-    Request,
-    RequestQueue,
-    Result,
-    StatusReport,
-    Target,
-)
+from illuminator_ros.payload.reconciler import MAX_CALLERS, PROGRESS_LIMIT
 import pytest
 from support.back_to_back import BRIDGE, Pair
-from support.fake_light import FakeLight, LIGHT
+from support.fake_light import FakeLight
 from support.faulty_wire import Faults
 from support.records import Answer
 
@@ -226,22 +216,39 @@ def test_requests_to_a_lost_light_fail_at_once_with_the_reason(
 
 # Several requests
 
-def test_off_overtakes_the_requests_before_it(pair: Pair) -> None:
-    answers = [pair.ask_enable(on) for on in (True, False, True, True, False)]
+def test_a_newer_request_supersedes_an_older_one_and_equal_ones_share_its_outcome(
+    pair: Pair,
+) -> None:
+    answers = [pair.ask_enable(on) for on in (True, False, True, True, False, False)]
     pair.run(5.0)
+    assert [answer.result.superseded for answer in answers] == [True] * 4 + [False] * 2
+    assert [answer.result.message for answer in answers[:4]] == [
+        'superseded by off', 'superseded by on', 'superseded by off', 'superseded by off']
+    assert [answer.result.success for answer in answers[4:]] == [True, True]
     # OFF is sent twice: the first acknowledgement may belong to the ON.
-    assert [bool(m.param1) for m in pair.commands(ON_OFF)] == [True, False, False, False]
-    assert [answer.result.success for answer in answers] == [False, True, False, False, True]
-    assert [answer.result.superseded for answer in answers] == [True, False, True, True, False]
+    assert [bool(m.param1) for m in pair.commands(ON_OFF)] == [True, False, False]
 
 
-def test_of_a_stream_of_switches_only_the_newest_waits(fake: FakeLight, faked: Pair) -> None:
-    fake.results[ON_OFF] = None
-    first, *replaced, last = [faked.ask_enable(True, is_stream=True) for _ in range(10)]
-    assert all(answer.result.superseded for answer in replaced)
-    fake.results.clear()
-    assert faked.wait_for(first).success
-    assert faked.wait_for(last).success
+def test_an_on_that_follows_an_unacknowledged_off_is_sent_once_that_has_ended(
+    fake: FakeLight, faked: Pair,
+) -> None:
+    fake.results[ON_OFF] = [None, ACCEPTED]
+    off, on = faked.ask_enable(False), faked.ask_enable(True)
+    assert off.result.message == 'superseded by on'
+    assert [bool(m.param1) for m in faked.commands(ON_OFF)] == [False]
+    assert faked.wait_for(on).success
+    assert fake.fields['enable'] == 1
+
+
+def test_a_set_takes_over_the_values_of_the_set_that_it_supersedes(
+    fake: FakeLight, faked: Pair,
+) -> None:
+    fake.apply_after = 0.1
+    first, second = faked.ask_configure(brightness=50), faked.ask_configure(strobe_period=1)
+    assert first.result.message == (
+        'superseded by brightness 50 %, strobe_period 1 s, strobe_duty_cycle 50 %')
+    assert faked.wait_for(second).success
+    assert (fake.fields['brightness'], fake.fields['strobe_period']) == (50.0, 1.0)
 
 
 def test_an_on_of_a_stream_that_waits_is_not_sent_after_a_later_off(
@@ -297,17 +304,18 @@ def test_switches_and_configurations_do_not_wait_for_each_other(
         faked.run(5.0)
 
 
-def test_requests_above_the_limit_are_refused_at_once_and_the_others_answered(
+def test_a_flood_of_equal_requests_is_bounded_and_each_is_answered_once(
     fake: FakeLight, faked: Pair,
 ) -> None:
     fake.results[ON_OFF] = DENIED
-    answers = [faked.ask_enable(True) for _ in range(MAX_WAITING + 3)]
-    assert [answer for answer in answers if answer.results] == answers[MAX_WAITING:]
+    answers = [faked.ask_enable(True) for _ in range(MAX_CALLERS + 3)]
+    assert [answer for answer in answers if answer.results] == answers[MAX_CALLERS:]
     assert answers[-1].result.message == '32 requests are waiting for light 1/243 already'
+    streamed = [faked.ask_enable(True, is_stream=True) for _ in range(10)]
+    assert all(answer.result.superseded for answer in streamed[:-1])
     faked.run(10.0)
-    assert [len(answer.results) for answer in answers] == [1] * len(answers)
-    fake.results.clear()
-    assert faked.enable(True).success
+    assert {len(answer.results) for answer in (*answers, *streamed)} == {1}
+    assert len(faked.commands(ON_OFF)) == 1
 
 
 def test_requests_fail_with_the_link_and_are_not_sent_later(fake: FakeLight, faked: Pair) -> None:
@@ -317,8 +325,8 @@ def test_requests_fail_with_the_link_and_are_not_sent_later(fake: FakeLight, fak
     faked.run(0.1)
     faked.close()
     faked.run(0.01)
-    assert answers[0].result.message.startswith('the link was lost (1 try, ')
-    assert 'light 1/243 is lost' in answers[1].result.message
+    assert {answer.result.message.partition(' (')[0] for answer in answers[:5]} == {
+        'the link was lost'}
     assert not any(answer.result.success for answer in answers)
     faked.run(5.0)
     at = faked.now
@@ -368,49 +376,6 @@ def test_an_answer_that_raises_does_not_hold_up_other_requests(pair: Pair) -> No
         pair.run(5.0)
     assert pair.wait_for(answer).success
     assert pair.enable(True).success
-
-
-ON = Status.from_message(
-    IlluminatorStatus(1000, 1, 3, 0, 1, 50.0, 0.0, 0.0, 25.0, 0.05, 10.0))
-
-
-def acknowledged(*switches: Switch) -> tuple[CommandSender, RequestQueue[Status]]:
-    """Return a sender and a queue of requests; the first one was acknowledged at 0.1 s."""
-    sender = CommandSender(BRIDGE)
-    target = Target(LIGHT, sender, kind='light', status_id=STATUS_ID,
-                    status_name='ILLUMINATOR_STATUS')
-    queue: RequestQueue[Status] = RequestQueue(target)
-    for change in switches:
-        queue.submit(Request(
-            target, lambda now, change=change: change,  # type: ignore[misc]
-            lambda *ended: None, now=0.0, deadline=10.0), 0.0)
-    sender.acknowledge(LIGHT, mav.CommandAck(ON_OFF, ACCEPTED, 0, 0, *BRIDGE), 0.1)
-    return sender, queue
-
-
-def commands(sender: CommandSender) -> list[tuple[int, float]]:
-    """Return the command and param1 of each command that was sent."""
-    sent: list[Any] = [message for _, message in sender.outgoing]
-    return [(message.command, message.param1) for message in sent]
-
-
-def test_the_status_that_ends_a_request_sends_the_next_one_without_a_poll() -> None:
-    sender, queue = acknowledged(Switch(True), Switch(False))
-    queue.take(StatusReport(ON, 0.2), 0.2)
-    assert commands(sender) == [(ON_OFF, 1.0), (ON_OFF, 0.0)]
-    assert len(queue) == 1
-
-
-@pytest.mark.parametrize(('after', 'asked'), [
-    (0.5 * ASK_DELAY, []), (1.5 * ASK_DELAY, [(REQUEST, float(STATUS_ID))])])
-def test_a_status_is_requested_unless_it_follows_the_acknowledgement_at_once(
-    after: float, asked: list[tuple[int, float]],
-) -> None:
-    sender, queue = acknowledged(Switch(True))
-    queue.poll(0.1 + after)
-    queue.take(StatusReport(ON, 0.1 + after), 0.1 + after)
-    assert commands(sender) == [(ON_OFF, 1.0), *asked]
-    assert len(queue) == 0
 
 
 # The end
@@ -478,11 +443,11 @@ def test_each_set_is_answered_once_and_in_time(
 
 
 def test_a_set_that_was_not_sent_in_time_says_so(fake: FakeLight, faked: Pair) -> None:
-    fake.results[CONFIGURE] = None
+    fake.results[CONFIGURE] = IN_PROGRESS
     first, second = faked.ask_configure(brightness=1), faked.ask_configure(brightness=2)
     faked.run(SET_LIMIT)
-    assert first.result.message.startswith('no acknowledgement')
-    assert second.result.message == 'not sent: earlier requests took too long'
+    assert first.result.message == 'superseded by brightness 2 %'
+    assert second.result.message == 'not sent: the command before it has not ended'
     assert {message.param2 for message in faked.commands(CONFIGURE)} == {1.0}
 
 
@@ -574,15 +539,16 @@ def test_an_off_of_all_lights_reaches_each_at_once_though_one_has_not_answered_t
     three: Pair,
 ) -> None:
     deafen(three)
-    first = ask_all(three, on=False, is_stream=True)
+    first = ask_all(three, on=False)
     three.run(0.1)
     pressed_at = three.now
-    ask_all(three, on=False, is_stream=True)
+    ask_all(three, on=False)
     three.run(0.1)
     assert not first.results
     assert {one.target_component for one in three.commands(ON_OFF, since=pressed_at)} >= {244, 245}
 
 
 def test_a_request_to_all_that_is_replaced_says_so(three: Pair) -> None:
-    _, replaced, _ = [ask_all(three, is_stream=True) for _ in range(3)]
+    replaced = ask_all(three, True)
+    ask_all(three, False)
     assert replaced.result.superseded

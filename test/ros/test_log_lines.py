@@ -100,7 +100,7 @@ def test_switch_is_logged_with_its_way_if_it_changes_the_light(own_ros: Ros, por
         Parameters(own_ros).wait(brightness=100.0)
         for _ in range(2):
             assert own_ros.enable().success
-        for number, on in enumerate((True, True, False, False), 3):
+        for number, on in enumerate((True, False), 3):
             own_ros.publish(Bool, '/illuminator/cmd/enable', on)
             light.wait_for(ON_OFF, count=number)
             own_ros.catch_up()

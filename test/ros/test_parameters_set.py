@@ -148,7 +148,7 @@ def test_refusal_by_the_light_is_reported_by_name_and_changes_nothing(
 
 
 @pytest.mark.parametrize(('result', 'applies', 'reason'), [
-    (None, True, 'no acknowledgement ('),
+    (None, True, 'superseded by brightness 31 %'),
     (MavResult.TEMPORARILY_REJECTED, True, 'MAV_RESULT_TEMPORARILY_REJECTED'),
     (MavResult.ACCEPTED, False, 'brightness 30 % not confirmed: MAV_RESULT_ACCEPTED, but '
                                 'ILLUMINATOR_STATUS shows brightness 80 %')])

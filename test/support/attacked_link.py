@@ -25,7 +25,7 @@ from illuminator_ros.illuminator.light import Settings
 from illuminator_ros.illuminator.simulated_properties import FAULTS, IlluminatorProperties
 from illuminator_ros.mavlink.messages import Address, CommandLong, MavResult
 from illuminator_ros.mavlink.signing import Signing, SigningMode
-from illuminator_ros.payload.request import Result
+from illuminator_ros.payload.attempt import Result
 from illuminator_ros.payload.simulated import SimulatedComponent, SimulatedComponents
 from support.attacker import Attacker
 from support.client import Client

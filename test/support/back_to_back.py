@@ -28,7 +28,7 @@ from illuminator_ros.mavlink import messages as mav
 from illuminator_ros.mavlink.component import Endpoint
 from illuminator_ros.mavlink.frame import Decoder
 from illuminator_ros.mavlink.statistics import Traffic
-from illuminator_ros.payload.request import Result
+from illuminator_ros.payload.attempt import Result
 from illuminator_ros.payload.simulated import SimulatedComponent, SimulatedComponents
 from support.client import Client
 from support.faulty_wire import Faults, FaultyWire

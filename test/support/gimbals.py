@@ -29,9 +29,9 @@ from illuminator_ros.mavlink import messages as mav
 from illuminator_ros.mavlink.command_sender import CommandSender
 from illuminator_ros.mavlink.component import Component, Endpoint
 from illuminator_ros.mavlink.link import Link
+from illuminator_ros.payload.attempt import Result
 from illuminator_ros.payload.messages import GimbalDeviceAttitudeStatus
 from illuminator_ros.payload.mount_attitude import MountFlags
-from illuminator_ros.payload.request import Result
 from support.live_link import EndpointLink
 
 OURS, AUTOPILOT, DEVICE, OTHER = (mav.Address(1, component) for component in (194, 1, 154, 195))

@@ -50,8 +50,8 @@ OUTCOMES = {
     'contradicted': 'but ILLUMINATOR_STATUS shows',
     'no status': 'ILLUMINATOR_STATUS came within',
     'doubtful': 'may belong to an earlier command',
-    'overtaken': 'cancelled by a later request',
-    'not sent': 'not sent: earlier requests took too long',
+    'superseded': 'superseded by ',
+    'not sent': 'not sent: the command before it has not ended',
     'refused': 'refused: MAV_RESULT_',
     'unfinished': 'not finished in time',
     'progress stopped': 'no final acknowledgement',
@@ -209,14 +209,18 @@ class Run:
     def _untruth(self, request: Request) -> str:
         """Return the untruth in the answer to a request, '' if it is true."""
         answer, outcome = request.answer, request.outcome
+        others = [other for other in self.requests if request.overlaps(other)]
+        # Equal requests share a command, which may have been sent for the first of them.
+        sent_at = min((other.answer.asked_at for other in others if other.values == request.values
+                       and other.answer.ended_at == answer.ended_at), default=answer.asked_at)
+        sent_at = min(sent_at, answer.asked_at)
         matches = self._witnesses[request.light.address].matches(
-            request.values, answer.asked_at - UPTIME_ERROR * (outcome != CONFIRMED),
-            answer.ended_at)
+            request.values,
+            answer.asked_at if outcome == CONFIRMED else sent_at - UPTIME_ERROR, answer.ended_at)
         acks = [at for at, source, ack in self.pair.near.received
                 if isinstance(ack, CommandAck) and ack.command == request.kind
                 and ack.result == MavResult.ACCEPTED and source == request.light.address
-                and answer.asked_at < at <= answer.ended_at]
-        others = [other for other in self.requests if request.overlaps(other)]
+                and sent_at < at <= answer.ended_at]
         match outcome:
             case 'confirmed':
                 # A refusal that may have answered an earlier command does not count.
@@ -233,9 +237,10 @@ class Run:
                 return '' if acks and (is_other or not all(matches)) else 'always as wished'
             case 'refused':
                 return 'done' if matches[-1] and not matches[0] and not others else ''
-            case 'overtaken':
-                is_overtaken = any(not other.values.get('enabled', True) for other in others)
-                return '' if request.values.get('enabled') and is_overtaken else 'not overtaken'
+            case 'superseded':
+                is_newer = any(other.answer.asked_at >= answer.asked_at
+                               and other.values != request.values for other in others)
+                return '' if is_newer else 'not superseded'
             case '':
                 return 'an unknown outcome'
         return ''

@@ -22,8 +22,8 @@ from typing import Any
 
 from illuminator_ros.illuminator import events as light_events
 from illuminator_ros.illuminator.model import Status
+from illuminator_ros.payload.attempt import Result
 from illuminator_ros.payload.identity import Identity
-from illuminator_ros.payload.request import Result
 
 
 @dataclass

@@ -22,7 +22,7 @@ from illuminator_ros.illuminator.light import Light, Settings
 from illuminator_ros.illuminator.simulated_properties import IlluminatorProperties
 from illuminator_ros.mavlink.component import Endpoint
 from illuminator_ros.mavlink.messages import Address, CommandAck, heartbeat, MavType
-from illuminator_ros.payload.request import Result
+from illuminator_ros.payload.attempt import Result
 from illuminator_ros.payload.simulated import SimulatedComponent
 from support.client import Client
 from support.fake_light import FakeLight

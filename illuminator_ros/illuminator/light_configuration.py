@@ -1,0 +1,696 @@
+# Copyright 2026 The illuminator_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+The configuration of a light: confirmed, requested, and to be restored.
+
+One command carries all fields. So a command holds the values that are wanted now, those of the
+command before it that is not confirmed yet, and the confirmed ones for the rest.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Container
+from dataclasses import dataclass, replace
+from enum import Enum
+import math
+
+from . import events
+from .commands import Configure, CONFIRMED
+from .model import (
+    Changes,
+    checked,
+    Configuration,
+    DIMMING_FLAGS,
+    FIELDS,
+    InvalidValue,
+    NOTHING,
+    SafetyLimits,
+    Status,
+    StrobeRange,
+    unexpected_differences,
+)
+from ..payload.attempt import Done, Result, StatusReport, Target
+from ..payload.reconciler import Desired, Reconciler
+from ..payload.repeat_limit import RepeatLimit
+
+# s; rqt_reconfigure gives up after 1.0 s, and the answer must arrive before. The middleware waits
+# up to 0.1 s before it sends an answer to a client that it has not discovered yet.
+CONFIGURE_LIMIT = 0.78
+# s between tries of overrides and restored configurations that got no answer.
+RESTORE_INTERVAL = 2.0
+# s for each try after the first one: no ON waits for it, and the line may be slow.
+RETRY_LIMIT = 1.5
+# Attempts before giving up on a light that accepts a configuration but does not apply it.
+MAX_CONTRADICTIONS = 3
+# s to wait for the first status before a complete set of overrides is sent without one.
+FIRST_STATUS_TIMEOUT = 3.0
+# %; set together with a strobe period where the duty cycle is 0, at which a light does not strobe.
+DEFAULT_DUTY_CYCLE = 50.0
+# s after a command of ours in which a change to a commanded value counts as its late effect, and a
+# change of another value as implied by it.
+LATE_TIME = 30.0
+IMPLIED_TIME = 2.0
+# How often in a row a change by another sender is undone, and s between two of these commands.
+REPEATS = 3
+REPEAT_INTERVAL = 2.0
+
+
+class Requirement(Enum):
+    """The reason why values must be sent that no request has asked for."""
+
+    OVERRIDE = 'override'
+    RESTART = 'restart'
+    LIMIT = 'limit'
+    OTHER_SENDER = 'other sender'
+
+
+# Values with these reasons are dropped when the light has accepted and not applied them; a
+# RepeatLimit limits further attempts.
+_SENT_ONCE = (Requirement.LIMIT, Requirement.OTHER_SENDER)
+
+
+@dataclass
+class Required:
+    """
+    Values that must be sent, see :class:`Requirement`.
+
+    :param attempts: how often the light has accepted them but then reported others.
+    :param due: when they are sent next, s.
+    :param has_ended: whether a command with them has ended, or none can be sent.
+    :param failure: why the last attempt failed, '' if it did not.
+    """
+
+    values: Changes
+    requirement: Requirement
+    due: float
+    attempts: int = 0
+    has_ended: bool = False
+    failure: str = ''
+
+    @property
+    def limit(self) -> float:
+        """Return s that the next attempt may take."""
+        return RETRY_LIMIT if self.has_ended else CONFIGURE_LIMIT
+
+
+@dataclass
+class _Unapplied:
+    """
+    A configuration that the light has accepted but does not report.
+
+    :param shown: the status that it reported instead, None if there was none.
+    :param failure: why it, or values that are required no more, were not set.
+    """
+
+    configuration: Configuration | None
+    shown: Status | None
+    failure: str
+
+
+class LimitGuard:
+    """
+    Whether a light exceeds the limits that the operator has set.
+
+    :param limits: apply to each command that is sent.
+    :ivar exceeded: how the light exceeds them.
+    """
+
+    def __init__(self, limits: SafetyLimits, emit: Callable[[events.AnyLightEvent], None],
+                 exceeded: events.LimitExceeded) -> None:
+        self.limits = limits
+        self.is_limiting = limits != SafetyLimits()
+        self.exceeded = exceeded
+        self._emit = emit
+        self.renew()
+
+    def renew(self) -> None:
+        """Bring the light back within the limits once more."""
+        self._repeats = RepeatLimit(1, REPEAT_INTERVAL)
+
+    def check(self, reported: Configuration, strobe_range: StrobeRange) -> bool:
+        """Return whether the light exceeds a limit, and report a change of that."""
+        exceeded = replace(self.exceeded, excess=self.limits.excess(reported),
+                           impossible=self.limits.impossible(strobe_range))
+        if exceeded != self.exceeded:
+            self.exceeded = exceeded
+            self._emit(exceeded)
+        return bool(exceeded.excess)
+
+    def due(self, now: float) -> float | None:
+        """Return when the light may be brought back, s; None if that has been tried."""
+        return self._repeats.take(now)
+
+
+# The reasons of values in the reconciler; a request has none.
+_REQUIRED, _SETPOINT = 'required values', 'a setpoint'
+
+
+class LightConfiguration:
+    """
+    Keeps one light configured. No I/O; times are s.
+
+    :param emit: takes the events.
+    :param limits: apply to each command that is sent.
+    :param restore: whether a light that has restarted gets its confirmed configuration again.
+    :param reassert: whether changes by other senders are undone.
+    :param must_wait: returns whether no required values may be sent now: the process ends, or an
+        OFF is under way and a brightness may be an ON.
+    :ivar confirmed: the configuration that the light last accepted from us or, if another sender
+        has changed it since, last reported; None before either.
+    :ivar guard: how the light exceeds the limits.
+    """
+
+    def __init__(
+        self, target: Target, emit: Callable[[events.AnyLightEvent], None], *,
+        limits: SafetyLimits, restore: bool = True, reassert: bool = False,
+        must_wait: Callable[[], bool] = lambda: False,
+    ) -> None:
+        self.confirmed: Configuration | None = None
+        self.guard = LimitGuard(limits, emit, events.LimitExceeded(target.address, (), ''))
+        self._address = target.address
+        self._emit = emit
+        self._restores = restore
+        self._must_wait = must_wait
+        # The limit on undoing changes by other senders, None where these are followed.
+        self._undoing = RepeatLimit(REPEATS, REPEAT_INTERVAL) if reassert else None
+        self._reconciler: Reconciler[Status] = Reconciler(target, self._ended)
+        self._report: StatusReport[Status] | None = None
+        self._setpoint: float | None = None
+        # The values that must be sent, and those of the last attempt.
+        self._required: Required | None = None
+        self._sending: Required | None = None
+        self._unapplied = _Unapplied(None, None, '')
+        # The result of the last command, None before the first.
+        self._outcome: Result | None = None
+        # The last configuration that was requested or reported as changed: small steps away
+        # from it add up to a change.
+        self._reference: Configuration | None = None
+
+    @property
+    def discrepancy(self) -> str:
+        """Why the light does not have a configuration that it should have, '' if it has."""
+        return (self._required.failure if self._required else '') or self._unapplied.failure
+
+    @property
+    def is_changing(self) -> bool:
+        """Whether a command of ours is under way."""
+        return self._reconciler.under_way is not None
+
+    @property
+    def has_values_to_send(self) -> bool:
+        """Whether a command of ours is under way, or values wait."""
+        return (self._reconciler.is_busy or self._setpoint is not None
+                or self._required is not None)
+
+    @property
+    def may_send_after_restart(self) -> bool:
+        """Whether a light that has restarted may be sent a configuration."""
+        return (self.guard.is_limiting or self._required is not None
+                or self._restores and self.confirmed is not None)
+
+    @property
+    def must_send_before_on(self) -> bool:
+        """Whether the light must be sent a configuration before it is switched on."""
+        required = self._required
+        return (required is not None and not required.has_ended
+                and required.requirement is not Requirement.OTHER_SENDER)
+
+    @property
+    def sent_at(self) -> float:
+        """When the last command was sent, s."""
+        return self._reconciler.last_sent.at if self._reconciler.last_sent else -math.inf
+
+    @property
+    def _status(self) -> Status | None:
+        return self._report.status if self._report else None
+
+    @property
+    def _strobe_range(self) -> StrobeRange:
+        return self._report.status.strobe_range if self._report else StrobeRange()
+
+    # Requests
+
+    def configure(self, changes: Changes, now: float, done: Done) -> None:
+        """
+        Change some fields with one command; the light must be connected.
+
+        :param changes: values by name, see :data:`~.model.FIELDS`; if one is wrong none is sent.
+        :param done: called once with the result.
+        """
+        try:
+            values = self._checked(changes)
+            for name, value in values.items():
+                self.guard.limits.check(name, value)
+            change = self._change(values)
+        except InvalidValue as error:
+            done(Result(False, str(error), permanent=True), now)
+            return
+        self._reconciler.want(Desired(change, since=now, limit=CONFIGURE_LIMIT), now, done)
+
+    def set_brightness(self, brightness: float, now: float) -> None:
+        """Take a setpoint of a stream, %, checked; the light must be connected."""
+        try:
+            self.guard.limits.check('brightness', brightness)
+        except InvalidValue as error:
+            brightness = self.guard.limits.max_brightness
+            self._emit(events.SetpointClipped(self._address, str(error)))
+        under_way = self._reconciler.under_way
+        if (self._is_stream and isinstance(under_way, Configure)
+                and under_way.configuration.brightness == brightness):
+            # A command with this value is under way; a setpoint that waits is outdated.
+            self._setpoint = None
+            return
+        self._setpoint = brightness
+        self.poll(now, connected=True)
+
+    def set_desired(self, values: Changes, now: float) -> None:
+        """
+        Send values as soon as the light has reported its configuration.
+
+        :param values: by name, checked, except against the limits that the light reports.
+        """
+        self._require({**self._required_values, **values}, Requirement.OVERRIDE,
+                      self._first_due(now))
+
+    def _first_due(self, now: float) -> float:
+        return now if self.confirmed else now + FIRST_STATUS_TIMEOUT
+
+    def _require(self, values: Changes, requirement: Requirement, due: float) -> None:
+        """Send values when they are due; the reason of values that already wait is kept."""
+        self._required = Required(
+            values, self._required.requirement if self._required else requirement, due)
+
+    @property
+    def _required_values(self) -> Changes:
+        return self._required.values if self._required else {}
+
+    def replace(self, message: str, now: float) -> None:
+        """End all requests, and drop the required values: an OFF or the end replaces them."""
+        self.drop_required()
+        self._setpoint = None
+        self._reconciler.cancel(message, now, superseded=True)
+
+    def end_requests(self, message: str, now: float) -> None:
+        """End all requests, but keep the required values."""
+        self._setpoint = None
+        self._reconciler.cancel(message, now)
+        self.retry_required(now)
+
+    def drop_required(self) -> None:
+        """Drop the required values: an OFF replaces them, and they would be an ON."""
+        if self._required and self._required.requirement is Requirement.LIMIT:
+            # The light may be switched on beyond the limit.
+            self.guard.renew()
+        self._required = None
+
+    def _drop_fields(self, names: Container[str]) -> None:
+        """Remove fields from the required values."""
+        if self._required:
+            self._required.values = {name: value for name, value in self._required.values.items()
+                                     if name not in names}
+            if not self._required.values:
+                self._required = None
+
+    def _checked(self, changes: Changes) -> dict[str, float]:
+        return {name: checked(name, value, self._strobe_range) for name, value in changes.items()}
+
+    def _change(self, values: Changes) -> Configure:
+        """
+        Return the change that sets some fields.
+
+        :raises InvalidValue: if nothing is confirmed yet and the values are not complete.
+        """
+        note, names = '', list(values)
+        desired = self._reconciler.desired
+        base = self.confirmed
+        if desired is not None and isinstance(desired.change, Configure):
+            base, names = desired.change.configuration, [*desired.change.names, *names]
+        if base is None:
+            missing = [name for name in FIELDS if name not in values]
+            if missing:
+                raise InvalidValue(
+                    'the light has not reported its configuration yet, so '
+                    f'{", ".join(missing)} must be set in the same call')
+            goal = Configuration(**values)
+        else:
+            if (values.get('strobe_period') and 'strobe_duty_cycle' not in values
+                    and not base.strobe_duty_cycle):
+                values = {**values, 'strobe_duty_cycle': DEFAULT_DUTY_CYCLE}
+                names.append('strobe_duty_cycle')
+                note = ('strobe_duty_cycle was 0 %, at which the light does not strobe, and was '
+                        f'set to {DEFAULT_DUTY_CYCLE:g} %')
+            goal = replace(self._sendable(base, values), **values)
+        # Each command is made here, so the limits apply to every command.
+        limited = self.guard.limits.clipped(goal, self._strobe_range)
+        return Configure(limited, list(dict.fromkeys((*names, *goal.differences(limited)))), note)
+
+    def _sendable(self, base: Configuration, changes: Changes) -> Configuration:
+        """
+        Return a configuration with reported values where its own are out of range.
+
+        Otherwise a light that once reported a value out of its range would deny every change.
+        """
+        if self._status is None:
+            return base
+        reported = self._status.configuration(base)
+        ruled_out = {}
+        for name in FIELDS:
+            try:
+                if name != 'mode' and name not in changes:
+                    checked(name, getattr(base, name), self._strobe_range)
+            except InvalidValue:
+                ruled_out[name] = getattr(reported, name)
+        return replace(base, **ruled_out)
+
+    def _ended(
+        self, desired: Desired[Status], result: Result, status: Status | None, now: float,
+    ) -> None:
+        change = desired.change
+        assert isinstance(change, Configure)
+        self._outcome = result
+        if result.success:
+            self._drop_fields([name for name, value in self._required_values.items()
+                               if name in change.names
+                               or value == getattr(change.configuration, name)])
+            self._accept(change.configuration, status)
+        elif result.contradicted:
+            self._unapplied = _Unapplied(change.configuration, self._status, result.message)
+        if desired.reason == _REQUIRED:
+            self._required_ended(result, now)
+        elif desired.reason == _SETPOINT and not (result.success or result.superseded):
+            self._setpoint_failed(result.message)
+
+    def _required_ended(self, result: Result, now: float) -> None:
+        required = self._required
+        if result.success:
+            self._restored(True, result.message)
+        elif required is None or required is not self._sending:
+            return
+        elif result.superseded:
+            required.due = now
+        else:
+            required.has_ended = True
+            required.failure = result.message
+            required.attempts += result.contradicted
+            if (result.permanent or required.attempts >= MAX_CONTRADICTIONS
+                    or required.attempts and required.requirement in _SENT_ONCE):
+                self._required = None
+                self._unapplied.failure = result.message
+                self._restored(False, result.message)
+
+    # Reports
+
+    def restarted(self, now: float) -> None:
+        """Note that the light has restarted, so that its configuration may be lost."""
+        if self._restores and self.confirmed is not None:
+            confirmed = self.confirmed
+            values = {name: getattr(confirmed, name) for name in FIELDS
+                      if name != 'mode' or confirmed.mode}
+            # Overrides that have not been sent yet replace confirmed values.
+            self._required = Required(
+                {**values, **self._required_values}, Requirement.RESTART, now)
+        elif self._required and self._required.requirement in _SENT_ONCE:
+            # The light has other values now.
+            self._required = None
+        # The restart may have undone the command that brought the light within the limits.
+        self.guard.renew()
+
+    def retry_required(self, now: float) -> None:
+        """Make required values due, since the light is heard or a command was cancelled."""
+        required = self._required
+        if required and required.due < math.inf:
+            required.due, required.has_ended = self._first_due(now), False
+
+    def lost(self, message: str, now: float) -> None:
+        """Note that the light is lost: no request must take effect when it is heard again."""
+        self._reconciler.lost(message, now)
+        # It may restart meanwhile, which cannot be detected where several lights share the
+        # address.
+        self.guard.renew()
+        if self._setpoint is not None:
+            self._setpoint = None
+            self._setpoint_failed(message)
+
+    def reported(
+        self, report: StatusReport[Status], now: float, *, can_follow: bool, switched_at: float,
+        brightness_is_switch: bool,
+    ) -> None:
+        """
+        Confirm the request under way, or follow the change of another sender.
+
+        :param can_follow: whether the status shows a change for certain.
+        :param switched_at: when the light was last switched by us, s.
+        """
+        self._report = report
+        was_changing = self.is_changing
+        self._reconciler.reported(report, now)
+        status = report.status
+        if self.confirmed is None and (was_changing or not status.complete):
+            return
+        reported = status.configuration(self.confirmed or NOTHING)
+        if not was_changing:
+            self._take(report, reported, now, can_follow=can_follow, switched_at=switched_at,
+                       brightness_is_switch=brightness_is_switch)
+        if self.guard.is_limiting:
+            self._keep_limits(reported, now)
+
+    def _take(
+        self, report: StatusReport[Status], reported: Configuration, now: float, *,
+        can_follow: bool, switched_at: float, brightness_is_switch: bool,
+    ) -> None:
+        status = report.status
+        self._end_discrepancy(reported, status)
+        required = self._required
+        if self.confirmed is None:
+            self._adopt(reported, events.ChangeCause.FIRST_STATUS)
+            if required:
+                required.due, required.has_ended = min(required.due, now), False
+        elif required and not report.shared_address and (
+                shown := self._shown_goal(required, self.confirmed, reported, status)):
+            # The light has kept the values, another sender has restored them, or our command was
+            # acknowledged too late.
+            self._required = None
+            self._accept(shown, status)
+            if required.has_ended:
+                self._restored(True, f'{shown.describe(list(required.values))}, {CONFIRMED}')
+        elif ((required is None or required.requirement is Requirement.OVERRIDE)
+                and can_follow and not report.shared_address):
+            self._follow(status, self.confirmed, reported, now, switched_at=switched_at,
+                         brightness_is_switch=brightness_is_switch)
+
+    def _end_discrepancy(self, reported: Configuration, status: Status) -> None:
+        """Forget that a configuration was not applied once the light shows something else."""
+        unapplied = self._unapplied
+        if unapplied.configuration is None or unapplied.shown is None:
+            return
+
+        def differs(before: Configuration) -> bool:
+            return bool(unexpected_differences(before, reported, status.error_flags, step=True))
+
+        # It was applied late, or another sender has replaced it.
+        if (not differs(unapplied.configuration)
+                or differs(unapplied.shown.configuration(NOTHING))):
+            self._unapplied = _Unapplied(None, None, '')
+
+    def _shown_goal(
+        self, required: Required, confirmed: Configuration, reported: Configuration,
+        status: Status,
+    ) -> Configuration | None:
+        """
+        Return the configuration with required values that the light shows, None if it does not.
+
+        Heat hides the brightness. Overrides are sent once even if the light shows them.
+        """
+        if required.requirement is Requirement.OVERRIDE and not required.has_ended:
+            return None
+        goal = self.guard.limits.clipped(
+            replace(confirmed, **required.values), self._strobe_range)
+        not_shown = goal.differences(reported)
+        if status.error_flags & DIMMING_FLAGS:
+            not_shown.append('brightness')
+        return None if any(name in required.values for name in not_shown) else goal
+
+    def _accept(self, goal: Configuration, status: Status | None) -> None:
+        """
+        Note that the light has accepted a configuration, with the status that shows it.
+
+        Values that the light rounds to its own steps are confirmed as it shows them; values that
+        differ for another reason (heat, external sync) as they were sent.
+        """
+        if status:
+            reported = status.configuration(goal)
+            far = goal.differences(reported)
+            goal = replace(goal, **{
+                name: getattr(reported, name)
+                for name in goal.differences(reported, step=False) if name not in far})
+        self._unapplied = _Unapplied(None, None, '')
+        self._adopt(goal, events.ChangeCause.REQUEST)
+
+    def _adopt(self, configuration: Configuration, cause: events.ChangeCause) -> None:
+        old, self.confirmed = self.confirmed, configuration
+        if cause is not events.ChangeCause.ROUNDING:
+            self._reference = configuration
+        names = [name for name in FIELDS
+                 if old is None or getattr(old, name) != getattr(configuration, name)]
+        if names:
+            self._emit(events.ConfigurationChanged(self._address, configuration, names, cause))
+
+    def _follow(
+        self, status: Status, confirmed: Configuration, reported: Configuration, now: float, *,
+        switched_at: float, brightness_is_switch: bool,
+    ) -> None:
+        names = unexpected_differences(confirmed, reported, status.error_flags, step=False)
+        if not names:
+            return
+        far = unexpected_differences(
+            self._reference or confirmed, reported, status.error_flags, step=True)
+        cause = events.ChangeCause.ROUNDING
+        if far:
+            own = all(self._is_own(name, reported, switched_at, now) for name in far)
+            cause = events.ChangeCause.REQUEST if own else events.ChangeCause.LIGHT
+        # Where brightness is the switch, each command to a light that is off is an ON.
+        if (cause is events.ChangeCause.LIGHT
+                and not (brightness_is_switch and status.enabled is False)
+                and self._undo_change(status, confirmed, reported, now)):
+            return
+        self._adopt(
+            replace(confirmed, **{name: getattr(reported, name) for name in names}), cause)
+
+    def _undo_change(
+        self, status: Status, confirmed: Configuration, reported: Configuration, now: float,
+    ) -> bool:
+        """Undo another sender's change up to the limit of repeats; return whether it is undone."""
+        names = unexpected_differences(confirmed, reported, status.error_flags, step=True)
+        if self._undoing is None or not names:
+            return False
+        due = self._undoing.take(now)
+        if due is not None:
+            self._require(
+                {**{name: getattr(confirmed, name) for name in names}, **self._required_values},
+                Requirement.OTHER_SENDER, due)
+        self._emit(events.ChangedByOther(
+            self._address, reported.describe(names), due is not None))
+        return due is not None
+
+    def _keep_limits(self, reported: Configuration, now: float) -> None:
+        """Bring a light that exceeds a limit back within it, once."""
+        # Values that undo a change by another sender may be due only later.
+        is_free = (self._required is None
+                   or self._required.requirement is Requirement.OTHER_SENDER)
+        if (self.guard.check(reported, self._strobe_range) and is_free
+                and (due := self.guard.due(now)) is not None):
+            limited = self.guard.limits.clipped(reported, self._strobe_range)
+            values = {name: getattr(limited, name) for name in reported.differences(limited)}
+            self._required = Required(
+                {**values, **self._required_values}, Requirement.LIMIT, due)
+
+    def _is_own(
+        self, name: str, reported: Configuration, switched_at: float, now: float,
+    ) -> bool:
+        """Return whether a change is a late or implied effect of a command of ours."""
+        if now <= switched_at + IMPLIED_TIME:
+            return True
+        sent = self._reconciler.last_sent
+        if sent is None or now > sent.at + LATE_TIME or not isinstance(sent.change, Configure):
+            return False
+        if name not in sent.change.configuration.differences(reported):
+            return True
+        was_accepted = self._outcome and (self._outcome.success or self._outcome.contradicted)
+        return bool(was_accepted and name not in sent.change.names
+                    and now <= sent.at + IMPLIED_TIME)
+
+    # Time
+
+    def poll(self, now: float, *, connected: bool) -> None:
+        """Send the values that are due; the light may be lost."""
+        self._reconciler.poll(now)
+        # Required values go first, since a stream of setpoints may never end.
+        if connected and self._is_free and now >= self._required_due:
+            self._send_required(now)
+        if connected and self._is_free and self._setpoint is not None:
+            value, self._setpoint = self._setpoint, None
+            self._send_setpoint(value, now)
+
+    @property
+    def _is_stream(self) -> bool:
+        desired = self._reconciler.desired
+        return desired is not None and desired.reason == _SETPOINT
+
+    @property
+    def _is_free(self) -> bool:
+        """Whether values may be sent that no request has asked for."""
+        # A newer setpoint need not wait for the status.
+        return not self._reconciler.is_busy or (
+            self._setpoint is not None and self._is_stream and self._reconciler.is_accepted)
+
+    @property
+    def _required_due(self) -> float:
+        if self._required is None or self._must_wait():
+            return math.inf
+        return self._required.due
+
+    def _send_setpoint(self, value: float, now: float) -> None:
+        is_unconfirmed = self._reconciler.is_busy or (
+            self._outcome is not None and not self._outcome.success)
+        if (self.confirmed is not None and self.confirmed.brightness == value
+                and not is_unconfirmed and not (self._report and self._report.shared_address)):
+            return
+        try:
+            change = self._change({'brightness': value})
+        except InvalidValue as error:
+            self._setpoint_failed(str(error))
+        else:
+            self._reconciler.want(
+                Desired(change, _SETPOINT, since=now, limit=CONFIGURE_LIMIT), now)
+
+    def _setpoint_failed(self, message: str) -> None:
+        self._emit(events.SetpointFailed(self._address, message))
+
+    def _restored(self, success: bool, message: str) -> None:
+        self._emit(events.ConfigurationRestored(self._address, success, message))
+
+    def _send_required(self, now: float) -> None:
+        required = self._required
+        assert required is not None
+        limit = required.limit
+        required.due = now + RESTORE_INTERVAL + limit - CONFIGURE_LIMIT
+        for name, value in list(required.values.items()):
+            try:
+                checked(name, value, self._strobe_range)
+            except InvalidValue as error:
+                self._drop_fields([name])
+                self._restored(False, str(error))
+        if self._required is not required:
+            return
+        try:
+            change = self._change(self._checked(required.values))
+        except InvalidValue as error:
+            # The values stay required until a status comes; report that once.
+            required.due = math.inf
+            required.has_ended = True
+            required.failure = f'{", ".join(required.values)} not sent: {error}'
+            self._restored(False, required.failure)
+            return
+        if self.confirmed is None:
+            required.due += FIRST_STATUS_TIMEOUT
+        self._sending = required
+        self._reconciler.want(Desired(change, _REQUIRED, since=now, limit=limit), now)
+
+    def next_deadline(self, *, connected: bool) -> float:
+        """Return when :meth:`poll` has something to do."""
+        due = self._reconciler.next_deadline()
+        if not connected or not self._is_free:
+            return due
+        return -math.inf if self._setpoint is not None else min(due, self._required_due)

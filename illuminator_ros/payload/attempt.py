@@ -1,0 +1,489 @@
+# Copyright 2026 The illuminator_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+One command that changes a device: its acknowledgement, and the status that shows the change.
+
+MAV_RESULT_ACCEPTED says that the command is valid and is executed, not that it is completed
+(command protocol). So an attempt waits for a status, and requests one if none follows within
+:data:`ASK_DELAY`. Only a status that was sent after the command and shows the change makes the
+attempt a success.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from enum import Enum
+import math
+from typing import Generic, NamedTuple, Protocol, TypeVar
+
+from ..mavlink import command_sender
+from ..mavlink.messages import Address, MavCmd, MavResult
+
+# s from the acknowledgement to the status that shows the change.
+CONFIRMATION_TIMEOUT = 1.0
+# s from the acknowledgement to the first request for the status: many devices send a status by
+# themselves, in the next datagram. ASK_INTERVAL, s, separates further requests, since a request or
+# its answer may be lost.
+ASK_DELAY = 0.001
+ASK_INTERVAL = 0.25
+# s from a status that may be older than the command to the next request, doubled each time: it may
+# have been sent in the same millisecond as the command.
+OUTDATED_INTERVAL = 0.001
+# s by which the statuses of a device without a clock may be late, until that is measured.
+UNKNOWN_DELAY = 0.75
+# The last delays of statuses, from which the next delay is estimated.
+MAX_DELAYS = 8
+
+PERMANENT_RESULTS = frozenset((
+    MavResult.DENIED, MavResult.UNSUPPORTED, MavResult.COMMAND_UNSUPPORTED_MAV_FRAME,
+    MavResult.COMMAND_LONG_ONLY, MavResult.COMMAND_INT_ONLY))
+
+S = TypeVar('S')
+S_contra = TypeVar('S_contra', contravariant=True)
+
+
+class Target:
+    """
+    The device that commands go to.
+
+    :param ended: called with the result of each command, after its own ``done``.
+    :param kind: a noun for it, such as ``light``.
+    :param status_id: the message id of its status.
+    :param status_source: the component that sends the status, if another one executes commands.
+    :param needs_status: whether only a status makes a change a success, even if none has ever
+        come.
+    """
+
+    def __init__(
+        self, address: Address, commands: command_sender.CommandSender,
+        ended: command_sender.Done = lambda result, now: None, *, kind: str, status_id: int,
+        status_name: str, status_source: Address | None = None, needs_status: bool = False,
+    ) -> None:
+        self.address = address
+        self.needs_status = needs_status
+        self.commands = commands
+        self.kind = kind
+        self.status_name = status_name
+        self._status_source = status_source or address
+        self._ended = ended
+        self._status_id = status_id
+        self._status_request: command_sender.Command | None = None
+        self._delays: list[float] = []
+
+    def send(
+        self, command: int, params: tuple[float, ...], now: float,
+        done: command_sender.Done = lambda result, now: None, *, to: Address | None = None,
+    ) -> None:
+        """Send a command, to the device or to another component."""
+        self.start(command_sender.Command(to or self.address, command, params), now, done)
+
+    def start(
+        self, command: command_sender.Command, now: float, done: command_sender.Done, *,
+        deadline: float = math.inf, overtake: bool = False,
+    ) -> None:
+        """Start a command; see :meth:`CommandSender.start`."""
+        def ended(result: command_sender.CommandResult, now: float) -> None:
+            done(result, now)
+            self._ended(result, now)
+
+        self.commands.start(command, now, ended, deadline=deadline, overtake=overtake)
+
+    def request_message(
+        self, message_id: int, now: float, done: command_sender.Done = lambda result, now: None, *,
+        to: Address | None = None,
+    ) -> None:
+        """Request one message of the device or of another component."""
+        self.send(MavCmd.REQUEST_MESSAGE, (float(message_id),), now, done, to=to)
+
+    def request_status(self, now: float, done: command_sender.Done | None = None) -> None:
+        """Request the status; without ``done`` only where no such request is under way."""
+        if done is not None:
+            self.request_message(self._status_id, now, done, to=self._status_source)
+        elif self._status_request is None:
+            self._status_request = command_sender.Command(
+                self._status_source, MavCmd.REQUEST_MESSAGE, (float(self._status_id),))
+            self.start(self._status_request, now, self._status_answered)
+
+    def cancel_status_request(self, now: float) -> None:
+        """Cancel a request for the status, so that a new one is sent at once."""
+        if self._status_request is not None:
+            self.commands.cancel(self._status_request, now)
+
+    def _status_answered(self, result: command_sender.CommandResult, now: float) -> None:
+        self._status_request = None
+
+    def status_delay(self, now: float, *, has_clock: bool) -> float:
+        """
+        Return by how much a status may be late, s.
+
+        :param has_clock: whether its sending time was computed from a time in the status.
+        """
+        if has_clock:
+            return self.commands.round_trip(self.address).shortest(now)
+        return 1.25 * max(self._delays) + 0.05 if self._delays else UNKNOWN_DELAY
+
+    def note_status_delay(self, seconds: float) -> None:
+        """Note the time from a command to the first status that showed the change."""
+        # A longer time is not a delay of the status: the acknowledgement was late, or this process
+        # paused.
+        self._delays = [*self._delays[1 - MAX_DELAYS:], min(seconds, CONFIRMATION_TIMEOUT)]
+
+
+@dataclass
+class StatusReport(Generic[S]):
+    """
+    A status that is newer than all before.
+
+    :param sent_by: the latest time at which it can have been sent, s.
+    :param has_clock: whether that was computed from a time in the status.
+    :param shared_address: whether several devices send from the address; then no status confirms
+        a change.
+    """
+
+    status: S
+    sent_by: float
+    has_clock: bool = True
+    shared_address: bool = False
+
+
+class Change(Protocol[S_contra]):
+    """A value of a property of a device, and the command that sets it."""
+
+    @property
+    def command(self) -> int:
+        """Return the MAV_CMD that makes it."""
+
+    @property
+    def params(self) -> tuple[float, ...]:
+        """Return the params of the command."""
+
+    @property
+    def goal(self) -> str:
+        """Describe the state to be reached, for people."""
+
+    @property
+    def note(self) -> str:
+        """Describe a change that was not requested but comes with it, '' if there is none."""
+
+    def shown_by(self, status: S_contra) -> bool | None:
+        """Return whether a status shows the change; None if it cannot show it."""
+
+    def evidence(self, status: S_contra) -> str:
+        """Describe how far a status that does not contradict shows the change, for people."""
+
+    def actual(self, status: S_contra) -> str:
+        """Describe the state that a status shows instead, for people."""
+
+
+class Result(NamedTuple):
+    """
+    The outcome of a request.
+
+    :param success: whether the device accepted it and, if it sends a status, shows it.
+    :param message: the outcome for people.
+    :param refused: whether the device answered with another result than ACCEPTED.
+    :param permanent: whether the same request will fail again.
+    :param contradicted: whether the device accepted it and then showed something else.
+    :param superseded: whether a newer request replaced it.
+    :param note: a change that was not asked for but came with it, for people, '' if none.
+    """
+
+    success: bool
+    message: str
+    refused: bool = False
+    permanent: bool = False
+    contradicted: bool = False
+    superseded: bool = False
+    note: str = ''
+
+
+Done = Callable[[Result, float], None]
+
+
+class Phase(Enum):
+    """The phase of an attempt: SENT waits for the acknowledgement, CONFIRMING for the status."""
+
+    SENT = 'sent'
+    CONFIRMING = 'confirming'
+    FINISHED = 'finished'
+
+
+class Step(Enum):
+    """An event that moves an attempt to another phase."""
+
+    ACKNOWLEDGED = 'acknowledged'
+    SEND_AGAIN = 'send again'
+    FINISH = 'finish'
+
+
+TRANSITIONS: dict[tuple[Phase, Step], Phase] = {
+    (Phase.SENT, Step.ACKNOWLEDGED): Phase.CONFIRMING,
+    (Phase.SENT, Step.SEND_AGAIN): Phase.SENT,
+    (Phase.SENT, Step.FINISH): Phase.FINISHED,
+    (Phase.CONFIRMING, Step.FINISH): Phase.FINISHED,
+}
+
+
+class Verdict(Enum):
+    """The relation of a status to a change."""
+
+    SHOWN = 'shown'
+    CONTRADICTED = 'contradicted'
+    OUTDATED = 'may be older than the command'
+
+
+class Evidence(Generic[S]):
+    """
+    The statuses since a command, compared with its change.
+
+    :param before: the newest status when the command was sent, None if there was none.
+    :ivar has_status: whether the device has ever sent a status.
+    :ivar contradiction: why the last status does not confirm the change, '' if it does.
+    :ivar is_outdated: whether a status may have been older than the command.
+    """
+
+    def __init__(self, target: Target, change: Change[S], before: S | None) -> None:
+        self.has_status = before is not None
+        self.contradiction = ''
+        self.is_outdated = False
+        self._target = target
+        self._change = change
+        self._differs_before = before is not None and change.shown_by(before) is False
+        self._outdated_wait = OUTDATED_INTERVAL
+
+    def outdated_wait(self) -> float:
+        """Return the time until the next request after an outdated status, s."""
+        self._outdated_wait *= 2
+        return self._outdated_wait / 2
+
+    def judge(
+        self, report: StatusReport[S], now: float, *, sent_at: float, delay: float,
+        is_accepted: bool, was_repeated: bool,
+    ) -> Verdict:
+        """
+        Compare a status that has come after the acknowledgement.
+
+        :param sent_at: when the command was last sent, s.
+        :param delay: by how much the status may be late, s.
+        :param is_accepted: whether the device has accepted the command.
+        :param was_repeated: whether a status may show an earlier command of the attempt.
+        """
+        shown = self._change.shown_by(report.status)
+        if shown is None:
+            # Then the acknowledgement decides.
+            shown = is_accepted
+        if shown and not was_repeated and self._differs_before:
+            self._target.note_status_delay(now - sent_at)
+            self._differs_before = False
+        if report.sent_by - delay < sent_at:
+            # With a late acknowledgement, a status from before the command would even confirm a
+            # change that was never made.
+            self.is_outdated = True
+            return Verdict.OUTDATED
+        target = self._target
+        reasons = [] if shown else [
+            f'{target.status_name} shows {self._change.actual(report.status)}']
+        if report.shared_address:
+            reasons.append(f'several {target.kind}s answer as {target.address}')
+        self.contradiction = ', '.join(reasons)
+        return Verdict.CONTRADICTED if reasons else Verdict.SHOWN
+
+
+class Attempt(Generic[S]):
+    """
+    One command of a change, and its confirmation.
+
+    :param ended: called once, with the result and the status that shows the change, None if none
+        did; not called after :meth:`abandon`.
+    :param wanted_at: when the change was first wanted, s.
+    :param deadline: the time by which the attempt ends, s.
+    :param overtake: whether the command is sent beside one of its kind that is in progress.
+    :param before: the newest status, None if there is none.
+    """
+
+    def __init__(
+        self, target: Target, change: Change[S],
+        ended: Callable[[Result, S | None, float], None], *, wanted_at: float, deadline: float,
+        overtake: bool, before: S | None,
+    ) -> None:
+        self.phase = Phase.SENT
+        self.change = change
+        self._target = target
+        self._ended = ended
+        self._wanted_at = wanted_at
+        self._deadline = deadline
+        self._command = command_sender.Command(target.address, change.command, change.params)
+        self._evidence = Evidence(target, change, before)
+        self._sent_at = -math.inf
+        # How often it must be sent again, since acknowledgements of an earlier command may come.
+        self._repeats: int | None = None
+        self._was_repeated = False
+        self._outcome: command_sender.CommandResult | None = None
+        self._acknowledged_at = self._confirm_until = self._ask_at = math.inf
+        self._overtake = overtake
+
+    @property
+    def is_accepted(self) -> bool:
+        """Whether the device has accepted, and the status is awaited."""
+        return self.phase is Phase.CONFIRMING and self._answer.accepted
+
+    @property
+    def _answer(self) -> command_sender.CommandResult:
+        assert self._outcome is not None
+        return self._outcome
+
+    def send(self, now: float) -> None:
+        """Send the command."""
+        # A status from before the last repeat may show a change that an earlier command still
+        # undoes.
+        self._sent_at = now
+        self._target.start(self._command, now, self._answered, deadline=self._deadline,
+                           overtake=self._overtake)
+
+    def stop_resending(self, now: float) -> None:
+        """Resend the command no more; it may still be answered."""
+        self._target.commands.stop_resending(
+            now, self._target.address, lambda command: command is self._command)
+
+    def end_command(self, now: float, status: command_sender.CommandStatus) -> None:
+        """End the command if it is not acknowledged yet."""
+        self._target.commands.end_all(
+            now, status, self._target.address, lambda command: command is self._command)
+
+    def abandon(self) -> None:
+        """End without a result."""
+        if self.phase is not Phase.FINISHED:
+            self.phase = TRANSITIONS[self.phase, Step.FINISH]
+
+    def _answered(self, outcome: command_sender.CommandResult, now: float) -> None:
+        if self.phase is Phase.FINISHED:
+            return
+        self._outcome = outcome
+        accepted = outcome.accepted
+        if outcome.status is command_sender.CommandStatus.CLOSED:
+            self._finish(Result(False, outcome.status.value, superseded=True), None, now)
+        elif accepted and self._must_repeat(outcome, now):
+            self.phase = TRANSITIONS[self.phase, Step.SEND_AGAIN]
+            self.send(now)
+        elif accepted or outcome.may_answer_earlier(now):
+            self.phase = TRANSITIONS[self.phase, Step.ACKNOWLEDGED]
+            self._acknowledged_at = now
+            self._confirm_until = min(now + CONFIRMATION_TIMEOUT, self._deadline)
+            self._ask_at = now + ASK_DELAY
+        else:
+            self._refused(now)
+
+    def _must_repeat(self, outcome: command_sender.CommandResult, now: float) -> bool:
+        """
+        Return whether the acknowledgement may belong to an earlier, unacknowledged command.
+
+        The earlier command may be executed only now and undo this one, and this one may be lost.
+        So this one is sent until there are more acknowledgements than tries of the earlier
+        command.
+        """
+        if self._repeats is None:
+            earlier = outcome.earlier
+            self._repeats = 0
+            if (earlier is not None and earlier.result is None
+                    and earlier.command.params != self.change.params
+                    and outcome.may_answer_earlier(now)):
+                self._repeats = earlier.tries
+        self._repeats -= 1
+        self._was_repeated |= self._repeats >= 0
+        return self._repeats >= 0
+
+    def reported(self, report: StatusReport[S], now: float) -> None:
+        """Take a status that is newer than all before."""
+        evidence = self._evidence
+        evidence.has_status = True
+        if self.phase is not Phase.CONFIRMING:
+            return
+        delay = self._target.status_delay(now, has_clock=report.has_clock)
+        self._confirm_until = max(self._confirm_until, min(
+            self._acknowledged_at + delay + ASK_INTERVAL, self._deadline))
+        verdict = evidence.judge(
+            report, now, sent_at=self._sent_at, delay=delay, is_accepted=self.is_accepted,
+            was_repeated=self._was_repeated)
+        if verdict is Verdict.SHOWN:
+            self._succeed(self.change.evidence(report.status), now, report.status)
+        elif verdict is Verdict.OUTDATED:
+            self._ask_at = min(self._ask_at, now + evidence.outdated_wait())
+        elif not self.is_accepted and now >= self._acknowledged_at + ASK_INTERVAL:
+            self._unconfirmed(now)
+
+    def poll(self, now: float) -> None:
+        """Request the status, or end."""
+        if self.phase is not Phase.CONFIRMING:
+            return
+        if now >= self._confirm_until:
+            self._unconfirmed(now)
+        elif now >= self._ask_at:
+            self._ask_at = now + ASK_INTERVAL
+            self._target.request_status(now)
+
+    def next_deadline(self) -> float:
+        """Return when :meth:`poll` has something to do."""
+        return (min(self._confirm_until, self._ask_at) if self.phase is Phase.CONFIRMING
+                else math.inf)
+
+    # The end
+
+    def _refused(self, now: float) -> None:
+        answer, goal = self._answer, self.change.goal
+        if self._was_repeated and answer.result is None:
+            self._end(f'{goal} not confirmed: the acknowledgement may belong to an earlier '
+                      'command', now)
+            return
+        text, earlier = answer.describe_failure(), answer.earlier
+        # No status has decided whose acknowledgement it is.
+        if (self.phase is Phase.CONFIRMING and earlier and earlier.is_doubtful
+                and earlier.command.params != self.change.params):
+            text = (f'{goal} not confirmed: {answer.describe()}, which may belong to an earlier '
+                    'command')
+        self._end(text, now, refused=answer.refused,
+                  permanent=answer.refused and answer.result in PERMANENT_RESULTS)
+
+    def _unconfirmed(self, now: float) -> None:
+        target, evidence = self._target, self._evidence
+        if not self.is_accepted:
+            self._refused(now)
+        elif not (evidence.has_status or target.needs_status):
+            self._succeed(f'accepted, not confirmed (the {target.kind} sends no '
+                          f'{target.status_name})', now)
+        else:
+            reason = evidence.contradiction or (
+                f'no {"later " if evidence.is_outdated else ""}{target.status_name} came within '
+                f'{command_sender.format_seconds(now - self._acknowledged_at)}')
+            self._end(f'{self.change.goal} not confirmed: {self._answer.describe()}, but {reason}',
+                      now, contradicted=bool(evidence.contradiction))
+
+    def _succeed(self, how: str, now: float, status: S | None = None) -> None:
+        answer = self._answer.describe()
+        if not self.is_accepted:
+            answer = f'the status decides, since {answer} may belong to an earlier command'
+        self._end(f'{self.change.goal}, {how}: {answer}', now, status, success=True,
+                  note=self.change.note)
+
+    def _end(
+        self, text: str, now: float, status: S | None = None, *, success: bool = False,
+        note: str = '', **flags: bool,
+    ) -> None:
+        timing = self._answer.timing(now - self._wanted_at)
+        self._finish(Result(success, f'{text} ({timing})', note=note, **flags), status, now)
+
+    def _finish(self, result: Result, status: S | None, now: float) -> None:
+        self.phase = TRANSITIONS[self.phase, Step.FINISH]
+        self._ended(result, status, now)

@@ -1,0 +1,278 @@
+# Copyright 2026 The illuminator_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""A reconciler moves a property to its desired value and answers each caller once, truthfully."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+import math
+from typing import Any
+
+from hypothesis import given, strategies
+from illuminator_ros.mavlink.command_sender import CommandSender
+from illuminator_ros.mavlink.messages import Address, CommandAck, MavResult
+from illuminator_ros.payload.attempt import Result, StatusReport, Target
+from illuminator_ros.payload.reconciler import decide, Desired, Reconciler
+import pytest
+
+US, DEVICE = Address(1, 194), Address(1, 7)
+SET_LEVEL, STATUS_ID = 31000, 40000
+ACCEPTED, DENIED = MavResult.ACCEPTED, MavResult.DENIED
+
+
+@dataclass(frozen=True)
+class Level:
+    """A level of the device; 0 overtakes."""
+
+    level: int
+    note: str = ''
+    command: int = SET_LEVEL
+
+    @property
+    def params(self) -> tuple[float, ...]:
+        return (float(self.level),)
+
+    @property
+    def goal(self) -> str:
+        return f'level {self.level}'
+
+    def shown_by(self, status: int) -> bool:
+        return status == self.level
+
+    def evidence(self, status: int) -> str:
+        return 'confirmed by STATUS'
+
+    def actual(self, status: int) -> str:
+        return f'level {status}'
+
+
+class Bench:
+    """A reconciler, the device at the other end, and the time."""
+
+    def __init__(self) -> None:
+        self.now = 100.0
+        self.sender = CommandSender(US)
+        target = Target(DEVICE, self.sender, kind='device', status_id=STATUS_ID,
+                        status_name='STATUS')
+        self.ready_at = -math.inf
+        self.reconciler: Reconciler[int] = Reconciler(
+            target, earliest=lambda change: self.ready_at,
+            overtakes=lambda change: change.params == (0.0,))
+
+    def want(self, level: int, *, is_stream: bool = False, limit: float = 30.0) -> list[Result]:
+        """Want a level, and return the list that gets its results."""
+        results: list[Result] = []
+        self.reconciler.want(
+            Desired(Level(level), since=self.now, limit=limit), self.now,
+            lambda result, now: results.append(result), is_stream=is_stream)
+        return results
+
+    def report(self, level: int, *, sent_by: float | None = None, shared: bool = False) -> None:
+        self.reconciler.reported(StatusReport(
+            level, self.now if sent_by is None else sent_by, shared_address=shared), self.now)
+
+    def acknowledge(self, result: int = ACCEPTED) -> None:
+        self.sender.acknowledge(DEVICE, CommandAck(SET_LEVEL, result, 0, 0, *US), self.now)
+
+    def run(self, seconds: float) -> None:
+        """Let time pass."""
+        end = self.now + seconds
+        while (due := min(self.reconciler.next_deadline(), self.sender.next_deadline())) <= end:
+            self.now = max(self.now, due)
+            self.sender.poll(self.now)
+            self.reconciler.poll(self.now)
+        self.now = end
+
+    @property
+    def sent(self) -> list[float]:
+        """Return the levels that were sent, tries included."""
+        messages: list[Any] = [message for _, message in self.sender.outgoing]
+        return [message.param1 for message in messages if message.command == SET_LEVEL]
+
+
+@pytest.fixture
+def bench() -> Bench:
+    bench = Bench()
+    bench.report(5)
+    return bench
+
+
+def messages(*answers: Sequence[Result]) -> list[str]:
+    return [answer[0].message.partition(' (')[0] if answer else '' for answer in answers]
+
+
+def test_a_status_after_the_acknowledgement_that_shows_the_value_is_the_only_success(
+    bench: Bench,
+) -> None:
+    answer = bench.want(1)
+    bench.report(1)
+    sent_at = bench.now
+    bench.run(0.1)
+    bench.acknowledge()
+    bench.report(1, sent_by=sent_at - 0.1)
+    bench.report(5)
+    assert answer == []
+    bench.report(1)
+    assert messages(answer) == ['level 1, confirmed by STATUS: MAV_RESULT_ACCEPTED']
+    assert answer[0].success
+
+
+@pytest.mark.parametrize(('result', 'level', 'shared', 'message'), [
+    (ACCEPTED, 5, False, 'level 1 not confirmed: MAV_RESULT_ACCEPTED, but STATUS shows level 5'),
+    (ACCEPTED, 1, True,
+     'level 1 not confirmed: MAV_RESULT_ACCEPTED, but several devices answer as 1/7'),
+    (ACCEPTED, None, False,
+     'level 1 not confirmed: MAV_RESULT_ACCEPTED, but no STATUS came within 1.00 s'),
+    (DENIED, 1, False, 'refused: MAV_RESULT_DENIED'),
+    (None, 1, False, 'no acknowledgement')], ids=str)
+def test_an_attempt_that_fails_says_why(
+    bench: Bench, result: int | None, level: int | None, shared: bool, message: str,
+) -> None:
+    answer = bench.want(1)
+    if result is not None:
+        bench.acknowledge(result)
+    if level is not None:
+        bench.run(0.01)
+        bench.report(level, shared=shared)
+    bench.run(10.0)
+    assert messages(answer) == [message]
+    assert not answer[0].success
+
+
+def test_a_device_that_never_sends_a_status_succeeds_as_not_confirmed() -> None:
+    bench = Bench()
+    answer = bench.want(1)
+    bench.acknowledge()
+    bench.run(1.0)
+    assert messages(answer) == ['level 1, accepted, not confirmed']
+    assert answer[0].success
+
+
+def test_equal_values_share_a_command_and_its_outcome(bench: Bench) -> None:
+    answers = [bench.want(1), bench.want(1), bench.want(1, is_stream=True)]
+    bench.acknowledge()
+    bench.report(1)
+    assert [answer[0].success for answer in answers] == [True] * 3
+    assert bench.sent == [1.0]
+
+
+@pytest.mark.parametrize(('newer', 'sent'), [(2, [1.0]), (0, [1.0, 0.0])])
+def test_a_newer_value_supersedes_an_older_one_and_is_sent_after_it_unless_it_overtakes(
+    bench: Bench, newer: int, sent: list[float],
+) -> None:
+    older, answer = bench.want(1), bench.want(newer)
+    assert messages(older, answer) == [f'superseded by level {newer}', '']
+    assert bench.sent == sent
+    bench.acknowledge()
+    bench.run(0.01)
+    assert bench.sent[-1] == newer
+    assert 1.0 not in bench.sent[1:]
+
+
+def test_a_value_waits_for_its_earliest_time_and_fails_if_that_does_not_come(
+    bench: Bench,
+) -> None:
+    bench.ready_at = bench.now + 1.0
+    answer = bench.want(1)
+    bench.run(0.9)
+    assert bench.sent == []
+    bench.run(0.2)
+    assert bench.sent == [1.0]
+    bench.ready_at = math.inf
+    late = bench.want(2, limit=0.5)
+    bench.run(0.6)
+    assert messages(answer, late) == [
+        'superseded by level 2', 'not sent: the command before it has not ended']
+
+
+@pytest.mark.parametrize(('end', 'message', 'tries'), [
+    (lambda bench: bench.reconciler.cancel('cancelled', bench.now), 'cancelled', 1),
+    (lambda bench: bench.reconciler.lost('lost', bench.now), 'no acknowledgement', 1),
+    (lambda bench: bench.reconciler.stop('released', bench.now), 'no acknowledgement', 1),
+    (lambda bench: None, 'no acknowledgement', 4)], ids=['cancel', 'lost', 'stop', 'nothing'])
+def test_a_value_that_is_given_up_is_not_resent(
+    bench: Bench, end: object, message: str, tries: int,
+) -> None:
+    answer = bench.want(1)
+    bench.run(0.1)
+    assert callable(end)
+    end(bench)
+    bench.run(10.0)
+    assert messages(answer) == [message]
+    assert bench.sent == [1.0] * tries
+
+
+def test_an_answer_may_want_another_value_twice(bench: Bench) -> None:
+    answers: list[list[Result]] = []
+    bench.reconciler.want(
+        Desired(Level(1)), bench.now,
+        lambda result, now: answers.extend((bench.want(2), bench.want(3))))
+    bench.acknowledge()
+    bench.report(1)
+    bench.acknowledge()
+    bench.run(0.01)
+    bench.acknowledge()
+    bench.report(3)
+    assert messages(*answers) == [
+        'superseded by level 3', 'level 3, confirmed by STATUS: MAV_RESULT_ACCEPTED']
+
+
+def test_the_first_rule_in_force_decides_and_a_later_one_is_named() -> None:
+    first, second = Desired(Level(1), since=20.0), Desired(Level(2), since=5.0)
+    rules = (lambda facts, now: first, lambda facts, now: None, lambda facts, now: second)
+    assert decide(rules, None, 0.0) == (None, 5.0)
+    assert decide(rules, None, 5.0) == (second, 20.0)
+    assert decide(rules, None, 20.0) == (first, math.inf)
+
+
+STEPS = strategies.lists(strategies.one_of(
+    strategies.tuples(strategies.just('want'), strategies.integers(0, 2)),
+    strategies.tuples(strategies.just('acknowledge'), strategies.sampled_from(
+        [ACCEPTED, ACCEPTED, DENIED, MavResult.TEMPORARILY_REJECTED, MavResult.IN_PROGRESS])),
+    strategies.tuples(strategies.just('report'), strategies.integers(0, 2)),
+    strategies.tuples(strategies.just('run'), strategies.sampled_from([0.001, 0.3, 2.0, 7.0]))),
+    max_size=40)
+
+
+@given(STEPS)
+def test_each_caller_is_answered_once_and_a_success_was_accepted_and_shown(
+    steps: list[tuple[str, int | float]],
+) -> None:
+    bench = Bench()
+    bench.report(5)
+    asked: list[tuple[int, list[Result]]] = []
+    accepted = False
+    for act, value in steps:
+        shown = None
+        if act == 'run':
+            bench.run(float(value))
+            continue
+        if act == 'acknowledge':
+            bench.acknowledge(int(value))
+            accepted |= value == ACCEPTED
+        elif act == 'report':
+            shown = int(value)
+            bench.report(shown)
+        else:
+            asked.append((int(value), bench.want(int(value))))
+        for level, answer in asked:
+            assert len(answer) <= 1
+            if answer and answer[0].success:
+                assert (level, accepted) == (shown, True)
+        asked = [one for one in asked if not one[1]]
+    bench.run(120.0)
+    assert [len(answer) for _, answer in asked] == [1] * len(asked)
+    assert not bench.reconciler.is_busy
