@@ -22,7 +22,6 @@ import math
 
 from . import events
 from .command_sources import LightSources
-from .commands import SWITCHES
 from .light_configuration import LightConfiguration
 from .light_switch import LightSwitch, RULES, SwitchRule
 from .messages import STATUS_ID
@@ -34,14 +33,11 @@ from ..payload.arbitration import Cause, HolderChanged
 from ..payload.attempt import Done, Result, Target
 from ..payload.command_sources import DEFAULT, SourceSettings
 from ..payload.identity import Identity, IdentityQuery
-from ..payload.last_change import LastChange
 
 # s without a status after which the light is asked for one, and between the requests.
 STATUS_TIMEOUT = 2.5
 # s; enough for two commands in sequence, each with its tries, and for their messages.
 REFRESH_LIMIT = 5.0
-# s after an ON in which an OFF may overtake it on the way to the light.
-OVERTAKING_TIME = 0.2
 
 
 @dataclass(frozen=True)
@@ -72,6 +68,36 @@ class Settings:
     sources: SourceSettings | None = None
     off_on_release: bool = False
     switch_rules: tuple[SwitchRule, ...] = RULES
+
+
+@dataclass
+class _Newest:
+    """
+    The newest status.
+
+    :param status: None before the first.
+    :param at: when it came, s.
+    :param measures_temperature: whether a temperature other than 0 was ever reported.
+    """
+
+    status: Status | None = None
+    at: float = -math.inf
+    measures_temperature: bool = False
+
+    def take(self, status: Status, now: float) -> None:
+        """Take a status."""
+        self.status, self.at = status, now
+        # Lights that do not measure send 0 (ArduSub), and a sensor rarely reads exactly 0.
+        self.measures_temperature |= bool(status.temperature)
+
+    @property
+    def temperature(self) -> float | None:
+        """Return the temperature, degC; None where it is not measured, or the sensor fails."""
+        status = self.status
+        if (status is None or not self.measures_temperature
+                or status.error_flags & ErrorFlags.THERMISTOR_FAILURE):
+            return None
+        return status.temperature
 
 
 @dataclass(eq=False)
@@ -154,14 +180,13 @@ class Light:
     """
     One component that is an illuminator: liveness, identity, switch and configuration. No I/O.
 
-    It has more than 15 fields: eight of them are what other classes read of a light.
+    Its fields are its parts, and six values that other classes read.
 
     :param emit: takes the events.
     :param changed: called with the light and the time when :meth:`next_deadline` or
         ``has_answered`` may have changed.
     :ivar connected: whether it is heard.
     :ivar heard_at: the time of its last message, s; -inf before the first.
-    :ivar status: the newest status, None before the first.
     :ivar lost_at: when it was lost, s; infinity while it is heard.
     :ivar restarts: how often it has restarted since it was found.
     :ivar was_commanded: whether a user has ever sent it a command.
@@ -174,14 +199,12 @@ class Light:
     ) -> None:
         self.address = address
         self.connected = False
-        self.heard_at = self._status_at = -math.inf
+        self.heard_at = -math.inf
         self.lost_at = math.inf
-        self.status: Status | None = None
         self.restarts = 0
         self.was_commanded = False
         self.has_answered = False
         self._settings = settings
-        self._commands = commands
         self._emit = emit
         self._changed = changed
         self._target = Target(
@@ -200,13 +223,11 @@ class Light:
             off_after_silence=settings.off_after_silence, reassert=settings.reassert,
             earliest_on=self._earliest_on, rules=settings.switch_rules)
         self._tracker = StatusTracker()
+        self._newest = _Newest()
         self._is_shared = False
-        self._measures_temperature = False
         self._link_failure = ''
         self._sources = LightSources(settings.sources)
         self._refreshes: list[_Refresh] = []
-        # The OFF at the end of the process.
-        self._last_off: LastChange[Status] | None = None
 
     def _command_ended(self, result: CommandResult, now: float) -> None:
         self.has_answered |= result.result is not None
@@ -243,9 +264,7 @@ class Light:
             if self._tracker.proof_due < math.inf:
                 self._status_query.need(self._tracker.proof_due)
             return
-        self.status, self._status_at = status, now
-        # Lights that do not measure send 0 (ArduSub), and a sensor rarely reads exactly 0.
-        self._measures_temperature |= bool(status.temperature)
+        self._newest.take(status, now)
         self._status_query.reported(now)
         if restarted:
             self._restarted(now)
@@ -257,15 +276,13 @@ class Light:
             report, now, can_follow=self._tracker.conflict.can_follow,
             switched_at=self._switch.switched_at,
             brightness_is_switch=self._switch.brightness.is_switch)
-        if self._last_off is not None:
-            self._last_off.reported(report, now)
         self._tracker.checked()
         if self._refreshes:
             for refresh in self._refreshes:
                 refresh.outcomes['ILLUMINATOR_STATUS'] = ''
             self._check_refreshes(now)
         # Last, so that a caller has its answer before topics show the change.
-        self._emit(events.StatusReceived(self.address, status, now, self.temperature))
+        self._emit(events.StatusReceived(self.address, status, now, self._newest.temperature))
 
     def take_identity(self, identity: Identity, now: float) -> None:
         """Take a COMPONENT_INFORMATION_BASIC."""
@@ -315,18 +332,14 @@ class Light:
     # Values
 
     @property
+    def status(self) -> Status | None:
+        """Return the newest status, None before the first."""
+        return self._newest.status
+
+    @property
     def strobe_range(self) -> StrobeRange:
         """Return the strobe periods that the light reports to be possible."""
         return self.status.strobe_range if self.status else StrobeRange()
-
-    @property
-    def temperature(self) -> float | None:
-        """Return the temperature, degC; None where it is not measured, or the sensor fails."""
-        status = self.status
-        if (status is None or not self._measures_temperature
-                or status.error_flags and status.error_flags & ErrorFlags.THERMISTOR_FAILURE):
-            return None
-        return status.temperature
 
     def unreachable(self, now: float) -> str:
         """Return why requests cannot reach the light, for people; '' if they can."""
@@ -340,8 +353,8 @@ class Light:
         """Return the state, for any thread."""
         configuration, query = self._configuration, self._identity_query
         return events.LightSnapshot(
-            self.address, self.connected, self.heard_at, self.status, self._status_at,
-            self._settings.status_interval, self.restarts, self.temperature,
+            self.address, self.connected, self.heard_at, self.status, self._newest.at,
+            self._settings.status_interval, self.restarts, self._newest.temperature,
             configuration.confirmed, configuration.discrepancy, configuration.guard.exceeded,
             query.identity, query.is_settled(now), self._tracker.conflict.detected,
             self.unreachable(now), self._sources.shown_holder, self._sources.since)
@@ -350,7 +363,7 @@ class Light:
 
     def _can_reach(self, now: float, done: Done, refusal: str = '') -> bool:
         """Return whether the light takes requests; if not, fail a request with the reason."""
-        closed = self._commands.refusal
+        closed = self._target.commands.refusal
         refusal = closed or refusal or self.unreachable(now)
         if refusal:
             done(Result(False, refusal, superseded=bool(closed)), now)
@@ -394,7 +407,7 @@ class Light:
         brightness: float | None = None,
     ) -> str:
         """Take a request; return why a source may not command the light, '' if it may."""
-        if refusal := self._commands.refusal:
+        if refusal := self._target.commands.refusal:
             return refusal
         self.was_commanded = True
         self._forget_silenced(now)
@@ -507,7 +520,7 @@ class Light:
 
     def close(self, now: float) -> None:
         """Answer all requests, and make no change any more but :meth:`switch_off_finally`."""
-        refusal = self._commands.refusal
+        refusal = self._target.commands.refusal
         self._sources = LightSources(None)
         self._switch.close(refusal, now)
         self._configuration.replace(refusal, now)
@@ -523,12 +536,8 @@ class Light:
         :param report: see :class:`~..payload.last_change.LastChange`. The failure of a light that
             is not heard is permanent until it is heard.
         """
-        self._last_off = LastChange(
-            self._target, SWITCHES[False], report,
-            counts_from=self._switch.last_on_at(now) + OVERTAKING_TIME)
-        if self.connected:
-            self._last_off.poll(now)
-        else:
+        self._switch.switch_off_finally(now, report)
+        if not self.connected:
             report(Result(False, self.unreachable(now), permanent=True), now)
         self._changed(self, now)
 
@@ -579,8 +588,6 @@ class Light:
         self._switch.poll(now, connected=self.connected)
         self._configuration.poll(now, connected=self.connected)
         self._check_refreshes(now)
-        if self._last_off is not None and self.connected:
-            self._last_off.poll(now)
 
     def next_deadline(self) -> float:
         """Return when :meth:`poll` has something to do."""
@@ -591,6 +598,5 @@ class Light:
             self._switch.next_deadline(connected=connected),
             self._configuration.next_deadline(connected=connected),
             self.heard_at + self._settings.heartbeat_timeout if connected else math.inf,
-            self._last_off.next_deadline() if self._last_off and connected else math.inf,
             min((one.started for one in self._refreshes), default=math.inf) + REFRESH_LIMIT,
             self._sources.next_deadline())

@@ -31,6 +31,7 @@ from .light_configuration import LightConfiguration
 from .model import DIMMING_FLAGS, ErrorFlags, Mode, Status
 from ..mavlink.command_sender import format_seconds
 from ..payload.attempt import Change, Done, Result, StatusReport, Target
+from ..payload.last_change import LastChange
 from ..payload.reconciler import decide, Desired, Reconciler, Rule
 from ..payload.repeat_limit import RepeatLimit
 
@@ -41,6 +42,8 @@ REPEATS = 3
 # s after a command in which a switch counts as its late effect, and after a configuration in which
 # a switch counts as implied by it.
 LATE_TIME = 30.0
+# s after an ON in which an OFF may overtake it on the way to the light.
+OVERTAKING_TIME = 0.2
 IMPLIED_TIME = 2.0
 
 
@@ -154,20 +157,22 @@ class LightSwitch:
     ) -> None:
         self.state = SwitchState(off_after_silence)
         self.brightness = BrightnessAsSwitch()
-        self._address = target.address
+        self._target = target
         self._emit = emit
         self._configuration = configuration
-        self._reasserts = reassert
         self._rules = rules
         self._reconciler: Reconciler[Status] = Reconciler(
             target, self._ended, overtakes=_is_off,
             earliest=lambda change: earliest_on() if _is_on(change) else -math.inf)
+        # The OFF at the end of the process.
+        self._last_off: LastChange[Status] | None = None
         # How the value was requested, for LightSwitched; None where no event is wanted.
         self._detail: str | None = ''
         # Whether it is switched on again if another sender switches it off: a request has switched
         # it on, and it was neither lost nor restarted since.
         self._undoes_off = False
-        self._undoing = RepeatLimit(REPEATS, REPEAT_INTERVAL)
+        # The limit on undoing switches by other senders, None where these are followed.
+        self._undoing = RepeatLimit(REPEATS, REPEAT_INTERVAL) if reassert else None
         # Whether a status has shown it on since the last OFF that was confirmed.
         self._was_on = False
         # The newest status and whether several lights send from the address.
@@ -204,7 +209,7 @@ class LightSwitch:
         self._due = -math.inf
         self.state.off = desired
         self.keep_off()
-        self._emit(events.AutomaticSwitch(self._address, False, desired.reason))
+        self._emit(events.AutomaticSwitch(self._target.address, False, desired.reason))
 
     def keep_off(self) -> None:
         """Undo no OFF by another sender until a request has switched the light on."""
@@ -270,12 +275,14 @@ class LightSwitch:
             state.off = self._failed(desired, result, now + REPEAT_INTERVAL)
         elif desired == state.undoing:
             state.undoing = self._failed(
-                desired, result, None if result.success else self._undoing.take(now))
+                desired, result,
+                self._undoing.take(now) if self._undoing and not result.success else None)
             if state.undoing is None and not result.success:
                 self._emit(events.ChangedByOther(
-                    self._address, 'off' if on else 'on', undone=False))
+                    self._target.address, 'off' if on else 'on', undone=False))
         if result.success and was_on is not on and detail is not None:
-            self._emit(events.LightSwitched(self._address, on, events.Origin.REQUEST, detail))
+            self._emit(events.LightSwitched(
+                self._target.address, on, events.Origin.REQUEST, detail))
 
     def _failed(
         self, desired: Desired[Status], result: Result, due: float | None,
@@ -284,7 +291,7 @@ class LightSwitch:
         if result.success:
             return None
         self._emit(events.AutomaticSwitch(
-            self._address, _is_on(desired.change), desired.reason, result.message))
+            self._target.address, _is_on(desired.change), desired.reason, result.message))
         return None if due is None else replace(desired, since=due)
 
     def cancel(self, message: str, now: float) -> None:
@@ -299,6 +306,11 @@ class LightSwitch:
         """End everything that is desired; no rule counts from now on."""
         self._rules = ()
         self._reconciler.cancel(message, now, superseded=True)
+
+    def switch_off_finally(self, now: float, report: Done) -> None:
+        """Switch the light off whenever it may be on; see :meth:`.light.Light.close`."""
+        self._last_off = LastChange(self._target, SWITCHES[False], report,
+                                    counts_from=self._last_on_at(now) + OVERTAKING_TIME)
 
     def stop_on(self, message: str, now: float) -> None:
         """Send no further ON: its source no longer holds the light."""
@@ -333,7 +345,7 @@ class LightSwitch:
             or sent and _is_on(sent.change) and (state.enabled is None or self._is_shared)
             or self._was_on and self._is_shared)
 
-    def last_on_at(self, now: float) -> float:
+    def _last_on_at(self, now: float) -> float:
         """Return the time after which no ON was sent, s, unless it has succeeded or failed."""
         sent, at = self._reconciler.last_sent, -math.inf
         if sent is not None:
@@ -395,6 +407,8 @@ class LightSwitch:
             if self._rules and not restarted:
                 self._follow(before, report, now)
         self._reconciler.reported(report, now)
+        if self._last_off is not None:
+            self._last_off.reported(report, now)
 
     def _follow(
         self, before: bool | None, report: StatusReport[Status], now: float,
@@ -407,16 +421,16 @@ class LightSwitch:
             return
         is_own = self.is_own(status.enabled, now)
         origin = events.Origin.REQUEST if is_own else events.Origin.OTHER_SENDER
-        self._emit(events.LightSwitched(self._address, status.enabled, origin))
-        if not self._reasserts or is_own or before and not self._undoes_off:
+        self._emit(events.LightSwitched(self._target.address, status.enabled, origin))
+        if self._undoing is None or is_own or before and not self._undoes_off:
             return
         due, change = self._undoing.take(now), 'off' if before else 'on'
         if due is None:
-            self._emit(events.ChangedByOther(self._address, change, undone=False))
+            self._emit(events.ChangedByOther(self._target.address, change, undone=False))
         else:
             reason = f'external_changes: another sender switched it {change}'
             self.state.undoing = Desired(SWITCHES[before], reason, since=due)
-            self._emit(events.AutomaticSwitch(self._address, before, reason))
+            self._emit(events.AutomaticSwitch(self._target.address, before, reason))
 
     def lost(self, message: str, now: float) -> None:
         """Send no further ON: the light is lost, and another try may reach it after a restart."""
@@ -430,12 +444,16 @@ class LightSwitch:
         """Do what is due."""
         if connected:
             self.decide(now)
+            if self._last_off is not None:
+                self._last_off.poll(now)
         self._reconciler.poll(now)
 
     def next_deadline(self, *, connected: bool) -> float:
         """Return when :meth:`poll` has something to do."""
         due = self._reconciler.next_deadline()
-        return min(due, self._due) if connected else due
+        if not connected:
+            return due
+        return min(due, self._due, self._last_off.next_deadline() if self._last_off else math.inf)
 
 
 def _is_hot(status: Status) -> bool:

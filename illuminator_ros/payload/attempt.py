@@ -250,12 +250,16 @@ class Evidence(Generic[S]):
     The statuses since a command, compared with its change.
 
     :param before: the newest status when the command was sent, None if there was none.
+    :ivar sent_at: when the command was last sent, s.
+    :ivar was_repeated: whether a status may show an earlier command of the attempt.
     :ivar has_status: whether the device has ever sent a status.
     :ivar contradiction: why the last status does not confirm the change, '' if it does.
     :ivar is_outdated: whether a status may have been older than the command.
     """
 
     def __init__(self, target: Target, change: Change[S], before: S | None) -> None:
+        self.sent_at = -math.inf
+        self.was_repeated = False
         self.has_status = before is not None
         self.contradiction = ''
         self.is_outdated = False
@@ -270,25 +274,22 @@ class Evidence(Generic[S]):
         return self._outdated_wait / 2
 
     def judge(
-        self, report: StatusReport[S], now: float, *, sent_at: float, delay: float,
-        is_accepted: bool, was_repeated: bool,
+        self, report: StatusReport[S], now: float, *, delay: float, is_accepted: bool,
     ) -> Verdict:
         """
         Compare a status that has come after the acknowledgement.
 
-        :param sent_at: when the command was last sent, s.
         :param delay: by how much the status may be late, s.
         :param is_accepted: whether the device has accepted the command.
-        :param was_repeated: whether a status may show an earlier command of the attempt.
         """
         shown = self._change.shown_by(report.status)
         if shown is None:
             # Then the acknowledgement decides.
             shown = is_accepted
-        if shown and not was_repeated and self._differs_before:
-            self._target.note_status_delay(now - sent_at)
+        if shown and not self.was_repeated and self._differs_before:
+            self._target.note_status_delay(now - self.sent_at)
             self._differs_before = False
-        if report.sent_by - delay < sent_at:
+        if report.sent_by - delay < self.sent_at:
             # With a late acknowledgement, a status from before the command would even confirm a
             # change that was never made.
             self.is_outdated = True
@@ -327,10 +328,8 @@ class Attempt(Generic[S]):
         self._deadline = deadline
         self._command = command_sender.Command(target.address, change.command, change.params)
         self._evidence = Evidence(target, change, before)
-        self._sent_at = -math.inf
         # How often it must be sent again, since acknowledgements of an earlier command may come.
         self._repeats: int | None = None
-        self._was_repeated = False
         self._outcome: command_sender.CommandResult | None = None
         self._acknowledged_at = self._confirm_until = self._ask_at = math.inf
         self._overtake = overtake
@@ -349,7 +348,7 @@ class Attempt(Generic[S]):
         """Send the command."""
         # A status from before the last repeat may show a change that an earlier command still
         # undoes.
-        self._sent_at = now
+        self._evidence.sent_at = now
         self._target.start(self._command, now, self._answered, deadline=self._deadline,
                            overtake=self._overtake)
 
@@ -402,7 +401,7 @@ class Attempt(Generic[S]):
                     and outcome.may_answer_earlier(now)):
                 self._repeats = earlier.tries
         self._repeats -= 1
-        self._was_repeated |= self._repeats >= 0
+        self._evidence.was_repeated |= self._repeats >= 0
         return self._repeats >= 0
 
     def reported(self, report: StatusReport[S], now: float) -> None:
@@ -415,8 +414,7 @@ class Attempt(Generic[S]):
         self._confirm_until = max(self._confirm_until, min(
             self._acknowledged_at + delay + ASK_INTERVAL, self._deadline))
         verdict = evidence.judge(
-            report, now, sent_at=self._sent_at, delay=delay, is_accepted=self.is_accepted,
-            was_repeated=self._was_repeated)
+            report, now, delay=delay, is_accepted=self.is_accepted)
         if verdict is Verdict.SHOWN:
             self._succeed(self.change.evidence(report.status), now, report.status)
         elif verdict is Verdict.OUTDATED:
@@ -443,7 +441,7 @@ class Attempt(Generic[S]):
 
     def _refused(self, now: float) -> None:
         answer, goal = self._answer, self.change.goal
-        if self._was_repeated and answer.result is None:
+        if self._evidence.was_repeated and answer.result is None:
             self._end(f'{goal} not confirmed: the acknowledgement may belong to an earlier '
                       'command', now)
             return

@@ -170,12 +170,12 @@ def test_a_temperature_is_measured_from_the_first_that_is_not_0_unless_the_senso
 ) -> None:
     fake.fields['temp_c'] = 0.0
     pair = Pair(fake).settle()
-    seen = [pair.light.temperature]
+    seen = [pair.snapshot.temperature]
     for fields in ({'temp_c': -3.0}, {'temp_c': 0.0}, {'error_status': 4},
                    {'error_status': 0, 'temp_c': float('nan')}):
         fake.fields |= fields
         pair.run(1.5)
-        seen.append(pair.light.temperature)
+        seen.append(pair.snapshot.temperature)
     assert seen == [None, -3.0, 0.0, None, None]
 
 

@@ -50,7 +50,7 @@ def test_each_kind_of_light_is_found_switched_configured_restored_and_never_lost
     pair.run(60.0)
     assert pair.recorder.events == ['connected']
     assert pair.light.strobe_range.known is strobes
-    assert (pair.light.temperature is not None) is strobes
+    assert (pair.snapshot.temperature is not None) is strobes
     identity = pair.snapshot.identity
     assert (identity is not None) is strobes
     if profile == 'reference':
