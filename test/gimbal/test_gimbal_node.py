@@ -42,6 +42,7 @@ from geometry_msgs.msg import QuaternionStamped, Vector3, Vector3Stamped  # noqa
 from illuminator_ros.gimbal.ros.gimbals import GIMBAL_PARAMETERS  # noqa: E402, I100
 from illuminator_ros.illuminator.ros.parameters import LIGHT_PARAMETERS  # noqa: E402
 from illuminator_ros.ros.parameters import LINK_PARAMETERS  # noqa: E402
+from rclpy.qos import ReliabilityPolicy  # noqa: E402
 from sensor_msgs.msg import NavSatFix  # noqa: E402
 from std_msgs.msg import Bool, Header, String  # noqa: E402
 from std_srvs.srv import SetBool, Trigger  # noqa: E402
@@ -474,6 +475,16 @@ def test_node_of_a_gimbal_that_is_silent_for_long_is_removed(
         program.wait_for('was silent for long: /illuminator_1_')
         assert trigger(own_ros, 'neutral', '/illuminator').message.startswith(
             'no gimbal connected: no component announces a gimbal')
+
+
+@pytest.mark.parametrize(('name', 'reliability'), [
+    *((name, ReliabilityPolicy.RELIABLE) for name in ('attitude', 'angles', 'roi')),
+    ('rate', ReliabilityPolicy.BEST_EFFORT)])
+def test_setpoint_that_is_not_repeated_is_subscribed_to_reliably(
+        name: str, reliability: ReliabilityPolicy, ros: Ros, gimbal: FakeManager) -> None:
+    (subscription,) = ros.node.get_subscriptions_info_by_topic(f'/gimbal/cmd/{name}')
+
+    assert subscription.qos_profile.reliability is reliability
 
 
 def test_lost_gimbal_is_reported(own_ros: Ros) -> None:

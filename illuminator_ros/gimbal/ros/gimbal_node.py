@@ -22,6 +22,7 @@ from typing import Any, TypeVar
 
 from geometry_msgs.msg import QuaternionStamped, Vector3Stamped
 from rclpy.node import Node
+from rclpy.qos import QoSProfile
 from sensor_msgs.msg import NavSatFix
 from std_msgs.msg import Bool, Header, String
 from std_srvs.srv import SetBool, Trigger
@@ -233,14 +234,14 @@ class GimbalNode:
     def _command_topics(self, source: str, prefix: str) -> tuple[ros_node.AnyCommand, ...]:
         def topic(
             name: str, type_: type[object], send: Callable[[Gimbal, T, float], str],
-            read: Callable[[Any], T],
+            read: Callable[[Any], T], qos: QoSProfile = ros_node.SWITCH_QOS,
         ) -> ros_node.CommandTopic[T]:
             def take(value: T, now: float) -> None:
                 gimbal = self._gimbal()
                 self._refused(f'{prefix}{name}', self.absence(now) if gimbal is None else
                               gimbal.claim(source, now) or send(gimbal, value, now))
 
-            return ros_node.CommandTopic(f'{prefix}{name}', type_, take, read)
+            return ros_node.CommandTopic(f'{prefix}{name}', type_, take, read, qos)
 
         def point(gimbal: Gimbal, place: GeoPoint, now: float) -> str:
             pointing.offer(place, now)
@@ -254,7 +255,8 @@ class GimbalNode:
             topic('cmd/angles', Vector3Stamped,
                   lambda gimbal, value, now: gimbal.set_angles(*value, now),
                   self._frames.read_angles),
-            topic('cmd/rate', Vector3Stamped, Gimbal.set_rates, conversions.read_rates),
+            topic('cmd/rate', Vector3Stamped, Gimbal.set_rates, conversions.read_rates,
+                  ros_node.COMMAND_QOS),
             topic('cmd/roi', NavSatFix, point,
                   lambda message: conversions.read_place(message, self._separation)))
 
