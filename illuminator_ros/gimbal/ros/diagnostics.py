@@ -16,7 +16,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping
 import math
 
 from ..axes import other_signs
@@ -36,12 +36,12 @@ _CONDITIONS = (ErrorFlags.AT_ROLL_LIMIT | ErrorFlags.AT_PITCH_LIMIT | ErrorFlags
 
 
 def why_no_gimbal(
-    link: diagnostics.LinkDiagnostics, heard: Sequence[GimbalKey], known: str,
+    link: diagnostics.LinkDiagnostics, heard: Mapping[GimbalKey, str], known: str,
 ) -> str:
     """
     Return why a node has no gimbal, for people.
 
-    :param heard: the gimbals that other nodes serve, or that are not connected.
+    :param heard: the announced gimbals, each with the reason why it is not connected, else ''.
     :param known: the reason that a manager in this process gives, else ''.
     """
     if link.state.failure:
@@ -49,14 +49,17 @@ def why_no_gimbal(
     if known and link.state.traffic.frames_received:
         return known
     if heard:
-        return f'gimbals {", ".join(map(str, heard))} are announced, none is connected or selected'
+        return '; '.join(
+            f'gimbal {key} is announced, but {why or "gimbal_device_id selects another one"}'
+            for key, why in heard.items())
     return ('no component announces a gimbal: '
             f'{diagnostics.why_nothing_is_heard(link, "a gimbal manager")}')
 
 
 def reports(
     link: diagnostics.LinkDiagnostics, *, gimbal: GimbalSnapshot | None,
-    heard: Sequence[GimbalKey], known: str, limit_reached: bool, interval: float, started: float,
+    heard: Mapping[GimbalKey, str], known: str, limit_reached: bool, interval: float,
+    started: float,
 ) -> list[diagnostics.Report]:
     """
     Return the reports of a node.

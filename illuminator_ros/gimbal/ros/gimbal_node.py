@@ -129,8 +129,11 @@ class GimbalNode:
     def absence(self, now: float) -> str:
         """Return why there is no gimbal, for people."""
         link = self._host.diagnostics.snapshot(now)
-        reason = why_no_gimbal(link, tuple(self._client.gimbals), self._why_none())
-        return f'no gimbal connected: {reason}'
+        return f'no gimbal connected: {why_no_gimbal(link, self._heard(now), self._why_none())}'
+
+    def _heard(self, now: float) -> dict[events.GimbalKey, str]:
+        """Return the announced gimbals, each with the reason why it is not connected."""
+        return {key: gimbal.unreachable(now) for key, gimbal in self._client.gimbals.items()}
 
     def _gimbal(self) -> Gimbal | None:
         return self._client.gimbals.get(self.key) if self.key else None
@@ -287,7 +290,7 @@ class GimbalNode:
         gimbal = self._gimbal()
         return functools.partial(
             reports, gimbal=gimbal.snapshot(now) if gimbal else None,
-            heard=tuple(self._client.gimbals), known=self._why_none(),
+            heard=self._heard(now), known=self._why_none(),
             limit_reached=self._client.limit_reached,
             interval=self._client.settings.attitude_interval, started=self._started)
 
