@@ -162,8 +162,8 @@ class Feeder:
                              '~/time_reference')
         utc = stamp.time + offset
         if not FIRST_UTC <= utc // 1000 <= LAST_UTC:
-            raise ValueError(f'its time, {utc / 1e9:.1f} s after 1970-01-01, cannot be UTC: set '
-                             'the clock, or publish ~/time_reference')
+            raise ValueError(f'its time, {utc / 1e9:.1f} s after 1970-01-01, cannot be UTC: stamp '
+                             'it by a clock that is set, or publish ~/time_reference')
         return utc
 
     def take_time_reference(self, utc: int, stamp: Stamp, now: float) -> None:

@@ -288,6 +288,13 @@ def test_diagnostics_name_each_input_that_is_missing_or_refused_re_30(own_ros: R
         eventually(lambda: 'PINGs without a reply: the camera does not receive' in newest())
 
 
+def test_reason_why_no_camera_is_heard_is_in_the_log(own_ros: Ros) -> None:
+    with ended(slow_python(MODULE, 'memory://none',
+                           env={'ROS_DOMAIN_ID': str(own_ros.domain)})) as node:
+        node.wait_for('link open')
+        pass_time_until(lambda: node.count('no camera connected: none heard yet on'), step=2.0)
+
+
 def test_help_names_the_device_and_its_own_defaults() -> None:
     shown = ' '.join(run(MODULE, '--help').stdout.split())
     assert 'usage: rededge ' in shown

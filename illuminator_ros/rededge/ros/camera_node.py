@@ -19,6 +19,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 import functools
 import logging
+import math
 from typing import Any
 
 from builtin_interfaces.msg import Time
@@ -27,7 +28,7 @@ from sensor_msgs.msg import NavSatFix, NavSatStatus
 from std_msgs.msg import Bool, Header, UInt32
 from std_srvs.srv import Trigger
 
-from .diagnostics import reports, topics
+from .diagnostics import reports, topics, why_no_camera
 from .inputs import subscriptions
 from ..camera import CameraConnected, CameraEvent, CameraLost, ImageTaken
 from ..client import RedEdgeClient, Settings
@@ -44,6 +45,7 @@ from ..messages import CameraFeedback, MAV_COMP_ID_CAMERA, Shot
 from ...mavlink.command_sender import CommandSender
 from ...payload.rotation import Vector
 from ...ros.conversions import GEOID_SEPARATION, quaternion_message
+from ...ros.device_nodes import ABSENCE_DELAY
 from ...ros.diagnostics_publisher import DiagnosticsSource, MakeReports
 from ...ros.node import Answer, NodeInterface, Publication, RequestService, STREAM_QOS
 from ...ros.parameter_services import ParameterServices
@@ -99,6 +101,7 @@ class CameraNode(ServedPayload):
         # Untyped: rclpy types it as a Clock, which lacks ``ros_time_is_active``.
         self._clock: Any = host.node.get_clock()
         self._started = host.link.clock()
+        self._absence_due = self._started + ABSENCE_DELAY
         self._geoid_is_known = GEOID_SEPARATION.name in given_parameters(host.node)
         self._mount_topic = host.node.resolve_topic_name(f'~/{Input.MOUNT.value}')
         self._interface = NodeInterface(
@@ -161,6 +164,11 @@ class CameraNode(ServedPayload):
 
     def poll(self, now: float) -> None:
         """See :meth:`ServedPayload.poll`."""
+        if now >= self._absence_due:
+            self._absence_due = math.inf
+            if self._client.camera.snapshot(now).address is None:
+                link = self._host.diagnostics.snapshot(now)
+                self._host.log.warning(f'no camera connected: {why_no_camera(link)}')
         orientation = self._client.feeder.orientation
         if orientation.mount_is_fixed and self._host.node.count_publishers(self._mount_topic):
             orientation.expect_mount()

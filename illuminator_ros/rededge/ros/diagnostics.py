@@ -49,11 +49,15 @@ def reports(
     :param started: when the node was started, s on the link's clock.
     :param geoid_is_known: whether ``geoid_separation`` is set.
     """
-    address = client.camera.address
-    absence = link.state.failure or (
-        f'none heard yet on {link.state.name}: {why_nothing_is_heard(link, "a camera")}')
-    return [link_report(link, address, kind='camera', absence=absence, started=started),
+    return [link_report(link, client.camera.address, kind='camera', absence=why_no_camera(link),
+                        started=started),
             _camera_report(client, link.taken_at, geoid_is_known)]
+
+
+def why_no_camera(link: LinkDiagnostics) -> str:
+    """Return why no camera was heard, for people."""
+    return link.state.failure or (
+        f'none heard yet on {link.state.name}: {why_nothing_is_heard(link, "a camera")}')
 
 
 def camera_findings(camera: CameraSnapshot) -> list[Finding]:
