@@ -165,10 +165,11 @@ def _run(arguments: list[str], termination: Termination, executable: Executable)
     if '--version' in own:
         from .. import __version__
         return executable.show(f'{__version__}\n')
-    url = own.pop(0) if own and not own[0].startswith('-') else ''
+    # A parameter without -p has the form of a URL with an unknown scheme.
+    url = own.pop(0) if own and not own[0].startswith('-') and ':=' not in own[0] else ''
     if own:
         return executable.refuse(
-            f'unknown argument {own[0]!r}; parameters follow --ros-args, see '
+            f'unknown argument {own[0]!r}; parameters follow --ros-args -p, see '
             f'{executable.name} --help')
     arguments = [argument for argument in arguments if argument != url]
     return _serve(arguments, url, termination, executable)
