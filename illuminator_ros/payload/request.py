@@ -29,7 +29,7 @@ from enum import Enum
 import math
 from typing import Generic, Protocol, TypeVar
 
-from .attempt import Done as Done
+from .attempt import Done as Done  # noqa: F401
 from .attempt import Result as Result
 from ..mavlink import command_sender
 from ..mavlink.messages import Address, MavCmd, MavResult

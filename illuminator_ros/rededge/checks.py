@@ -71,7 +71,6 @@ LATITUDE, LONGITUDE, ALTITUDE = -48.8766667, -123.3933333, 1234.5
 MAX_PLACE_ERROR, MAX_ALTITUDE_ERROR, MAX_ANGLE_ERROR = 2e-7, 0.1, 0.1
 
 
-
 class Capture(NamedTuple):
     """The messages that reported an image; None for a message that did not come."""
 
@@ -359,7 +358,7 @@ async def system_id(tester: CameraTester) -> str:
 # Captures
 
 @with_captures('capture-status', 'reports an image that was commanded with CAMERA_STATUS',
-              section='CAMERA_STATUS')
+               section='CAMERA_STATUS')
 async def capture_status(tester: CameraTester) -> None:
     """Read the status of the first image."""
     status = (await tester.first_capture()).status
@@ -370,7 +369,7 @@ async def capture_status(tester: CameraTester) -> None:
 
 
 @with_captures('capture-feedback', 'confirms an image with CAMERA_FEEDBACK',
-              section='CAMERA_FEEDBACK')
+               section='CAMERA_FEEDBACK')
 async def capture_feedback(tester: CameraTester) -> str:
     """Command an image, and measure the time."""
     begun = tester.session.now

@@ -146,6 +146,7 @@ class FractionLight(MinimalLight):
 
 
 class ObedientGimbal(MinimalGimbal):
+
     def obeys(self, source: Address) -> bool:
         return True
 
@@ -155,6 +156,7 @@ class CameraGimbal(MinimalGimbal):
 
 
 class DegreeRateGimbal(MinimalGimbal):
+
     def obey(self, message: GimbalDeviceSetAttitude) -> None:
         super().obey(replace(
             message, angular_velocity_y=math.radians(message.angular_velocity_y),
@@ -168,24 +170,28 @@ class ClaimingGimbal(MinimalGimbal):
 
 
 class ConjugatedCommandGimbal(MinimalGimbal):
+
     def commanded(self, q: Q) -> tuple[float, float]:
         w, x, y, z = q
         return super().commanded((w, -x, -y, -z))
 
 
 class ConjugatedReportGimbal(MinimalGimbal):
+
     def reported(self) -> Q:
         w, x, y, z = super().reported()
         return w, -x, -y, -z
 
 
 class ScalarLastGimbal(MinimalGimbal):
+
     def reported(self) -> Q:
         w, x, y, z = super().reported()
         return x, y, z, w
 
 
 class SwappedLimitsGimbal(MinimalGimbal):
+
     def reported_limits(self) -> Q:
         pitch_min, pitch_max, yaw_min, yaw_max = super().reported_limits()
         return pitch_max, pitch_min, yaw_max, yaw_min
@@ -196,6 +202,7 @@ class BothFramesGimbal(MinimalGimbal):
 
 
 class DegreeLimitsGimbal(MinimalGimbal):
+
     def reported_limits(self) -> Q:
         low, high, left, right = map(math.degrees, super().reported_limits())
         return low, high, left, right
@@ -212,6 +219,7 @@ class DegreePitchGimbal(MinimalGimbal):
 
 
 class ObedientManager(MinimalManager):
+
     def controls(self, source: Address) -> bool:
         return True
 

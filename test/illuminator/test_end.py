@@ -155,8 +155,8 @@ class Users:
 
 def lights(draw: random.Random) -> list[IlluminatorProperties]:
     """Return three lights, one of which is heard only later."""
-    return [IlluminatorProperties(
-        address=address, behaviour=IlluminatorBehaviour(
+    return [
+        IlluminatorProperties(address=address, behaviour=IlluminatorBehaviour(
             brightness_is_switch=draw.random() < 0.3,
             silence=5.0 if address == LATE else 0.0))
         for address in (Address(1, 243), Address(1, 244), LATE)]
