@@ -28,7 +28,7 @@ from collections.abc import Iterator
 import itertools
 import time
 
-from illuminator_ros.illuminator.events import AnyLightEvent, StatusReceived
+from illuminator_ros.illuminator.events import LightEvent, StatusReceived
 from illuminator_ros.illuminator.light import Settings
 from illuminator_ros.illuminator.messages import IlluminatorStatus
 from illuminator_ros.mavlink.messages import Address, heartbeat, MavType, Message
@@ -69,7 +69,7 @@ class Lights:
         self.measure(warm_up)
         self.costs.clear()
 
-    def _count(self, event: AnyLightEvent) -> None:
+    def _count(self, event: LightEvent) -> None:
         self._statuses += isinstance(event, StatusReceived)
 
     def measure(self, count: int) -> None:

@@ -21,7 +21,7 @@ import functools
 import itertools
 
 from .commands import SWITCHES
-from .events import AnyLightEvent, LightForgotten, LightFound
+from .events import LightEvent, LightForgotten, LightFound
 from .light import Light, Settings
 from .messages import IlluminatorStatus
 from .model import Status
@@ -71,7 +71,7 @@ class IlluminatorClient(Payload):
         self.mount_moved: Listeners[int] = Listeners()
         self._commands = commands
         self.settings = settings
-        self.events: Listeners[AnyLightEvent] = Listeners()
+        self.events: Listeners[LightEvent] = Listeners()
         # Takes the results of the OFF at the end of the process.
         self._report_off: Callable[[Light, Result, float], None] | None = None
         self._discovery = Discovery(
@@ -101,7 +101,7 @@ class IlluminatorClient(Payload):
         return self._discovery.limit_reached
 
     def _make(self, address: Address) -> Light:
-        def emit(event: AnyLightEvent) -> None:
+        def emit(event: LightEvent) -> None:
             if address in self._discovery.devices:
                 self.events.emit(event)
 

@@ -95,16 +95,15 @@ class LightIdentified(LightEvent):
     identity: Identity
 
 
-@dataclass(slots=True)
-class StatusReceived:
+@dataclass(frozen=True)
+class StatusReceived(LightEvent):
     """
-    A light has sent ILLUMINATOR_STATUS. Not frozen, since that costs time for each status.
+    A light has sent ILLUMINATOR_STATUS.
 
     :param received_at: s on the link's clock.
     :param temperature: degC; None where the light does not measure it, or its sensor fails.
     """
 
-    address: Address
     status: Status
     received_at: float
     temperature: float | None = None
@@ -224,9 +223,6 @@ class LightSwitched(LightEvent):
     detail: str = ''
 
 
-AnyLightEvent = LightEvent | StatusReceived
-
-
 class LightSnapshot(NamedTuple):
     """
     A light at one moment, for any thread. Times are s on the link's clock.
@@ -263,9 +259,9 @@ class LightSnapshot(NamedTuple):
     holder: str | None = None
     held_since: float = 0.0
 
-    def events(self) -> list[AnyLightEvent]:
+    def events(self) -> list[LightEvent]:
         """Return the events that lead to this state, for a listener that subscribes late."""
-        events: list[AnyLightEvent] = [LightConnected(self.address)] if self.connected else []
+        events: list[LightEvent] = [LightConnected(self.address)] if self.connected else []
         if self.identity:
             events.append(LightIdentified(self.address, self.identity))
         if self.status:

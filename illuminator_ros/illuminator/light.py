@@ -195,7 +195,7 @@ class Light:
 
     def __init__(
         self, address: Address, commands: CommandSender, settings: Settings,
-        emit: Callable[[events.AnyLightEvent], None], changed: Callable[[Light, float], None],
+        emit: Callable[[events.LightEvent], None], changed: Callable[[Light, float], None],
     ) -> None:
         self.address = address
         self.connected = False

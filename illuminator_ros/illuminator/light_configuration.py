@@ -127,7 +127,7 @@ class LimitGuard:
     :ivar exceeded: how the light exceeds them.
     """
 
-    def __init__(self, limits: SafetyLimits, emit: Callable[[events.AnyLightEvent], None],
+    def __init__(self, limits: SafetyLimits, emit: Callable[[events.LightEvent], None],
                  exceeded: events.LimitExceeded) -> None:
         self.limits = limits
         self.is_limiting = limits != SafetyLimits()
@@ -173,7 +173,7 @@ class LightConfiguration:
     """
 
     def __init__(
-        self, target: Target, emit: Callable[[events.AnyLightEvent], None], *,
+        self, target: Target, emit: Callable[[events.LightEvent], None], *,
         limits: SafetyLimits, restore: bool = True, reassert: bool = False,
         must_wait: Callable[[], bool] = lambda: False,
     ) -> None:

@@ -151,7 +151,7 @@ class LightSwitch:
     """
 
     def __init__(
-        self, target: Target, emit: Callable[[events.AnyLightEvent], None],
+        self, target: Target, emit: Callable[[events.LightEvent], None],
         configuration: LightConfiguration, *, off_after_silence: float, reassert: bool,
         earliest_on: Callable[[], float], rules: Sequence[SwitchRule] = RULES,
     ) -> None:

@@ -129,11 +129,6 @@ class StrobeRange:
         return 0 <= low <= high <= MAX_STROBE_PERIOD and high > 0
 
 
-@lru_cache(maxsize=256)
-def _strobe_range(low: float, high: float) -> StrobeRange:
-    return StrobeRange(low, high)
-
-
 class InvalidValue(ValueError):
     """A value that the light must not get; the message names it and says why."""
 
@@ -316,7 +311,7 @@ class Status:
     def from_message(cls, message: IlluminatorStatus) -> Status:
         """Read a message. Any content is accepted: an invalid field is marked, not raised."""
         brightness, duty = message.brightness, message.strobe_duty_cycle
-        strobe_range = _strobe_range(message.min_strobe_period, message.max_strobe_period)
+        strobe_range = StrobeRange(message.min_strobe_period, message.max_strobe_period)
         if (message.enable in (0, 1) and message.mode in _MODES and 0.0 <= brightness <= 100.0
                 and 0.0 <= duty <= 100.0 and 0.0 <= message.strobe_period <= MAX_STROBE_PERIOD
                 and ABSOLUTE_ZERO_C <= message.temp_c <= MAX_TEMPERATURE_C):

@@ -37,7 +37,7 @@ class Heard(Client):
 
     def __init__(self, **options: Any) -> None:
         super().__init__(BRIDGE, Settings(), **options)
-        self.heard: list[events.AnyLightEvent] = []
+        self.heard: list[events.LightEvent] = []
         self.events.subscribe(self.heard.append)
         self.link_opened(0.0)
 

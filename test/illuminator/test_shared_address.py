@@ -20,8 +20,8 @@ from typing import Any
 
 from illuminator_ros.illuminator.events import (
     AddressShared,
-    AnyLightEvent,
     ChangeCause,
+    LightEvent,
     StatusReceived,
 )
 from illuminator_ros.illuminator.model import Status
@@ -86,9 +86,9 @@ def test_parameters_move_once_at_most_and_nothing_is_sent_while_lights_differ(
 def test_a_status_is_published_before_it_shows_that_an_address_is_shared_and_an_event_tells_it(
 ) -> None:
     pair, _ = two(enable=1, brightness=40.0)
-    events: list[tuple[type[AnyLightEvent], bool]] = []
+    events: list[tuple[type[LightEvent], bool]] = []
 
-    def note(event: AnyLightEvent) -> None:
+    def note(event: LightEvent) -> None:
         if isinstance(event, AddressShared):
             events.append((AddressShared, event.shared))
         elif isinstance(event, StatusReceived):

@@ -21,8 +21,8 @@ import math
 from typing import Any
 
 from illuminator_ros.illuminator.events import (
-    AnyLightEvent,
     ChangeCause,
+    LightEvent,
     LightSwitched,
     Origin,
     StatusReceived,
@@ -41,14 +41,14 @@ from support.records import Answer
 ON_OFF, CONFIGURE = MavCmd.ILLUMINATOR_ON_OFF, MavCmd.DO_ILLUMINATOR_CONFIGURE
 
 
-def events_of(pair: Pair) -> list[AnyLightEvent]:
+def events_of(pair: Pair) -> list[LightEvent]:
     """Return the list that further events are added to."""
-    events: list[AnyLightEvent] = []
+    events: list[LightEvent] = []
     pair.controller.events.subscribe(events.append)
     return events
 
 
-def switches(events: list[AnyLightEvent]) -> list[tuple[bool, Origin, str]]:
+def switches(events: list[LightEvent]) -> list[tuple[bool, Origin, str]]:
     return [(one.on, one.origin, one.detail) for one in events if isinstance(one, LightSwitched)]
 
 
@@ -333,7 +333,7 @@ def test_a_strobe_period_alone_also_sets_a_duty_cycle_that_is_0(
 def test_a_listener_that_raises_does_not_stop_the_others(
     faked: Pair, caplog: pytest.LogCaptureFixture,
 ) -> None:
-    def fail(event: AnyLightEvent) -> None:
+    def fail(event: LightEvent) -> None:
         raise RuntimeError('as the test says')
 
     faked.controller.events.subscribe(fail)
@@ -347,7 +347,7 @@ def test_a_listener_that_raises_does_not_stop_the_others(
 def test_a_request_is_answered_before_its_status_is_published(faked: Pair) -> None:
     order: list[str] = []
 
-    def note(event: AnyLightEvent) -> None:
+    def note(event: LightEvent) -> None:
         if isinstance(event, StatusReceived) and event.status.enabled:
             order.append('status')
 

@@ -20,7 +20,7 @@ from collections.abc import Callable, Iterator, Sequence
 import math
 from typing import Any
 
-from illuminator_ros.illuminator.events import AnyLightEvent, LightFound, LightSnapshot
+from illuminator_ros.illuminator.events import LightEvent, LightFound, LightSnapshot
 from illuminator_ros.illuminator.light import Light, Settings
 from illuminator_ros.illuminator.simulated import SimulatedIlluminator
 from illuminator_ros.illuminator.simulated_properties import IlluminatorProperties
@@ -109,7 +109,7 @@ class Pair:
         self._turns = 0
         self.open()
 
-    def _take(self, event: AnyLightEvent) -> None:
+    def _take(self, event: LightEvent) -> None:
         if isinstance(event, LightFound):
             self.recorders[event.address] = Recorder()
             self._on_light(self.controller.lights[event.address])

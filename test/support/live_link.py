@@ -22,7 +22,7 @@ import threading
 import time
 from typing import Any, Generic, TypeVar
 
-from illuminator_ros.illuminator.events import AnyLightEvent, LightConnected, LightLost
+from illuminator_ros.illuminator.events import LightConnected, LightEvent, LightLost
 from illuminator_ros.illuminator.light import Light, Settings
 from illuminator_ros.illuminator.simulated_properties import IlluminatorProperties
 from illuminator_ros.mavlink.component import Endpoint, HeartbeatTimer
@@ -174,7 +174,7 @@ class Bridge(EndpointLink[Client]):
         client.events.subscribe(self._take)
         super().__init__(url, client, **options)
 
-    def _take(self, event: AnyLightEvent) -> None:
+    def _take(self, event: LightEvent) -> None:
         if isinstance(event, LightConnected | LightLost):
             kind = 'connected' if isinstance(event, LightConnected) else 'lost'
             self.lights.append((kind, self.endpoint.lights[event.address]))

@@ -36,9 +36,9 @@ class Recorder:
     changes: list[tuple[light_events.ChangeCause, dict[str, Any]]] = field(default_factory=list)
     restorations: list[tuple[bool, str]] = field(default_factory=list)
     failed_setpoints: list[str] = field(default_factory=list)
-    others: list[light_events.AnyLightEvent] = field(default_factory=list)
+    others: list[light_events.LightEvent] = field(default_factory=list)
 
-    def __call__(self, event: light_events.AnyLightEvent) -> None:
+    def __call__(self, event: light_events.LightEvent) -> None:
         match event:
             case light_events.LightConnected():
                 self.events.append('connected')

@@ -24,7 +24,7 @@ import time
 from rclpy.node import Node
 
 from .parameters import BeamGeometry
-from ..events import AnyLightEvent, LightLost, StatusReceived
+from ..events import LightEvent, LightLost, StatusReceived
 from ..model import Mode, Status
 from ...payload.rotation import Quaternion
 from ...ros.node import STATE_QOS
@@ -136,7 +136,7 @@ class BeamPublisher:
         marker.points = [PointMessage(x=x, y=y, z=z)
                          for x, y, z in cone(geometry.beam_range, geometry.beam_angle)]
 
-    def take(self, event: AnyLightEvent) -> None:
+    def take(self, event: LightEvent) -> None:
         """Take an event of the light."""
         if isinstance(event, StatusReceived):
             self.device_id = self._mounted_on or event.status.gimbal_device_id

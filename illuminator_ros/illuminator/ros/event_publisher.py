@@ -81,7 +81,7 @@ class EventPublisher:
         self._flags = FlagLog()
         interface.publish('connected', False)
 
-    def take(self, event: events.AnyLightEvent) -> None:
+    def take(self, event: events.LightEvent) -> None:
         """Publish an event."""
         if isinstance(event, events.StatusReceived):
             self._status_received(event)

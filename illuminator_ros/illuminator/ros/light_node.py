@@ -29,7 +29,7 @@ from .diagnostics import hardware_id, LightsHeard, reports, why_no_light
 from .event_publisher import EventPublisher, PUBLICATIONS
 from .parameters import BeamGeometry, device_parameters
 from ..client import IlluminatorClient
-from ..events import AnyLightEvent
+from ..events import LightEvent
 from ..light import Light
 from ..model import checked, InvalidValue, SafetyLimits
 from ...mavlink.messages import Address
@@ -118,7 +118,7 @@ class LightNode:
             self._host.frame_log.assign(self.address, None)
         self.address = None
 
-    def take(self, event: AnyLightEvent) -> None:
+    def take(self, event: LightEvent) -> None:
         """Publish an event of the light."""
         self._publishers.take(event)
         if self._beam is not None:

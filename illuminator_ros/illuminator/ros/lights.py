@@ -72,7 +72,7 @@ class Lights(ServedPayload):
             if node.address and node.address.system == system:
                 node.mount_moved()
 
-    def _take(self, event: events.AnyLightEvent) -> None:
+    def _take(self, event: events.LightEvent) -> None:
         node = self._nodes.get(event.address)
         if isinstance(event, events.LightForgotten):
             self._nodes.forget(event.address)
