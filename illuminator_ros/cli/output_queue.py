@@ -158,21 +158,14 @@ def _open_again(descriptor: int) -> int:
     The flag of a duplicate would be shared with other processes, such as the shell.
     """
     mode = os.fstat(descriptor).st_mode
-    if stat.S_ISFIFO(mode) or stat.S_ISCHR(mode):
-        with contextlib.suppress(OSError):
-            again = os.open(f'/proc/self/fd/{descriptor}', os.O_WRONLY | os.O_NONBLOCK
-                            | os.O_NOCTTY | os.O_CLOEXEC)
-            return _above_standard(again)
-    return _above_standard(os.dup(descriptor))
-
-
-def _above_standard(descriptor: int) -> int:
-    """Move a descriptor above 2: one of the first three may have been closed."""
-    if descriptor > 2:
-        return descriptor
-    moved = fcntl.fcntl(descriptor, fcntl.F_DUPFD_CLOEXEC, 3)
-    os.close(descriptor)
-    return moved
+    with contextlib.ExitStack() as opened:
+        if stat.S_ISFIFO(mode) or stat.S_ISCHR(mode):
+            with contextlib.suppress(OSError):
+                descriptor = os.open(f'/proc/self/fd/{descriptor}',
+                                     os.O_WRONLY | os.O_NONBLOCK | os.O_NOCTTY)
+                opened.callback(os.close, descriptor)
+        # Above 2: one of the first three may have been closed.
+        return fcntl.fcntl(descriptor, fcntl.F_DUPFD_CLOEXEC, 3)
 
 
 def _is_writable(descriptor: int) -> bool:
