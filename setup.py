@@ -43,15 +43,15 @@ setup(
     ],
     python_requires='>=3.10',
     # The oldest versions that the tests have passed with.
-    install_requires=['setuptools', 'fastcrc>=0.3'],
+    install_requires=['setuptools', 'pymavlink>=2.4.50', 'fastcrc>=0.3'],
     extras_require={
         'monitor': ['rich>=13.3'],
         'serial': ['pyserial>=3.5'],
         'yaml': ['pyyaml>=5.4'],
         # "colcon test" looks here for pytest.
-        # Oracles: pymavlink for frames, scipy for rotations; mavsdk is another player at a gimbal.
-        'test': ['pytest', 'pytest-timeout', 'hypothesis', 'pymavlink>=2.4.50', 'pyserial',
-                 'pyyaml', 'rich', 'scipy', 'mavsdk>=4.1'],
+        # scipy is the oracle for rotations; mavsdk is another player at a gimbal.
+        'test': ['pytest', 'pytest-timeout', 'hypothesis', 'pyserial', 'pyyaml', 'rich', 'scipy',
+                 'mavsdk>=4.1'],
     },
     zip_safe=True,
     maintainer='The illuminator_ros developers',

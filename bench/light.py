@@ -26,6 +26,7 @@ import time
 
 from illuminator_ros.illuminator.messages import IlluminatorStatus
 from illuminator_ros.mavlink import messages as mav
+from illuminator_ros.mavlink.dialect import mavlink
 from illuminator_ros.mavlink.frame import Decoder
 from support.frames import frame_of
 
@@ -68,7 +69,7 @@ class MinimalLight:
         uptime = int((now - self._began) * 1000)
         if now >= self._heartbeat_due:
             self._heartbeat_due = now + 1.0
-            self._send(mav.heartbeat(mav.MavType.ILLUMINATOR))
+            self._send(mav.heartbeat(mavlink.MAV_TYPE_ILLUMINATOR))
             self._answer()
         frame = self._frame(IlluminatorStatus(
             uptime, self._on, 3, 0, 1, 50.0, 0.0, 0.0, 25.0, 0.05, 10.0))
@@ -107,12 +108,12 @@ class MinimalLight:
         if command in self.silent:
             self.asked.set()
             return
-        if command == mav.MavCmd.ILLUMINATOR_ON_OFF:
+        if command == mavlink.MAV_CMD_ILLUMINATOR_ON_OFF:
             self._on = int(values[0])
-        elif (command, values[0]) != (mav.MavCmd.REQUEST_MESSAGE, IlluminatorStatus.id):
-            self._send(mav.CommandAck(command, mav.MavResult.UNSUPPORTED))
+        elif (command, values[0]) != (mavlink.MAV_CMD_REQUEST_MESSAGE, IlluminatorStatus.id):
+            self._send(mav.CommandAck(command, mavlink.MAV_RESULT_UNSUPPORTED))
             return
-        self._send(mav.CommandAck(command, mav.MavResult.ACCEPTED))
+        self._send(mav.CommandAck(command, mavlink.MAV_RESULT_ACCEPTED))
         self.status()
 
     def _send(self, message: mav.Message) -> None:

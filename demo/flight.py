@@ -58,13 +58,13 @@ from flight_model import (  # noqa: E402
 )
 from illuminator_ros.cli.simulator.components import SettingError  # noqa: E402
 from illuminator_ros.cli.simulator.csv_file import CsvFile  # noqa: E402
+from illuminator_ros.mavlink.dialect import mavlink  # noqa: E402
 from illuminator_ros.mavlink.link import Link  # noqa: E402
 from illuminator_ros.mavlink.messages import Address  # noqa: E402
 from illuminator_ros.mavlink.url import parse_url  # noqa: E402
 from illuminator_ros.payload.messages import GeoPoint  # noqa: E402
 from illuminator_ros.payload.rotation import enu_flu, flip, Quaternion  # noqa: E402
 from illuminator_ros.payload.simulated import Description, SimulatedComponents  # noqa: E402
-from illuminator_ros.rededge.messages import MAV_COMP_ID_CAMERA  # noqa: E402
 from illuminator_ros.rededge.simulated import (  # noqa: E402
     COLUMNS,
     DEFAULT_SYSTEM_ID,
@@ -148,7 +148,7 @@ class SimulatedCamera:
     """
 
     def __init__(self, path: Path, images: Path, speed: float) -> None:
-        address = Address(DEFAULT_SYSTEM_ID, MAV_COMP_ID_CAMERA)
+        address = Address(DEFAULT_SYSTEM_ID, mavlink.MAV_COMP_ID_CAMERA)
         self._url = f'pty://{path}'
         self._device = SimulatedRedEdge(
             address, validity=VALIDITY / speed, own_gps=GeoPoint(LATITUDE, LONGITUDE, 0.0))

@@ -20,8 +20,9 @@ from queue import SimpleQueue
 
 from illuminator_ros.mavlink.command_sender import Command, CommandResult, CommandSender
 from illuminator_ros.mavlink.component import Component
+from illuminator_ros.mavlink.dialect import mavlink
 from illuminator_ros.mavlink.link import Link
-from illuminator_ros.mavlink.messages import Address, MavCmd, MavType
+from illuminator_ros.mavlink.messages import Address
 from illuminator_ros.mavlink.url import parse_url
 
 ADDRESS = Address(255, 190)
@@ -32,7 +33,7 @@ class GroundStation:
 
     def __init__(self, url: str) -> None:
         self._commands = CommandSender(ADDRESS)
-        component = Component(self._commands, [], mav_type=MavType.GCS)
+        component = Component(self._commands, [], mav_type=mavlink.MAV_TYPE_GCS)
         self._link = Link(parse_url(url), component, label=url)
         self._link.start()
 
@@ -46,7 +47,7 @@ class GroundStation:
         :param duty_cycle: %, 0..100.
         :param timeout: s.
         """
-        command = Command(light, MavCmd.DO_ILLUMINATOR_CONFIGURE,
+        command = Command(light, mavlink.MAV_CMD_DO_ILLUMINATOR_CONFIGURE,
                           (mode, brightness, strobe_period, duty_cycle))
         results: SimpleQueue[CommandResult] = SimpleQueue()
         self._link.call(lambda now: self._commands.start(

@@ -31,6 +31,7 @@ sys.path[:0] = [str(ROOT), str(ROOT / 'test')]
 
 from illuminator_ros.illuminator.messages import IlluminatorStatus, STATUS_ID  # noqa: E402
 from illuminator_ros.mavlink import messages as mav  # noqa: E402
+from illuminator_ros.mavlink.dialect import decode, mavlink  # noqa: E402
 import rclpy  # noqa: E402
 from rclpy.executors import ExternalShutdownException  # noqa: E402
 from std_srvs.srv import SetBool  # noqa: E402
@@ -41,7 +42,7 @@ HEADER, CHECKSUM = 10, 2
 MAX_DATAGRAM = 65536
 US = mav.Address(1, 191)
 FRAMES = {on: frame_of(mav.CommandLong(
-    1, 243, mav.MavCmd.ILLUMINATOR_ON_OFF, 0, float(on), 0, 0, 0, 0, 0, 0), source=US)
+    1, 243, mavlink.MAV_CMD_ILLUMINATOR_ON_OFF, 0, float(on), 0, 0, 0, 0, 0, 0), source=US)
     for on in (False, True)}
 
 
@@ -66,7 +67,7 @@ def main() -> None:
                 if id_ == mav.CommandAck.id:
                     accepted = True
                 elif id_ == STATUS_ID and accepted:
-                    status = IlluminatorStatus.decode(payload)
+                    status = decode(IlluminatorStatus, payload)
                     response.success = status.enable == request.data
                 data = data[end + CHECKSUM:]
         return response

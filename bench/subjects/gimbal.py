@@ -35,10 +35,10 @@ from illuminator_ros.gimbal.messages import (
     GimbalManagerSetAttitude,
     GimbalManagerStatus,
 )
+from illuminator_ros.mavlink.dialect import mavlink
 from illuminator_ros.mavlink.frame import HEADER_V2
 from illuminator_ros.mavlink.messages import Address, Heartbeat
 from illuminator_ros.payload.messages import GimbalDeviceAttitudeStatus
-from illuminator_ros.payload.mount_attitude import MountFlags
 from support.frames import frame_of
 
 from ..rig import Bench, bridge, Client, free_port, interleaved, PATIENCE, peer
@@ -95,8 +95,8 @@ class Manager:
                     GimbalManagerInformation(0, 0xFFFF, 1, -1, 1, -1, 1, -1, 1),
                     GimbalManagerStatus(0, 12, 1, *BRIDGE, 0, 0),
                     GimbalDeviceAttitudeStatus(
-                        0, 0, 0, MountFlags.YAW_IN_VEHICLE_FRAME, (1, 0, 0, 0), NAN, NAN, NAN, 0,
-                        NAN, NAN, 1)):
+                        0, 0, 0, mavlink.GIMBAL_DEVICE_FLAGS_YAW_IN_VEHICLE_FRAME, (1, 0, 0, 0),
+                        NAN, NAN, NAN, 0, NAN, NAN, 1)):
                 sequence = (sequence + 1) & 0xFF
                 with contextlib.suppress(ConnectionError):
                     self.link.send(frame_of(message, sequence, MANAGER))

@@ -31,6 +31,7 @@ from typing import Any
 
 from illuminator_ros.gimbal import messages as gimbal
 from illuminator_ros.mavlink import messages as mav
+from illuminator_ros.mavlink.dialect import decode, mavlink
 from illuminator_ros.mavlink.frame import Decoder
 from illuminator_ros.payload.rotation import Quaternion
 from support.frames import Codec
@@ -89,7 +90,7 @@ class Line:
                 return now
 
     def _messages(self, data: bytes) -> list[Any]:
-        return [CLASSES[frame.message_id].decode(frame.payload)
+        return [decode(CLASSES[frame.message_id], frame.payload)
                 for frame in self._decoder.feed(data) if frame.message_id in CLASSES]
 
     def drain(self) -> None:
@@ -103,7 +104,7 @@ class Line:
 def configure(player: mav.Address) -> mav.CommandLong:
     """Return the command by which a player takes control."""
     return mav.CommandLong(
-        *MANAGER, gimbal.GimbalCommand.DO_GIMBAL_MANAGER_CONFIGURE, 0, *player, -1, -1, 0, 0, 0)
+        *MANAGER, mavlink.MAV_CMD_DO_GIMBAL_MANAGER_CONFIGURE, 0, *player, -1, -1, 0, 0, 0)
 
 
 def setpoint(player: mav.Address, pitch: float = 0.0) -> gimbal.GimbalManagerSetPitchyaw:
@@ -121,8 +122,8 @@ def managed() -> Iterator[tuple[int, Line, Line]]:
                 payloads='[gimbal_manager]'):
         until = time.monotonic() + 20.0
         while time.monotonic() < until:
-            device.send(DEVICE, mav.heartbeat(gimbal.MAV_TYPE_GIMBAL), port)
-            players.send(PLAYERS[0], mav.heartbeat(mav.MavType.GCS), port)
+            device.send(DEVICE, mav.heartbeat(mavlink.MAV_TYPE_GIMBAL), port)
+            players.send(PLAYERS[0], mav.heartbeat(mavlink.MAV_TYPE_GCS), port)
             players.send(PLAYERS[0], configure(PLAYERS[0]), port)
             device.receive(0.1)
             if any(isinstance(message, mav.CommandAck) and message.result == 0
@@ -152,8 +153,8 @@ def _setpoints(bench: Bench) -> Row:
             for number in range(bench.amount(400, 20)):
                 if time.monotonic() >= beat:
                     beat = time.monotonic() + 0.5
-                    device.send(DEVICE, mav.heartbeat(gimbal.MAV_TYPE_GIMBAL), port)
-                    players.send(PLAYERS[0], mav.heartbeat(mav.MavType.GCS), port)
+                    device.send(DEVICE, mav.heartbeat(mavlink.MAV_TYPE_GIMBAL), port)
+                    players.send(PLAYERS[0], mav.heartbeat(mavlink.MAV_TYPE_GCS), port)
                     time.sleep(0.01)
                 data = players.frame(PLAYERS[0], setpoint(
                     PLAYERS[0], pitch=0.3 * math.sin(number)))
@@ -187,9 +188,9 @@ def _competition(bench: Bench) -> Iterator[Row]:
         while (now := time.monotonic()) < began + seconds + 1.0:
             if now >= beat:
                 beat = now + 0.5
-                device.send(DEVICE, mav.heartbeat(gimbal.MAV_TYPE_GIMBAL), port)
+                device.send(DEVICE, mav.heartbeat(mavlink.MAV_TYPE_GIMBAL), port)
                 for player in PLAYERS:
-                    players.send(player, mav.heartbeat(mav.MavType.GCS), port)
+                    players.send(player, mav.heartbeat(mavlink.MAV_TYPE_GCS), port)
             while sent < min(now - began, seconds) * RATE:
                 player = PLAYERS[sent % len(PLAYERS)]
                 players.send(player, configure(player), port)

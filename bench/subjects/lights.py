@@ -31,7 +31,8 @@ import time
 from illuminator_ros.illuminator.events import LightEvent, StatusReceived
 from illuminator_ros.illuminator.light import Settings
 from illuminator_ros.illuminator.messages import IlluminatorStatus
-from illuminator_ros.mavlink.messages import Address, heartbeat, MavType, Message
+from illuminator_ros.mavlink.dialect import mavlink
+from illuminator_ros.mavlink.messages import Address, heartbeat, Message
 from support.client import Client
 from support.frames import frame_of
 from support.simulated_link import SimulatedLink
@@ -93,7 +94,7 @@ def frames(lights: int) -> Iterator[bytes]:
 
     for number in itertools.count():
         source = sources[number % lights]
-        yield next_frame(source, heartbeat(MavType.ILLUMINATOR))
+        yield next_frame(source, heartbeat(mavlink.MAV_TYPE_ILLUMINATOR))
         yield next_frame(source, IlluminatorStatus(
             100_000 + int(number * 2000 / RATE), 1, 3, 0, 1, 50.0, 0.0, 0.0, 25.0, 0.05, 10.0))
 

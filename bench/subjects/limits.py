@@ -21,7 +21,7 @@ import contextlib
 import signal
 import time
 
-from illuminator_ros.mavlink.messages import MavCmd
+from illuminator_ros.mavlink.dialect import mavlink
 from rcl_interfaces.srv import SetParameters
 from rclpy.parameter import Parameter
 
@@ -71,7 +71,7 @@ def measure(bench: Bench) -> Iterator[Row]:
             time.sleep(seconds)
             yield Row('CPU of the bridge with one light at 1 Hz', '%',
                       one(100 * (cpu(program.pid) - before) / seconds))
-            light.silent = {MavCmd.DO_ILLUMINATOR_CONFIGURE}
+            light.silent = {mavlink.MAV_CMD_DO_ILLUMINATOR_CONFIGURE}
             yield limited('a set of parameters is answered beside a silent light',
                           [set_brightness(client, float(10 + number)) for number in tries],
                           ANSWER)

@@ -21,7 +21,8 @@ import contextlib
 import threading
 import time
 
-from illuminator_ros.mavlink.messages import Address, MavCmd
+from illuminator_ros.mavlink.dialect import mavlink
+from illuminator_ros.mavlink.messages import Address
 
 from ..light import serving
 from ..rig import Bench, bridge, Client, free_port, PATIENCE
@@ -50,7 +51,8 @@ def measure(bench: Bench) -> Iterator[Row]:
             for kind, values in took.items():
                 ended = threading.Event()
                 thread = threading.Thread(target=keep_calling, args=(second, silent, ended))
-                lights[-1].silent = {MavCmd.ILLUMINATOR_ON_OFF} if kind == BESIDE else set()
+                lights[-1].silent = {
+                    mavlink.MAV_CMD_ILLUMINATOR_ON_OFF} if kind == BESIDE else set()
                 if kind == BESIDE:
                     lights[-1].asked.clear()
                     thread.start()

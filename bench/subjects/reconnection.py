@@ -28,7 +28,8 @@ import socket
 import tempfile
 import time
 
-from illuminator_ros.mavlink.messages import heartbeat, MavType
+from illuminator_ros.mavlink.dialect import mavlink
+from illuminator_ros.mavlink.messages import heartbeat
 from support.frames import frame_of
 from support.ptys import PtyDevice
 
@@ -40,7 +41,7 @@ LIMIT_MS = 1000.0
 ABSENCES = (0.2, 1.0, 4.0)
 # s for which the other side is present; longer than the time that proves a connection.
 LASTING = 1.2
-HELLO = frame_of(heartbeat(MavType.ILLUMINATOR), 0)
+HELLO = frame_of(heartbeat(mavlink.MAV_TYPE_ILLUMINATOR), 0)
 
 
 def tcp(absences: tuple[float, ...], lasting: float) -> list[float]:

@@ -20,21 +20,28 @@ import math
 from typing import NamedTuple, TypeAlias
 
 from .messages import (
-    Capabilities,
-    ErrorFlags,
     GimbalDeviceInformation,
     GimbalManagerInformation,
 )
-from ..payload.mount_attitude import AXES, MountFlags
+from ..mavlink.dialect import mavlink
+from ..payload.mount_attitude import AXES
 
-HAS_AXIS = (Capabilities.HAS_ROLL_AXIS, Capabilities.HAS_PITCH_AXIS, Capabilities.HAS_YAW_AXIS)
-HAS_FOLLOW = (Capabilities.HAS_ROLL_FOLLOW, Capabilities.HAS_PITCH_FOLLOW,
-              Capabilities.HAS_YAW_FOLLOW)
-HAS_LOCK = (Capabilities.HAS_ROLL_LOCK, Capabilities.HAS_PITCH_LOCK, Capabilities.HAS_YAW_LOCK)
-LOCKS = (MountFlags.ROLL_LOCK, MountFlags.PITCH_LOCK, MountFlags.YAW_LOCK)
-AT_LIMIT = (ErrorFlags.AT_ROLL_LIMIT, ErrorFlags.AT_PITCH_LIMIT, ErrorFlags.AT_YAW_LIMIT)
+HAS_AXIS = (mavlink.GIMBAL_DEVICE_CAP_FLAGS_HAS_ROLL_AXIS,
+            mavlink.GIMBAL_DEVICE_CAP_FLAGS_HAS_PITCH_AXIS,
+            mavlink.GIMBAL_DEVICE_CAP_FLAGS_HAS_YAW_AXIS)
+HAS_FOLLOW = (mavlink.GIMBAL_DEVICE_CAP_FLAGS_HAS_ROLL_FOLLOW,
+              mavlink.GIMBAL_DEVICE_CAP_FLAGS_HAS_PITCH_FOLLOW,
+              mavlink.GIMBAL_DEVICE_CAP_FLAGS_HAS_YAW_FOLLOW)
+HAS_LOCK = (mavlink.GIMBAL_DEVICE_CAP_FLAGS_HAS_ROLL_LOCK,
+            mavlink.GIMBAL_DEVICE_CAP_FLAGS_HAS_PITCH_LOCK,
+            mavlink.GIMBAL_DEVICE_CAP_FLAGS_HAS_YAW_LOCK)
+LOCKS = (mavlink.GIMBAL_DEVICE_FLAGS_ROLL_LOCK, mavlink.GIMBAL_DEVICE_FLAGS_PITCH_LOCK,
+         mavlink.GIMBAL_DEVICE_FLAGS_YAW_LOCK)
+AT_LIMIT = (mavlink.GIMBAL_DEVICE_ERROR_FLAGS_AT_ROLL_LIMIT,
+            mavlink.GIMBAL_DEVICE_ERROR_FLAGS_AT_PITCH_LIMIT,
+            mavlink.GIMBAL_DEVICE_ERROR_FLAGS_AT_YAW_LIMIT)
 # Roll and pitch are relative to the horizon.
-LEVEL = MountFlags.ROLL_LOCK | MountFlags.PITCH_LOCK
+LEVEL = mavlink.GIMBAL_DEVICE_FLAGS_ROLL_LOCK | mavlink.GIMBAL_DEVICE_FLAGS_PITCH_LOCK
 # rad; angles that differ by less are equal.
 RESOLUTION = 1e-6
 

@@ -23,19 +23,18 @@ import math
 from .events import GimbalEvent, GimbalForgotten, GimbalFound, GimbalKey
 from .gimbal import Gimbal, GimbalSettings, Repetition
 from .messages import (
-    GimbalCommand,
     GimbalDeviceInformation,
     GimbalManagerInformation,
     GimbalManagerSetAttitude,
     GimbalManagerStatus,
-    MAV_TYPE_GIMBAL,
     NON_MAVLINK_IDS,
     REMOVE_SENDER,
 )
 from ..mavlink.command_sender import Command, CommandSender
 from ..mavlink.component import Payload
 from ..mavlink.deadline_queue import DeadlineQueue
-from ..mavlink.messages import Address, Heartbeat, MAV_AUTOPILOT_INVALID, MavCmd, Message
+from ..mavlink.dialect import mavlink
+from ..mavlink.messages import Address, Heartbeat, Message
 from ..payload.listeners import Listeners
 from ..payload.messages import GimbalDeviceAttitudeStatus
 
@@ -169,8 +168,8 @@ class GimbalClient(Payload):
             return
         if len(self._components) >= MAX_COMPONENTS and not self._forget_component(now):
             return
-        likely = (heartbeat.autopilot != MAV_AUTOPILOT_INVALID
-                  or heartbeat.type == MAV_TYPE_GIMBAL)
+        likely = (heartbeat.autopilot != mavlink.MAV_AUTOPILOT_INVALID
+                  or heartbeat.type == mavlink.MAV_TYPE_GIMBAL)
         self._component(source, now)
         self._queries.set(source, now if likely else now + UNLIKELY_DELAY)
 
@@ -201,14 +200,15 @@ class GimbalClient(Payload):
         self._next_query = now + REQUEST_SPACING
         if now < component.heard_at + FORGET_AFTER:
             self._commands.start(Command(
-                address, MavCmd.REQUEST_MESSAGE, (float(GimbalManagerInformation.id),)), now)
+                address, mavlink.MAV_CMD_REQUEST_MESSAGE, (float(GimbalManagerInformation.id),)),
+                                 now)
 
     # The end
 
     def may_send_at_end(self, sent: Command | Message) -> bool:
         """See :meth:`Payload.may_send_at_end`: a release of control, and rates of zero."""
         if isinstance(sent, Command):
-            return (sent.command == GimbalCommand.DO_GIMBAL_MANAGER_CONFIGURE
+            return (sent.command == mavlink.MAV_CMD_DO_GIMBAL_MANAGER_CONFIGURE
                     and sent.params[0] == REMOVE_SENDER)
         return isinstance(sent, GimbalManagerSetAttitude) and not any((
             *map(math.isfinite, sent.q), sent.angular_velocity_x, sent.angular_velocity_y,

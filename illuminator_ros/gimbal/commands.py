@@ -20,10 +20,11 @@ from dataclasses import dataclass
 import math
 
 from .axes import LEVEL
-from .messages import flag_names, GimbalCommand, GimbalManagerStatus, REMOVE_SENDER, UNCHANGED
+from .messages import GimbalManagerStatus, REMOVE_SENDER, UNCHANGED
+from ..mavlink.dialect import flag_names, mavlink
 from ..mavlink.messages import Address
 from ..payload.messages import GimbalDeviceAttitudeStatus
-from ..payload.mount_attitude import MountFlags, YawFrame
+from ..payload.mount_attitude import YawFrame
 
 
 @dataclass(frozen=True)
@@ -51,13 +52,13 @@ def _component(system: int, component: int) -> Address | None:
     return Address(system, component) if system else None
 
 
-def setpoint_flags(frame: YawFrame) -> MountFlags:
+def setpoint_flags(frame: YawFrame) -> int:
     """
     Return the flags of a setpoint whose yaw is relative to a frame.
 
     PX4 and ArduPilot read YAW_LOCK as the frame of the yaw, so the two flags always agree.
     """
-    lock = MountFlags.YAW_LOCK if frame is YawFrame.EARTH else MountFlags(0)
+    lock = mavlink.GIMBAL_DEVICE_FLAGS_YAW_LOCK if frame is YawFrame.EARTH else 0
     return LEVEL | frame.flag | lock
 
 
@@ -73,7 +74,7 @@ class Configure:
     device_id: int
     take: bool
     note: str = ''
-    command: int = GimbalCommand.DO_GIMBAL_MANAGER_CONFIGURE
+    command: int = mavlink.MAV_CMD_DO_GIMBAL_MANAGER_CONFIGURE
 
     @property
     def params(self) -> tuple[float, ...]:
@@ -113,12 +114,12 @@ class SetFlags:
     :param goal: the state to be reached, for people.
     """
 
-    flags: MountFlags
-    flag: MountFlags
+    flags: int
+    flag: int
     device_id: int
     goal: str
     note: str = ''
-    command: int = GimbalCommand.DO_GIMBAL_MANAGER_PITCHYAW
+    command: int = mavlink.MAV_CMD_DO_GIMBAL_MANAGER_PITCHYAW
 
     @property
     def params(self) -> tuple[float, ...]:
@@ -135,4 +136,4 @@ class SetFlags:
 
     def actual(self, status: GimbalDeviceAttitudeStatus) -> str:
         """See :class:`~..payload.request.Change`."""
-        return ', '.join(flag_names(MountFlags(status.flags))) or 'no flags'
+        return ', '.join(flag_names('GIMBAL_DEVICE_FLAGS', status.flags)) or 'no flags'

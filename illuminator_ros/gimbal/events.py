@@ -21,11 +21,12 @@ from typing import NamedTuple
 
 from .axes import Ranges
 from .commands import Control
-from .messages import Capabilities, ErrorFlags, GimbalDeviceInformation
+from .messages import GimbalDeviceInformation
+from ..mavlink.dialect import raw
 from ..mavlink.messages import Address
 from ..payload.arbitration import HolderChanged
 from ..payload.identity import text
-from ..payload.mount_attitude import MountAttitude, MountFlags
+from ..payload.mount_attitude import MountAttitude
 
 
 class GimbalKey(NamedTuple):
@@ -62,9 +63,9 @@ class DeviceIdentity:
     @classmethod
     def of(cls, message: GimbalDeviceInformation) -> DeviceIdentity:
         """Read a message."""
-        return cls(text(message.vendor_name), text(message.model_name), text(message.custom_name),
-                   _version(message.firmware_version), _version(message.hardware_version),
-                   message.uid)
+        return cls(text(raw(message, 'vendor_name')), text(raw(message, 'model_name')),
+                   text(raw(message, 'custom_name')), _version(message.firmware_version),
+                   _version(message.hardware_version), message.uid)
 
 
 def _version(number: int) -> str:
@@ -112,8 +113,8 @@ class AttitudeReceived(GimbalEvent):
     """
 
     attitude: MountAttitude | None
-    flags: MountFlags
-    errors: ErrorFlags
+    flags: int
+    errors: int
 
 
 @dataclass(frozen=True)
@@ -186,14 +187,14 @@ class GimbalSnapshot:
     key: GimbalKey
     unreachable: str
     managers: tuple[Address, ...]
-    capabilities: Capabilities | None
+    capabilities: int | None
     ranges: Ranges | None
     identity: DeviceIdentity | None
     attitude: MountAttitude | None
     attitude_at: float
     attitude_problem: str
-    flags: MountFlags
-    errors: ErrorFlags
+    flags: int
+    errors: int
     control: Control | None
     in_control: bool
     status_at: float

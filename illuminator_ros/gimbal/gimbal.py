@@ -25,10 +25,7 @@ from . import events
 from .axes import Ranges, read_ranges
 from .commands import Configure, Control, SetFlags, setpoint_flags
 from .messages import (
-    Capabilities,
     DEVICE_ID_PARAM,
-    ErrorFlags,
-    GimbalCommand,
     GimbalDeviceInformation,
     GimbalManagerInformation,
     GimbalManagerSetAttitude,
@@ -42,14 +39,14 @@ from ..mavlink.command_sender import (
     format_seconds,
     Position,
 )
-from ..mavlink.messages import Address, MAV_AUTOPILOT_ARDUPILOTMEGA, MavCmd
+from ..mavlink.dialect import mavlink, short_names
+from ..mavlink.messages import Address
 from ..payload import request
 from ..payload.arbitration import HolderChanged
 from ..payload.command_sources import Sources, SourceSettings
 from ..payload.messages import GimbalDeviceAttitudeStatus
 from ..payload.mount_attitude import (
     MountAttitude,
-    MountFlags,
     STILL,
     to_mavlink,
     UNSET_QUATERNION,
@@ -81,9 +78,9 @@ MAX_MANAGERS = 4
 MAV_FRAME_GLOBAL = 0
 S = TypeVar('S')
 # Commands that move a gimbal.
-_MOVES = DEVICE_ID_PARAM.keys() - {GimbalCommand.DO_GIMBAL_MANAGER_CONFIGURE}
+_MOVES = DEVICE_ID_PARAM.keys() - {mavlink.MAV_CMD_DO_GIMBAL_MANAGER_CONFIGURE}
 # Commands that must not be sent again after a later setpoint or request, which they would undo.
-_PLACES = (GimbalCommand.DO_SET_ROI_LOCATION, GimbalCommand.DO_SET_ROI_NONE)
+_PLACES = (mavlink.MAV_CMD_DO_SET_ROI_LOCATION, mavlink.MAV_CMD_DO_SET_ROI_NONE)
 
 
 @dataclass
@@ -235,8 +232,8 @@ class Gimbal:
         self._attitude: MountAttitude | None = None
         self._attitude_at = -math.inf
         self._problem = ''
-        self._flags = MountFlags(0)
-        self._errors = ErrorFlags(0)
+        self._flags = 0
+        self._errors = 0
         self._setpoint: _Setpoint | None = None
         self._setpoints_sent = 0
         # The yaw frame of the last attitude or request, which implies the yaw lock; and the time
@@ -399,7 +396,7 @@ class Gimbal:
     def take_attitude(self, status: GimbalDeviceAttitudeStatus, now: float) -> None:
         """Take GIMBAL_DEVICE_ATTITUDE_STATUS of the device."""
         self._device_heard_at = self._attitude_at = now
-        self._flags, self._errors = MountFlags(status.flags), ErrorFlags(status.failure_flags)
+        self._flags, self._errors = status.flags, status.failure_flags
         try:
             self._attitude, self._problem = MountAttitude.from_status(status), ''
         except ValueError as error:
@@ -446,7 +443,7 @@ class Gimbal:
     def enforces_control(self) -> bool:
         """Whether the manager refuses components without control, as far as it is known."""
         manager = self._active
-        return manager is None or manager.autopilot != MAV_AUTOPILOT_ARDUPILOTMEGA
+        return manager is None or manager.autopilot != mavlink.MAV_AUTOPILOT_ARDUPILOTMEGA
 
     def take_control(self, now: float, done: request.Done) -> None:
         """Take primary control; succeed only if GIMBAL_MANAGER_STATUS shows it."""
@@ -568,27 +565,30 @@ class Gimbal:
 
     def set_neutral(self, now: float, done: request.Done) -> None:
         """Turn the gimbal to its neutral position."""
-        flags = setpoint_flags(YawFrame.VEHICLE) | MountFlags.NEUTRAL
-        self._set_flag(MountFlags.NEUTRAL, flags, Capabilities.HAS_NEUTRAL,
+        flags = setpoint_flags(YawFrame.VEHICLE) | mavlink.GIMBAL_DEVICE_FLAGS_NEUTRAL
+        self._set_flag(mavlink.GIMBAL_DEVICE_FLAGS_NEUTRAL, flags,
+                       mavlink.GIMBAL_DEVICE_CAP_FLAGS_HAS_NEUTRAL,
                        'turn to neutral', 'neutral position', now, done)
 
     def retract(self, now: float, done: request.Done) -> None:
         """Turn the gimbal to its retracted position."""
-        flags = setpoint_flags(YawFrame.VEHICLE) | MountFlags.RETRACT
-        self._set_flag(MountFlags.RETRACT, flags, Capabilities.HAS_RETRACT,
+        flags = setpoint_flags(YawFrame.VEHICLE) | mavlink.GIMBAL_DEVICE_FLAGS_RETRACT
+        self._set_flag(mavlink.GIMBAL_DEVICE_FLAGS_RETRACT, flags,
+                       mavlink.GIMBAL_DEVICE_CAP_FLAGS_HAS_RETRACT,
                        'retract', 'retracted', now, done)
 
     def set_yaw_lock(self, lock: bool, now: float, done: request.Done) -> None:
         """Hold the yaw against the earth, or let it follow the vehicle (GM-3)."""
         if lock:
-            self._set_flag(MountFlags.YAW_LOCK, setpoint_flags(YawFrame.EARTH),
-                           Capabilities.HAS_YAW_LOCK, 'lock yaw', 'yaw locked', now, done)
+            self._set_flag(mavlink.GIMBAL_DEVICE_FLAGS_YAW_LOCK, setpoint_flags(YawFrame.EARTH),
+                           mavlink.GIMBAL_DEVICE_CAP_FLAGS_HAS_YAW_LOCK, 'lock yaw', 'yaw locked',
+                           now, done)
         else:
-            self._set_flag(MountFlags.YAW_LOCK, setpoint_flags(YawFrame.VEHICLE),
-                           Capabilities(0), 'unlock yaw', 'yaw follows the vehicle', now, done)
+            self._set_flag(mavlink.GIMBAL_DEVICE_FLAGS_YAW_LOCK, setpoint_flags(YawFrame.VEHICLE),
+                           0, 'unlock yaw', 'yaw follows the vehicle', now, done)
 
     def _set_flag(
-        self, flag: MountFlags, flags: MountFlags, needed: Capabilities, wish: str, goal: str,
+        self, flag: int, flags: int, needed: int, wish: str, goal: str,
         now: float, done: request.Done,
     ) -> None:
         self._begin(now)
@@ -609,19 +609,19 @@ class Gimbal:
             manager.flag_target, SetFlags(flags, flag, self.key.device_id, goal), now,
             self._explained(wish, ended)), now)
 
-    def _capabilities(self) -> Capabilities | None:
+    def _capabilities(self) -> int | None:
         manager = self._active
         if manager is None or manager.information is None:
             return None
-        return Capabilities(manager.information.cap_flags)
+        return manager.information.cap_flags
 
-    def _missing(self, *enough: Capabilities) -> str:
+    def _missing(self, *enough: int) -> str:
         """Return that the gimbal has none of some capabilities, '' if it has or may have one."""
         known = self._capabilities()
-        if known is None or any(one in known for one in enough):
+        if known is None or any(one & known == one for one in enough):
             return ''
-        return (f'gimbal {self.key} does not have '
-                f'{" or ".join(str(one.name) for one in enough)}')
+        names = [short_names('GIMBAL_DEVICE_CAP_FLAGS')[one] for one in enough]
+        return f'gimbal {self.key} does not have {" or ".join(names)}'
 
     def set_roi(
         self, latitude: float, longitude: float, altitude: float, now: float, done: request.Done,
@@ -633,7 +633,7 @@ class Gimbal:
         :param altitude: m above mean sea level.
         """
         self._command(Command(
-            self._manager, GimbalCommand.DO_SET_ROI_LOCATION, (float(self.key.device_id),),
+            self._manager, mavlink.MAV_CMD_DO_SET_ROI_LOCATION, (float(self.key.device_id),),
             position=Position(MAV_FRAME_GLOBAL, latitude, longitude, altitude)),
             f'point at {latitude:.7g}, {longitude:.7g}, {altitude:.4g} m',
             _Setpoint(self._manager), now, done)
@@ -641,7 +641,7 @@ class Gimbal:
     def clear_roi(self, now: float, done: request.Done) -> None:
         """Stop pointing at a place."""
         self._command(Command(
-            self._manager, GimbalCommand.DO_SET_ROI_NONE, (float(self.key.device_id),)),
+            self._manager, mavlink.MAV_CMD_DO_SET_ROI_NONE, (float(self.key.device_id),)),
             'point at no place', None, now, done)
 
     def _command(
@@ -717,7 +717,8 @@ class Gimbal:
         :return: why it was not sent, for people; '' if it was.
         """
         self._begin(now)
-        absolute = (Capabilities.HAS_YAW_LOCK, Capabilities.SUPPORTS_YAW_IN_EARTH_FRAME)
+        absolute = (mavlink.GIMBAL_DEVICE_CAP_FLAGS_HAS_YAW_LOCK,
+                    mavlink.GIMBAL_DEVICE_CAP_FLAGS_SUPPORTS_YAW_IN_EARTH_FRAME)
         reason = self.unavailable(now) or (
             self._missing(*absolute) if frame is YawFrame.EARTH else '')
         if not reason:
@@ -769,7 +770,8 @@ class Gimbal:
         return reason
 
     def _send_rates(self, rates: Vector, now: float) -> None:
-        frame = YawFrame.EARTH if self._flags & MountFlags.YAW_LOCK else YawFrame.VEHICLE
+        frame = (YawFrame.EARTH if self._flags & mavlink.GIMBAL_DEVICE_FLAGS_YAW_LOCK
+                 else YawFrame.VEHICLE)
         if now < self._frame_until:
             frame = self._frame
         message = self._message(frame, UNSET_QUATERNION, flu_frd(rates))
@@ -784,8 +786,8 @@ class Gimbal:
         self, frame: YawFrame, q: tuple[float, float, float, float], rates: Vector,
     ) -> GimbalManagerSetAttitude:
         flags = setpoint_flags(frame)
-        if self._missing(Capabilities.HAS_YAW_LOCK):
-            flags &= ~MountFlags.YAW_LOCK
+        if self._missing(mavlink.GIMBAL_DEVICE_CAP_FLAGS_HAS_YAW_LOCK):
+            flags &= ~mavlink.GIMBAL_DEVICE_FLAGS_YAW_LOCK
         return GimbalManagerSetAttitude(*self._manager, flags, self.key.device_id, q, *rates)
 
     def _send(self, message: GimbalManagerSetAttitude) -> None:
@@ -848,8 +850,8 @@ class Gimbal:
                 GimbalDeviceInformation.id, now, to=self.key.address)
         if self._interval_query.take(now):
             manager.target.send(
-                MavCmd.SET_MESSAGE_INTERVAL, (float(GimbalDeviceAttitudeStatus.id),
-                                              self._settings.attitude_interval * 1e6),
+                mavlink.MAV_CMD_SET_MESSAGE_INTERVAL,
+                (float(GimbalDeviceAttitudeStatus.id), self._settings.attitude_interval * 1e6),
                 now, self._interval_answered, to=self.key.address)
 
     def _taken_automatically(self, result: request.Result, now: float) -> None:

@@ -22,7 +22,7 @@ manager a policy decides. No I/O.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 import math
 import random
 from typing import TypeAlias
@@ -49,9 +49,7 @@ from .manager_setpoint import (
 from .manager_state import ManagerState, StateChanged, StateTracker
 from .messages import (
     AutopilotStateForGimbalDevice,
-    Capabilities,
     DEVICE_ID_PARAM,
-    GimbalCommand,
     GimbalDeviceInformation,
     GimbalDeviceSetAttitude,
     GimbalManagerInformation,
@@ -59,22 +57,20 @@ from .messages import (
     GimbalManagerSetManualControl,
     GimbalManagerSetPitchyaw,
     GimbalManagerStatus,
-    MAV_TYPE_GIMBAL,
     NO_COMPONENT,
     NON_MAVLINK_IDS,
 )
 from .vehicle_state import VehicleState
 from ..mavlink import messages as mav
-from ..mavlink.command_receiver import AnyCommand
 from ..mavlink.command_sender import Command, CommandResult, CommandSender
 from ..mavlink.component import Payload
-from ..mavlink.messages import Address, command_name, MavResult
+from ..mavlink.dialect import mavlink, replaced, short_names
+from ..mavlink.messages import Address, AnyCommand, command_name, params_of
 from ..payload.listeners import Listeners
 from ..payload.messages import Attitude, GeoPoint, GimbalDeviceAttitudeStatus, GlobalPositionInt
 from ..payload.mount_attitude import (
     AXES,
     MountAttitude,
-    MountFlags,
     STILL,
     to_mavlink,
     UNSET_QUATERNION,
@@ -222,11 +218,11 @@ class GimbalManager(Payload):
         self._send_due = self._status_due = self._information_due = math.inf
         self._autopilot_at = self._state_sent_at = -math.inf
         self._identities: dict[Address, tuple[tuple[int, int], float]] = {}
-        self._handlers: dict[int, Callable[[Address, AnyCommand, float], MavResult]] = {
-            GimbalCommand.DO_GIMBAL_MANAGER_CONFIGURE: self._configure,
-            GimbalCommand.DO_GIMBAL_MANAGER_PITCHYAW: self._pitch_yaw,
-            GimbalCommand.DO_SET_ROI_LOCATION: self._set_roi,
-            GimbalCommand.DO_SET_ROI_NONE: self._clear_roi}
+        self._handlers: dict[int, Callable[[Address, AnyCommand, float], int]] = {
+            mavlink.MAV_CMD_DO_GIMBAL_MANAGER_CONFIGURE: self._configure,
+            mavlink.MAV_CMD_DO_GIMBAL_MANAGER_PITCHYAW: self._pitch_yaw,
+            mavlink.MAV_CMD_DO_SET_ROI_LOCATION: self._set_roi,
+            mavlink.MAV_CMD_DO_SET_ROI_NONE: self._clear_roi}
 
     # Snapshots
 
@@ -234,11 +230,12 @@ class GimbalManager(Payload):
         """Return GIMBAL_MANAGER_STATUS, which contains the players in control."""
         setpoint, device = self._setpoint, self._device_status(now)
         flags = 0 if setpoint is None else setpoint.device_flags
-        accepts = device is not None and device.flags & MountFlags.ACCEPTS_YAW_IN_EARTH_FRAME
+        accepts = (device is not None and device.flags
+                   & mavlink.GIMBAL_DEVICE_FLAGS_ACCEPTS_YAW_IN_EARTH_FRAME)
         primary, secondary = (self.control.holder(role) or NO_COMPONENT for role in Role)
         return GimbalManagerStatus(
             mav.time_boot_ms(now),
-            int(flags | (accepts and MountFlags.ACCEPTS_YAW_IN_EARTH_FRAME)),
+            int(flags | (accepts and mavlink.GIMBAL_DEVICE_FLAGS_ACCEPTS_YAW_IN_EARTH_FRAME)),
             self.tracker.device_id, *primary, *secondary)
 
     # The payload
@@ -258,7 +255,7 @@ class GimbalManager(Payload):
         elif isinstance(message, mav.Heartbeat):
             self.control.heard(source, now)
             self._compare_identity(source, message, now)
-            if message.type == MAV_TYPE_GIMBAL:
+            if message.type == mavlink.MAV_TYPE_GIMBAL:
                 self.tracker.hear_device(source, now)
         elif isinstance(message, GimbalDeviceAttitudeStatus | GimbalDeviceInformation) and (
                 message.gimbal_device_id in NON_MAVLINK_IDS):
@@ -274,7 +271,7 @@ class GimbalManager(Payload):
                 self.model = GimbalModel.from_information(message)
         elif isinstance(message, GimbalManagerInformation | GimbalManagerStatus):
             self.tracker.hear_manager(source, message.gimbal_device_id, now)
-        elif source == Address(self.address.system, mav.MAV_COMP_ID_AUTOPILOT1):
+        elif source == Address(self.address.system, mavlink.MAV_COMP_ID_AUTOPILOT1):
             if isinstance(message, AutopilotStateForGimbalDevice):
                 self._autopilot_at = now
             elif isinstance(message, Attitude | GlobalPositionInt):
@@ -286,26 +283,26 @@ class GimbalManager(Payload):
         if isinstance(message, GimbalManagerInformation | GimbalManagerStatus):
             self.tracker.hear_manager(self.address, message.gimbal_device_id, now)
 
-    def execute(self, source: Address, command: AnyCommand, now: float) -> MavResult | None:
+    def execute(self, source: Address, command: AnyCommand, now: float) -> int | None:
         """See :meth:`Payload.execute`."""
-        params = command.params
-        if command.command == mav.MavCmd.REQUEST_MESSAGE:
+        params = params_of(command)
+        if command.command == mavlink.MAV_CMD_REQUEST_MESSAGE:
             return self._send_requested(params[0], now)
-        if command.command == mav.MavCmd.SET_MESSAGE_INTERVAL:
+        if command.command == mavlink.MAV_CMD_SET_MESSAGE_INTERVAL:
             # Each player needs the status, so none may stop it.
-            return MavResult.DENIED if params[0] == GimbalManagerStatus.id else None
+            return mavlink.MAV_RESULT_DENIED if params[0] == GimbalManagerStatus.id else None
         handler = self._handlers.get(command.command)
         if handler is None:
             return None
         if params[DEVICE_ID_PARAM[command.command]] not in (0, self.tracker.device_id):
-            return MavResult.DENIED
-        is_configure = command.command == GimbalCommand.DO_GIMBAL_MANAGER_CONFIGURE
+            return mavlink.MAV_RESULT_DENIED
+        is_configure = command.command == mavlink.MAV_CMD_DO_GIMBAL_MANAGER_CONFIGURE
         # Control may be released at the end.
         if (inactive := self._inactivity()) and not (is_configure and self._commands.refusal):
             if not is_configure:
                 self.events.emit(DemandRefused(source, inactive))
-            return (MavResult.DENIED if self.tracker.state is ManagerState.INACTIVE
-                    else MavResult.TEMPORARILY_REJECTED)
+            return (mavlink.MAV_RESULT_DENIED if self.tracker.state is ManagerState.INACTIVE
+                    else mavlink.MAV_RESULT_TEMPORARILY_REJECTED)
         return handler(source, command, now)
 
     def poll(self, now: float) -> None:
@@ -339,8 +336,8 @@ class GimbalManager(Payload):
         if not self.tracker.has_mavlink and self.tracker.state is ManagerState.ACTIVE:
             flags = 0 if self._setpoint is None else self._setpoint.operation
             limits = sum(AT_LIMIT[AXES.index(one.axis)] for one in self._clipped)
-            self._commands.send(replace(
-                status, flags=int(status.flags | flags), gimbal_device_id=self.tracker.device_id,
+            self._commands.send(replaced(
+                status, flags=status.flags | flags, gimbal_device_id=self.tracker.device_id,
                 failure_flags=status.failure_flags | limits))
 
     def _report_commanded(self, now: float) -> None:
@@ -348,7 +345,8 @@ class GimbalManager(Payload):
         attitude = self._sent and self._sent.attitude or Quaternion()
         heading = self.vehicle.heading(now)
         self._report(GimbalDeviceAttitudeStatus(
-            0, 0, mav.time_boot_ms(now), int(MountFlags.YAW_IN_VEHICLE_FRAME), attitude, math.nan,
+            0, 0, mav.time_boot_ms(now), mavlink.GIMBAL_DEVICE_FLAGS_YAW_IN_VEHICLE_FRAME,
+            attitude, math.nan,
             math.nan, math.nan, 0, math.nan if heading is None else heading, math.nan), now)
 
     def take_attitude(self, status: GimbalDeviceAttitudeStatus, now: float) -> None:
@@ -369,15 +367,15 @@ class GimbalManager(Payload):
 
     # Control
 
-    def _configure(self, source: Address, command: AnyCommand, now: float) -> MavResult:
+    def _configure(self, source: Address, command: AnyCommand, now: float) -> int:
         try:
-            changes = self.control.configure(source, command.params, now)
+            changes = self.control.configure(source, params_of(command), now)
         except ValueError:
-            return MavResult.DENIED
+            return mavlink.MAV_RESULT_DENIED
         if changes is None:
-            return MavResult.DENIED
+            return mavlink.MAV_RESULT_DENIED
         self._control_changed(changes, now)
-        return MavResult.ACCEPTED
+        return mavlink.MAV_RESULT_ACCEPTED
 
     def _control_changed(self, changes: Sequence[RoleHolderChanged], now: float) -> None:
         for change in changes:
@@ -431,20 +429,20 @@ class GimbalManager(Payload):
         try:
             demand = read_demand(message, self.model.ranges)
         except ValueError as error:
-            refusal = f'{message.name}: {error}'
+            refusal = f'{message.get_type()}: {error}'
         else:
             refusal = self._demand(source, demand, now)
         if refusal:
             self.events.emit(DemandRefused(source, refusal))
 
-    def _answer(self, source: Address, refusal: str, now: float) -> MavResult:
+    def _answer(self, source: Address, refusal: str, now: float) -> int:
         """Return the result of a command; report a refusal, since a result has no reason."""
         if refusal:
             self.events.emit(DemandRefused(source, refusal))
-        return MavResult.DENIED if refusal else MavResult.ACCEPTED
+        return mavlink.MAV_RESULT_DENIED if refusal else mavlink.MAV_RESULT_ACCEPTED
 
-    def _pitch_yaw(self, source: Address, command: AnyCommand, now: float) -> MavResult:
-        *angles_and_rates, flags, _, _ = command.params
+    def _pitch_yaw(self, source: Address, command: AnyCommand, now: float) -> int:
+        *angles_and_rates, flags, _, _ = params_of(command)
         try:
             pitch, yaw, pitch_rate, yaw_rate = map(math.radians, angles_and_rates)
             demand = Demand.from_pitch_yaw(
@@ -460,7 +458,8 @@ class GimbalManager(Payload):
         if self.control.primary.holder == player:
             return self._set(demand, now)
         if self.control.secondary.holder == player:
-            if demand.flags & (MountFlags.RETRACT | MountFlags.NEUTRAL) or not (
+            if demand.flags & (mavlink.GIMBAL_DEVICE_FLAGS_RETRACT
+                               | mavlink.GIMBAL_DEVICE_FLAGS_NEUTRAL) or not (
                     demand.attitude or any(map(math.isfinite, demand.angles))):
                 return 'secondary control adds angles only'
             self._offsets = nudge(demand, self.settings.nudge_limit)
@@ -484,7 +483,9 @@ class GimbalManager(Payload):
 
     def _set(self, demand: Demand, now: float) -> str:
         if lacking := self.model.lacks(demand.flags):
-            return f'the gimbal does not have {lacking.name}'
+            names = (name for flag, name in short_names('GIMBAL_DEVICE_FLAGS').items()
+                     if flag & lacking)
+            return f'the gimbal does not have {", ".join(names)}'
         self._turn(now)
         current = self._current(demand, now)
         if isinstance(current, str):
@@ -602,11 +603,11 @@ class GimbalManager(Payload):
 
     # A region of interest
 
-    def _set_roi(self, source: Address, command: AnyCommand, now: float) -> MavResult:
+    def _set_roi(self, source: Address, command: AnyCommand, now: float) -> int:
         if refusal := self._lacks_control(source):
             return self._answer(source, refusal, now)
         read = read_roi(command)
-        if isinstance(read, MavResult):
+        if isinstance(read, int):
             self.events.emit(DemandRefused(
                 source, f'{command_name(command.command)}: no place, or an unknown frame'))
             return read
@@ -617,20 +618,20 @@ class GimbalManager(Payload):
                 and not self._accepts_earth_frame(now)):
             self.events.emit(DemandRefused(
                 source, 'the position or the heading of the vehicle is unknown'))
-            return MavResult.TEMPORARILY_REJECTED
+            return mavlink.MAV_RESULT_TEMPORARILY_REJECTED
         self._roi = place._replace(altitude=place.altitude + above)
         self._follow(now)
-        return MavResult.ACCEPTED
+        return mavlink.MAV_RESULT_ACCEPTED
 
-    def _clear_roi(self, source: Address, command: AnyCommand, now: float) -> MavResult:
+    def _clear_roi(self, source: Address, command: AnyCommand, now: float) -> int:
         if not (refusal := self._lacks_control(source)):
             self._roi = None
             self._send(now)
         return self._answer(source, refusal, now)
 
-    def _roi_flags(self) -> MountFlags:
-        return LEVEL | (MountFlags(0) if self.model.lacks(MountFlags.YAW_LOCK)
-                        else MountFlags.YAW_LOCK)
+    def _roi_flags(self) -> int:
+        return LEVEL | (0 if self.model.lacks(mavlink.GIMBAL_DEVICE_FLAGS_YAW_LOCK)
+                        else mavlink.GIMBAL_DEVICE_FLAGS_YAW_LOCK)
 
     def _follow(self, now: float) -> None:
         """Send the setpoint, which follows the region of interest if there is one."""
@@ -645,7 +646,7 @@ class GimbalManager(Payload):
 
     # Messages
 
-    def _send_requested(self, message_id: float, now: float) -> MavResult | None:
+    def _send_requested(self, message_id: float, now: float) -> int | None:
         message: mav.Message | None
         if message_id == GimbalManagerInformation.id:
             message = self._own_information(now)
@@ -657,10 +658,10 @@ class GimbalManager(Payload):
             return None
         if self.tracker.state is not ManagerState.ACTIVE or message is None:
             self._is_awaited |= message_id == GimbalManagerInformation.id
-            return (MavResult.DENIED if self.tracker.state is ManagerState.INACTIVE
-                    else MavResult.TEMPORARILY_REJECTED)
+            return (mavlink.MAV_RESULT_DENIED if self.tracker.state is ManagerState.INACTIVE
+                    else mavlink.MAV_RESULT_TEMPORARILY_REJECTED)
         self._commands.send(message)
-        return MavResult.ACCEPTED
+        return mavlink.MAV_RESULT_ACCEPTED
 
     def _send_awaited(self, now: float) -> None:
         """Send GIMBAL_MANAGER_INFORMATION that was requested too early: clients may give up."""
@@ -675,26 +676,28 @@ class GimbalManager(Payload):
             # Clients request the message once, and would never know the device's capabilities.
             return None
         # The manager itself computes the attitude towards a place.
-        capabilities = self.model.capabilities | Capabilities.CAN_POINT_LOCATION_GLOBAL
+        capabilities = (self.model.capabilities
+                        | mavlink.GIMBAL_DEVICE_CAP_FLAGS_CAN_POINT_LOCATION_GLOBAL)
         return GimbalManagerInformation(
-            mav.time_boot_ms(now), int(capabilities), self.tracker.device_id,
+            mav.time_boot_ms(now), capabilities, self.tracker.device_id,
             **range_fields(self.model.ranges))
 
     def _device_information(self, now: float) -> GimbalDeviceInformation | None:
         """Return GIMBAL_DEVICE_INFORMATION, which clients may request from the manager."""
         if self.tracker.has_mavlink:
-            return self._information and replace(
+            return self._information and replaced(
                 self._information, gimbal_device_id=self.tracker.device_id)
         return GimbalDeviceInformation(
             mav.time_boot_ms(now), b'illuminator_ros', b'gimbal behind ROS', b'', 0, 0, 0,
-            int(self.model.capabilities & 0xFFFF), 0, **range_fields(self.model.ranges),
+            self.model.capabilities & 0xFFFF, 0, **range_fields(self.model.ranges),
             gimbal_device_id=self.tracker.device_id, cap_flags2=0)
 
     def _request_information(self, now: float) -> None:
         self._information_due = math.inf
         if self.tracker.device is not None:
             self._commands.start(Command(
-                self.tracker.device, mav.MavCmd.REQUEST_MESSAGE, (GimbalDeviceInformation.id,)),
+                self.tracker.device, mavlink.MAV_CMD_REQUEST_MESSAGE,
+                (GimbalDeviceInformation.id,)),
                 now, self._information_answered, deadline=now + INFORMATION_TIMEOUT)
 
     def _information_answered(self, result: CommandResult, now: float) -> None:
@@ -719,7 +722,7 @@ class GimbalManager(Payload):
         if change.after is ManagerState.LISTENING:
             # Another manager may send no status, but answers a request.
             self._commands.send(Command(
-                Address(0, 0), mav.MavCmd.REQUEST_MESSAGE,
+                Address(0, 0), mavlink.MAV_CMD_REQUEST_MESSAGE,
                 (GimbalManagerInformation.id,)).message(0, as_int=False))
             if self.tracker.has_mavlink and self._information is None:
                 self._information_due = now

@@ -29,7 +29,6 @@ from typing import NamedTuple
 from .axes import HAS_AXIS, LEVEL, Range, Ranges, read_ranges, UNLIMITED
 from .messages import (
     ABSOLUTE_FRAMES,
-    Capabilities,
     GimbalDeviceInformation,
     GimbalDeviceSetAttitude,
     GimbalManagerSetAttitude,
@@ -37,14 +36,12 @@ from .messages import (
     GimbalManagerSetPitchyaw,
     RELATIVE_FRAMES,
 )
-from ..mavlink.command_receiver import AnyCommand
 from ..mavlink.command_sender import DEGREE_SCALE
-from ..mavlink.messages import CommandInt, MavResult
+from ..mavlink.dialect import MAV_RESULT_COMMAND_UNSUPPORTED_MAV_FRAME, mavlink
+from ..mavlink.messages import AnyCommand, CommandInt, params_of
 from ..payload.messages import GeoPoint
 from ..payload.mount_attitude import (
     AXES,
-    Components,
-    MountFlags,
     names_frame,
     STILL,
     UNSET_VECTOR,
@@ -54,14 +51,13 @@ from ..payload.mount_attitude import (
 from ..payload.rotation import Quaternion, Vector
 
 # Flags that alone set the attitude.
-POSES = MountFlags.RETRACT | MountFlags.NEUTRAL
+POSES = mavlink.GIMBAL_DEVICE_FLAGS_RETRACT | mavlink.GIMBAL_DEVICE_FLAGS_NEUTRAL
 # Flags that are copied to GIMBAL_DEVICE_SET_ATTITUDE; its yaw frame flags depend on the frame.
-# An operation on an IntFlag takes ten times as long as on an int.
-_PASSED_BITS = int(POSES | LEVEL | MountFlags.YAW_LOCK | MountFlags.RC_EXCLUSIVE
-                   | MountFlags.RC_MIXED)
-_POSE_BITS = int(POSES)
-_EARTH_BIT, _VEHICLE_BIT = int(YawFrame.EARTH.flag), int(YawFrame.VEHICLE.flag)
-_NO_FLAGS = MountFlags(0)
+_PASSED_BITS = (POSES | LEVEL | mavlink.GIMBAL_DEVICE_FLAGS_YAW_LOCK
+                | mavlink.GIMBAL_DEVICE_FLAGS_RC_EXCLUSIVE
+                | mavlink.GIMBAL_DEVICE_FLAGS_RC_MIXED)
+_POSE_BITS = POSES
+_EARTH_BIT, _VEHICLE_BIT = YawFrame.EARTH.flag, YawFrame.VEHICLE.flag
 _RIGHT_ANGLE = math.pi / 2
 # rad that a clipped angle is beyond its range at least, and by which the other end of the range
 # must be nearer before an axis leaves the end where it is.
@@ -70,10 +66,10 @@ _HYSTERESIS = math.radians(10)
 # rad/s at full deflection of GIMBAL_MANAGER_SET_MANUAL_CONTROL, which leaves it open.
 MANUAL_RATE = 0.5
 # The capability that a flag needs.
-_NEEDED = {MountFlags.RETRACT: Capabilities.HAS_RETRACT,
-           MountFlags.NEUTRAL: Capabilities.HAS_NEUTRAL,
-           MountFlags.YAW_LOCK: Capabilities.HAS_YAW_LOCK}
-_NEEDING = int(sum(_NEEDED))
+_NEEDED = {mavlink.GIMBAL_DEVICE_FLAGS_RETRACT: mavlink.GIMBAL_DEVICE_CAP_FLAGS_HAS_RETRACT,
+           mavlink.GIMBAL_DEVICE_FLAGS_NEUTRAL: mavlink.GIMBAL_DEVICE_CAP_FLAGS_HAS_NEUTRAL,
+           mavlink.GIMBAL_DEVICE_FLAGS_YAW_LOCK: mavlink.GIMBAL_DEVICE_CAP_FLAGS_HAS_YAW_LOCK}
+_NEEDING = sum(_NEEDED)
 # Equatorial radius, m, and squared eccentricity of WGS 84.
 _RADIUS, _ECCENTRICITY_2 = 6378137.0, 6.69437999014e-3
 
@@ -87,7 +83,7 @@ class GimbalModel:
     :param ranges: of roll, pitch, and yaw relative to the vehicle.
     """
 
-    capabilities: Capabilities = Capabilities(0)
+    capabilities: int = 0
     ranges: Ranges = UNLIMITED
 
     @classmethod
@@ -97,9 +93,9 @@ class GimbalModel:
 
         An end that is not finite is unknown. If the ends of a range are swapped, both are unknown.
         """
-        capabilities = Capabilities(message.cap_flags | message.cap_flags2)
+        capabilities = message.cap_flags | message.cap_flags2
 
-        def known(read: Range, flag: Capabilities) -> Range:
+        def known(read: Range, flag: int) -> Range:
             if capabilities and not capabilities & flag:
                 return Range(0.0, 0.0)
             range_ = Range(read.low if math.isfinite(read.low) else -math.inf,
@@ -112,18 +108,21 @@ class GimbalModel:
     @classmethod
     def from_ranges(cls, ranges: Ranges) -> GimbalModel:
         """Return a gimbal that is stabilised and points to any attitude within the ranges."""
-        flags = (Capabilities.HAS_ROLL_AXIS | Capabilities.HAS_ROLL_LOCK,
-                 Capabilities.HAS_PITCH_AXIS | Capabilities.HAS_PITCH_LOCK,
-                 Capabilities.HAS_YAW_AXIS | Capabilities.HAS_YAW_FOLLOW
-                 | Capabilities.HAS_YAW_LOCK)
-        capabilities = Capabilities.HAS_NEUTRAL
+        flags = (mavlink.GIMBAL_DEVICE_CAP_FLAGS_HAS_ROLL_AXIS
+                 | mavlink.GIMBAL_DEVICE_CAP_FLAGS_HAS_ROLL_LOCK,
+                 mavlink.GIMBAL_DEVICE_CAP_FLAGS_HAS_PITCH_AXIS
+                 | mavlink.GIMBAL_DEVICE_CAP_FLAGS_HAS_PITCH_LOCK,
+                 mavlink.GIMBAL_DEVICE_CAP_FLAGS_HAS_YAW_AXIS
+                 | mavlink.GIMBAL_DEVICE_CAP_FLAGS_HAS_YAW_FOLLOW
+                 | mavlink.GIMBAL_DEVICE_CAP_FLAGS_HAS_YAW_LOCK)
+        capabilities = mavlink.GIMBAL_DEVICE_CAP_FLAGS_HAS_NEUTRAL
         for range_, flag in zip(ranges, flags, strict=True):
-            capabilities |= Capabilities(0) if range_.is_fixed else flag
+            capabilities |= 0 if range_.is_fixed else flag
         return cls(capabilities, ranges)
 
-    def lacks(self, flags: int) -> MountFlags:
+    def lacks(self, flags: int) -> int:
         """Return the flags that the gimbal cannot follow."""
-        lacking = _NO_FLAGS
+        lacking = 0
         if not flags & _NEEDING:
             return lacking
         for flag, needed in _NEEDED.items():
@@ -138,16 +137,16 @@ class GimbalModel:
         :param reported: the flags that the device reports now, None if it reports none.
         """
         if reported is not None and names_frame(reported):
-            return bool(reported & MountFlags.ACCEPTS_YAW_IN_EARTH_FRAME)
+            return bool(reported & mavlink.GIMBAL_DEVICE_FLAGS_ACCEPTS_YAW_IN_EARTH_FRAME)
         return not self.capabilities or bool(
-            self.capabilities & Capabilities.SUPPORTS_YAW_IN_EARTH_FRAME)
+            self.capabilities & mavlink.GIMBAL_DEVICE_CAP_FLAGS_SUPPORTS_YAW_IN_EARTH_FRAME)
 
 
 class Demand(NamedTuple):
     """
     The content of one setpoint message or command of a player.
 
-    :param flags: :class:`~..payload.mount_attitude.MountFlags`.
+    :param flags: GIMBAL_DEVICE_FLAGS.
     :param frame: of its yaw.
     :param angles: roll, pitch, yaw, rad; NaN leaves an axis as it is.
     :param rates: of the axes, rad/s; NaN where none is given.
@@ -267,7 +266,7 @@ def read_demand(message: AnySetpoint, ranges: Ranges) -> Demand:
         message.flags, message.pitch, message.yaw, message.pitch_rate, message.yaw_rate)
 
 
-def _attitude(q: Components) -> Quaternion | None:
+def _attitude(q: Sequence[float]) -> Quaternion | None:
     return None if all(map(math.isnan, q)) else Quaternion(*q).normalized()
 
 
@@ -491,7 +490,7 @@ def _nearest(
 def in_vehicle_frame(setpoint: Setpoint, heading: float) -> Setpoint:
     """Return a setpoint with its yaw relative to the vehicle instead of north."""
     return setpoint._replace(
-        frame=YawFrame.VEHICLE, flags=setpoint.flags & ~MountFlags.YAW_LOCK,
+        frame=YawFrame.VEHICLE, flags=setpoint.flags & ~mavlink.GIMBAL_DEVICE_FLAGS_YAW_LOCK,
         attitude=setpoint.attitude and turned_by(setpoint.attitude, -heading))
 
 
@@ -513,24 +512,24 @@ def _from_angles(angles: Sequence[float]) -> Quaternion:
     return Quaternion.from_euler(roll, pitch, yaw)
 
 
-def read_roi(command: AnyCommand) -> tuple[GeoPoint, bool] | MavResult:
+def read_roi(command: AnyCommand) -> tuple[GeoPoint, bool] | int:
     """
     Return the place of MAV_CMD_DO_SET_ROI_LOCATION.
 
     :return: the place, and whether its altitude is relative to the home position; the result of
         the command if it has no valid place.
     """
-    *_, latitude, longitude, altitude = command.params
+    *_, latitude, longitude, altitude = params_of(command)
     is_relative = False
     # A COMMAND_LONG has no frame; PX4, too, reads its altitude as above mean sea level.
     if isinstance(command, CommandInt):
         is_relative = command.frame in RELATIVE_FRAMES
         if not is_relative and command.frame not in ABSOLUTE_FRAMES:
-            return MavResult.COMMAND_UNSUPPORTED_MAV_FRAME
+            return MAV_RESULT_COMMAND_UNSUPPORTED_MAV_FRAME
         latitude, longitude = latitude / DEGREE_SCALE, longitude / DEGREE_SCALE
     if abs(latitude) <= 90 and abs(longitude) <= 180 and math.isfinite(altitude):
         return GeoPoint(latitude, longitude, altitude), is_relative
-    return MavResult.DENIED
+    return mavlink.MAV_RESULT_DENIED
 
 
 def direction(origin: GeoPoint, target: GeoPoint) -> tuple[float, float] | None:

@@ -32,9 +32,11 @@ from .gimbal import GimbalSettings
 from .manager import GimbalManager, ManagerSettings
 from .manager_setpoint import AnySetpoint
 from ..mavlink import messages as mav
-from ..mavlink.command_receiver import AnyCommand, CommandReceiver
+from ..mavlink.command_receiver import CommandReceiver
 from ..mavlink.command_sender import Command, CommandSender, CommandStatus
 from ..mavlink.component import HEARTBEAT_INTERVAL, Payload
+from ..mavlink.dialect import mavlink
+from ..mavlink.messages import AnyCommand
 from ..payload.messages import GimbalDeviceAttitudeStatus
 
 T = TypeVar('T')
@@ -104,7 +106,7 @@ class ManagerWithClient(Payload):
 
     def execute(
         self, source: mav.Address, command: AnyCommand, now: float,
-    ) -> mav.MavResult | None:
+    ) -> int | None:
         """See :meth:`Payload.execute`."""
         return self._manage(lambda: self.manager.execute(source, command, now), now)
 
@@ -116,7 +118,7 @@ class ManagerWithClient(Payload):
         """See :meth:`Payload.poll`."""
         if now >= self._heartbeat_due:
             self._heartbeat_due = now + HEARTBEAT_INTERVAL
-            alive = mav.heartbeat(mav.MavType.ONBOARD_CONTROLLER)
+            alive = mav.heartbeat(mavlink.MAV_TYPE_ONBOARD_CONTROLLER)
             self.client.receive(self._commands.address, alive, now)
             self.manager.receive(self._commands.address, alive, now)
         self._manage(lambda: self.manager.poll(now), now)

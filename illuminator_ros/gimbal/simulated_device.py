@@ -32,15 +32,15 @@ from typing import Any
 from . import messages as gimbal
 from .axes import Range, range_fields
 from .manager_setpoint import Demand
-from .messages import Capabilities, ErrorFlags
 from .simulated_motion import GimbalMechanics, GimbalMotion
 from .. import __version__
+from ..mavlink.dialect import flag_names, mavlink, short_names
 from ..mavlink.messages import Address, Message, time_boot_ms
 from ..payload import simulated
 from ..payload.faults import Behaviour, Fault, FaultTable
 from ..payload.faults import FAULTS as COMPONENT_FAULTS
 from ..payload.messages import GimbalDeviceAttitudeStatus
-from ..payload.mount_attitude import AXES, MountFlags, yaw_frame, YawFrame
+from ..payload.mount_attitude import AXES, yaw_frame, YawFrame
 from ..payload.rotation import Quaternion
 from ..payload.simulated_settings import integer, number, one_of, Setting, text, Values
 
@@ -76,7 +76,7 @@ class GimbalBehaviour(Behaviour):
     :param reports_failures: whether its failure flags show the axes at their limits.
     """
 
-    heartbeat_type: int = gimbal.MAV_TYPE_GIMBAL
+    heartbeat_type: int = mavlink.MAV_TYPE_GIMBAL
     enforces_control: bool = True
     reports: bool = True
     frozen_flags: bool = False
@@ -108,7 +108,7 @@ GIMBAL_FAULTS = FaultTable({
     'no-frame': Fault('names_frame', 'does not name the yaw frame of its attitude',
                       default=False),
     'flags': Fault('false_flags', 'reports failure flags without a reason', 'FLAGS',
-                   integer(1, 0xFFFFFFFF), int(ErrorFlags.MOTOR_ERROR)),
+                   integer(1, 0xFFFFFFFF), mavlink.GIMBAL_DEVICE_ERROR_FLAGS_MOTOR_ERROR),
     'no-identity': Fault('identifies', 'sends no INFORMATION message', default=False),
     'changing-identity': Fault('static_information', 'changes the limits that it reports',
                                default=False),
@@ -135,7 +135,7 @@ class GimbalProperties:
     :param status_interval: s between messages with its attitude.
     """
 
-    address: Address = Address(1, gimbal.MAV_COMP_ID_GIMBAL)
+    address: Address = Address(1, mavlink.MAV_COMP_ID_GIMBAL)
     mechanics: GimbalMechanics = GimbalMechanics()
     vendor: str = 'illuminator_ros'
     model: str = 'simulator'
@@ -176,7 +176,7 @@ class SimulatedMount:
         if not behaviour.ignores_changes and (behaviour.stops or not stop):
             self.motion.obey(demand, now)
 
-    def flags(self, behaviour: GimbalBehaviour) -> MountFlags:
+    def flags(self, behaviour: GimbalBehaviour) -> int:
         """Return the flags of the setpoint as they are reported."""
         return self._first_flags if behaviour.frozen_flags else self.motion.flags
 
@@ -201,8 +201,9 @@ class SimulatedMount:
             # In older devices YAW_LOCK also selects the frame.
             frame = yaw_frame(flags)
         if behaviour.accepts_earth_always or known and (
-                motion.mechanics.capabilities & Capabilities.SUPPORTS_YAW_IN_EARTH_FRAME):
-            flags |= MountFlags.ACCEPTS_YAW_IN_EARTH_FRAME
+                motion.mechanics.capabilities
+                & mavlink.GIMBAL_DEVICE_CAP_FLAGS_SUPPORTS_YAW_IN_EARTH_FRAME):
+            flags |= mavlink.GIMBAL_DEVICE_FLAGS_ACCEPTS_YAW_IN_EARTH_FRAME
         q = motion.attitude(frame)
         self._reported += 1
         if behaviour.jump and not self._reported % 10:
@@ -212,7 +213,7 @@ class SimulatedMount:
         turning = motion.vehicle.rate if known else math.nan
         roll_rate, pitch_rate, yaw_rate = motion.rates
         return GimbalDeviceAttitudeStatus(
-            0, 0, self.uptime_ms(now), int(flags), q, roll_rate, pitch_rate,
+            0, 0, self.uptime_ms(now), flags, q, roll_rate, pitch_rate,
             yaw_rate + (turning if frame is YawFrame.EARTH else 0.0),
             failures | behaviour.false_flags, motion.vehicle.yaw if known else math.nan, turning,
             self._device_id)
@@ -232,7 +233,7 @@ class SimulatedMount:
         """Return the INFORMATION of a device, None if it sends none."""
         if not behaviour.identifies:
             return None
-        properties, capabilities = self._properties, int(self.motion.mechanics.capabilities)
+        properties, capabilities = self._properties, self.motion.mechanics.capabilities
         vendor, model, custom = (
             name.encode()[:31] for name in (
                 properties.vendor, properties.model, properties.custom_name))
@@ -249,11 +250,10 @@ class SimulatedMount:
         motion = self.motion
         motion.advance(now)
         roll, pitch, yaw = map(math.degrees, motion.angles)
-        shown_flags = MountFlags.RETRACT, MountFlags.NEUTRAL, MountFlags.YAW_LOCK
-        state = (*(str(flag.name) for flag in shown_flags if flag & motion.flags),
-                 *(str(flag.name) for flag in ErrorFlags if flag & motion.limits()),
-                 *filter(None, notes))
-        shown = tuple(str(one).lower().replace('_', ' ') for one in state)
+        shown_flags = (mavlink.GIMBAL_DEVICE_FLAGS_RETRACT | mavlink.GIMBAL_DEVICE_FLAGS_NEUTRAL
+                       | mavlink.GIMBAL_DEVICE_FLAGS_YAW_LOCK)
+        shown = (*flag_names('GIMBAL_DEVICE_FLAGS', shown_flags & motion.flags),
+                 *flag_names('GIMBAL_DEVICE_ERROR_FLAGS', motion.limits()), *filter(None, notes))
         return simulated.Snapshot(
             '  '.join((f'roll {roll:6.1f}  pitch {pitch:6.1f}  yaw {yaw:6.1f} deg', *shown)),
             (*shown, motion.moving), motion.travelled / TRAVEL_STEP)
@@ -312,7 +312,8 @@ class SimulatedGimbal(simulated.SimulatedDevice):
         if message_id == GimbalDeviceAttitudeStatus.id:
             self._expire(now)
             return self.mount.status(
-                self.behaviour, now, 0 if self.manager else ErrorFlags.NO_MANAGER)
+                self.behaviour, now, 0 if self.manager
+                else mavlink.GIMBAL_DEVICE_ERROR_FLAGS_NO_MANAGER)
         if message_id == gimbal.GimbalDeviceInformation.id:
             return self.mount.information(self.behaviour, now)
         return None
@@ -381,9 +382,10 @@ def _span(text_: str) -> Range:
     return Range(low, high)
 
 
-def _capabilities(names: str) -> Capabilities:
-    known = {str(one.name).lower(): one for one in Capabilities}
-    result = Capabilities(0)
+def _capabilities(names: str) -> int:
+    known = {name.lower(): flag
+             for flag, name in short_names('GIMBAL_DEVICE_CAP_FLAGS').items()}
+    result = 0
     for name in names.split(','):
         result |= known[one_of(known)(name.strip().lower())]
     return result
@@ -423,7 +425,8 @@ def mechanics(settings: Values) -> GimbalMechanics:
             given[field] = math.radians(settings[name])
     endless = given.get('yaw', default.yaw).is_endless
     return replace(default, **given, capabilities=(
-        default.capabilities | (Capabilities.SUPPORTS_INFINITE_YAW if endless else 0))
+        default.capabilities
+        | (mavlink.GIMBAL_DEVICE_CAP_FLAGS_SUPPORTS_INFINITE_YAW if endless else 0))
         & ~settings.get('lacks', 0))
 
 

@@ -32,7 +32,7 @@ from typing import NamedTuple
 from . import messages as gimbal
 from .axes import LEVEL, Range
 from .manager_setpoint import AnySetpoint, Demand, direction, read_demand, read_roi
-from .messages import Capabilities, DEVICE_ID_PARAM, GimbalCommand, NO_COMPONENT
+from .messages import DEVICE_ID_PARAM, NO_COMPONENT
 from .simulated_device import (
     COMMANDS,
     GIMBAL_FAULTS,
@@ -42,26 +42,32 @@ from .simulated_device import (
     properties,
     SimulatedMount,
 )
-from ..mavlink.command_receiver import AnyCommand
+from ..mavlink.dialect import mavlink, replaced
 from ..mavlink.messages import (
     Address,
-    MAV_AUTOPILOT_ARDUPILOTMEGA,
-    MAV_COMP_ID_AUTOPILOT1,
-    MavResult,
+    AnyCommand,
     Message,
+    params_of,
 )
 from ..payload import simulated
 from ..payload.faults import Behaviour, Fault, FaultTable
-from ..payload.messages import Attitude, GeoPoint, GimbalDeviceAttitudeStatus, GlobalPositionInt
-from ..payload.mount_attitude import MountFlags, UNSET_VECTOR, YawFrame
+from ..payload.messages import (
+    Attitude,
+    GeoPoint,
+    GimbalDeviceAttitudeStatus,
+    GlobalPositionInt,
+    is_finite,
+    place_of,
+)
+from ..payload.mount_attitude import UNSET_VECTOR, YawFrame
 from ..payload.simulated_settings import geo_point, integer, number, one_of, Setting, Values
 
 # s between messages with the state of the manager ("Gimbal Manager Status").
 STATUS_INTERVAL = 0.2
 # rad that secondary control may add to an angle.
 NUDGE_LIMIT = math.radians(20.0)
-MAV_TYPE_QUADROTOR = 2
-MAV_AUTOPILOT_PX4 = 12
+mavlink.MAV_TYPE_QUADROTOR = 2
+mavlink.MAV_AUTOPILOT_PX4 = 12
 
 
 @dataclass(frozen=True)
@@ -91,12 +97,12 @@ class ManagerBehaviour(GimbalBehaviour):
     has_secondary: bool = True
     own_is_manager: bool = False
     releases_pairs: bool = True
-    invalid_configure: MavResult = MavResult.DENIED
+    invalid_configure: int = mavlink.MAV_RESULT_DENIED
     rates_in_degrees: bool = True
     checks_device: bool = True
     takes_pitchyaw: bool = True
     takes_manual: bool = True
-    partial_angles: MavResult | None = None
+    partial_angles: int | None = None
     angles_with_rates: bool = True
     frame_is_lock: bool = False
     shows_flags: bool = True
@@ -114,8 +120,8 @@ class Profile(NamedTuple):
 
     description: str
     behaviour: ManagerBehaviour = ManagerBehaviour()
-    address: Address = Address(1, gimbal.MAV_COMP_ID_GIMBAL)
-    lacks: Capabilities = Capabilities(0)
+    address: Address = Address(1, mavlink.MAV_COMP_ID_GIMBAL)
+    lacks: int = 0
 
 
 PROFILES = {
@@ -126,23 +132,26 @@ PROFILES = {
         'and no device ids, -2 is PX4 itself, -3 compares system and component id separately, '
         'PITCHYAW takes rates in rad/s, no SET_PITCHYAW, regions of interest from any component',
         ManagerBehaviour(
-            heartbeat_type=MAV_TYPE_QUADROTOR, heartbeat_autopilot=MAV_AUTOPILOT_PX4,
+            heartbeat_type=mavlink.MAV_TYPE_QUADROTOR,
+            heartbeat_autopilot=mavlink.MAV_AUTOPILOT_PX4,
             enforces_roi=False, has_secondary=False, own_is_manager=True, releases_pairs=False,
-            invalid_configure=MavResult.ACCEPTED, rates_in_degrees=False, checks_device=False,
-            takes_pitchyaw=False, partial_angles=MavResult.ACCEPTED, frame_is_lock=True),
-        Address(1, MAV_COMP_ID_AUTOPILOT1), Capabilities.HAS_RETRACT),
+            invalid_configure=mavlink.MAV_RESULT_ACCEPTED, rates_in_degrees=False,
+            checks_device=False,
+            takes_pitchyaw=False, partial_angles=mavlink.MAV_RESULT_ACCEPTED, frame_is_lock=True),
+        Address(1, mavlink.MAV_COMP_ID_AUTOPILOT1), mavlink.GIMBAL_DEVICE_CAP_FLAGS_HAS_RETRACT),
     # AP_Mount.cpp and AP_Mount_Backend.cpp.
     'ardupilot': Profile(
         'ArduPilot with a gimbal on its outputs: records control and obeys any component, no '
         'secondary control, no SET_MANUAL_CONTROL, ignores angles with rates and the angle of one '
         'axis, reports constant flags and no failures',
         ManagerBehaviour(
-            heartbeat_type=MAV_TYPE_QUADROTOR, heartbeat_autopilot=MAV_AUTOPILOT_ARDUPILOTMEGA,
+            heartbeat_type=mavlink.MAV_TYPE_QUADROTOR,
+            heartbeat_autopilot=mavlink.MAV_AUTOPILOT_ARDUPILOTMEGA,
             enforces_control=False, enforces_roi=False, has_secondary=False,
-            invalid_configure=MavResult.FAILED, takes_manual=False,
-            partial_angles=MavResult.FAILED, angles_with_rates=False, frame_is_lock=True,
+            invalid_configure=mavlink.MAV_RESULT_FAILED, takes_manual=False,
+            partial_angles=mavlink.MAV_RESULT_FAILED, angles_with_rates=False, frame_is_lock=True,
             shows_flags=False, reports_earth=False, reports_failures=False),
-        Address(1, MAV_COMP_ID_AUTOPILOT1)),
+        Address(1, mavlink.MAV_COMP_ID_AUTOPILOT1)),
 }
 
 
@@ -176,7 +185,7 @@ class SimulatedManager(simulated.SimulatedDevice):
         gimbal.GimbalManagerSetManualControl, Attitude, GlobalPositionInt)
     sends = (gimbal.GimbalManagerInformation, gimbal.GimbalManagerStatus,
              GimbalDeviceAttitudeStatus, gimbal.GimbalDeviceInformation)
-    changes = frozenset(GimbalCommand)
+    changes = frozenset(DEVICE_ID_PARAM)
     faults = FAULTS
     commands = COMMANDS
     behaviour: ManagerBehaviour
@@ -241,11 +250,11 @@ class SimulatedManager(simulated.SimulatedDevice):
 
     def _take_vehicle(self, message: Attitude | GlobalPositionInt, now: float) -> None:
         if isinstance(message, Attitude):
-            if message.is_finite:
+            if is_finite(message):
                 self.mount.motion.take_heading(
                     message.roll, message.pitch, message.yaw, message.yawspeed, now, math.inf)
         else:
-            self._position = message.place
+            self._position = place_of(message)
             self._point_at_roi(now)
 
     def _is_for_device(self, device_id: float) -> bool:
@@ -256,7 +265,8 @@ class SimulatedManager(simulated.SimulatedDevice):
 
     def _flags(self, flags: int) -> int:
         """Return the flags of a message as the profile reads them."""
-        frames = MountFlags.YAW_IN_EARTH_FRAME | MountFlags.YAW_IN_VEHICLE_FRAME
+        frames = (mavlink.GIMBAL_DEVICE_FLAGS_YAW_IN_EARTH_FRAME
+                  | mavlink.GIMBAL_DEVICE_FLAGS_YAW_IN_VEHICLE_FRAME)
         return flags & ~frames if self.behaviour.frame_is_lock else flags
 
     def _read(self, message: AnySetpoint) -> Demand | None:
@@ -267,7 +277,7 @@ class SimulatedManager(simulated.SimulatedDevice):
                 and not behaviour.takes_manual):
             return None
         try:
-            demand = read_demand(replace(message, flags=self._flags(message.flags)),
+            demand = read_demand(replaced(message, flags=self._flags(message.flags)),
                                  self.mount.motion.mechanics.ranges)
         except ValueError:
             return None
@@ -303,24 +313,26 @@ class SimulatedManager(simulated.SimulatedDevice):
         """See :meth:`SimulatedDevice.execute`."""
         if command.command not in self.changes:
             return None
-        *first, flags, _, _ = command.params
-        if not self._is_for_device(command.params[DEVICE_ID_PARAM[command.command]]):
-            return simulated.CommandReply(MavResult.DENIED)
-        if command.command == GimbalCommand.DO_GIMBAL_MANAGER_PITCHYAW:
+        params = params_of(command)
+        *first, flags, _, _ = params
+        if not self._is_for_device(params[DEVICE_ID_PARAM[command.command]]):
+            return simulated.CommandReply(mavlink.MAV_RESULT_DENIED)
+        if command.command == mavlink.MAV_CMD_DO_GIMBAL_MANAGER_PITCHYAW:
             return self._pitchyaw(source, first, flags, now)
-        if command.command == GimbalCommand.DO_GIMBAL_MANAGER_CONFIGURE:
+        if command.command == mavlink.MAV_CMD_DO_GIMBAL_MANAGER_CONFIGURE:
             return self._configure(source, first)
         effect: simulated.Effect = partial(self._clear_roi, now)
-        if command.command == GimbalCommand.DO_SET_ROI_LOCATION:
+        if command.command == mavlink.MAV_CMD_DO_SET_ROI_LOCATION:
             read = read_roi(command)
-            if isinstance(read, MavResult):
+            if isinstance(read, int):
                 return simulated.CommandReply(read)
             place, is_relative = read
             above = self.properties.position.altitude if is_relative else 0.0
             effect = partial(
                 self._set_roi, place._replace(altitude=place.altitude + above), now)
         allowed = not self.behaviour.enforces_roi or source == self.primary
-        return simulated.CommandReply(MavResult.ACCEPTED if allowed else MavResult.DENIED, effect)
+        return simulated.CommandReply(mavlink.MAV_RESULT_ACCEPTED if allowed
+                                      else mavlink.MAV_RESULT_DENIED, effect)
 
     def _pitchyaw(
         self, source: Address, values: Sequence[float], flags: float, now: float,
@@ -332,13 +344,13 @@ class SimulatedManager(simulated.SimulatedDevice):
             demand = Demand.from_pitch_yaw(
                 self._flags(int(flags)), pitch, yaw, pitch_rate, yaw_rate)
         except (ValueError, OverflowError):
-            return simulated.CommandReply(MavResult.DENIED)
+            return simulated.CommandReply(mavlink.MAV_RESULT_DENIED)
         if self._lacks_an_axis(demand):
             assert self.behaviour.partial_angles is not None
             return simulated.CommandReply(self.behaviour.partial_angles)
         return simulated.CommandReply(
-            MavResult.ACCEPTED if self._may_control(source) else MavResult.DENIED,
-            partial(self._obey, source, demand, now))
+            mavlink.MAV_RESULT_ACCEPTED if self._may_control(source)
+            else mavlink.MAV_RESULT_DENIED, partial(self._obey, source, demand, now))
 
     def _configure(
         self, source: Address, values: Sequence[float],
@@ -348,7 +360,7 @@ class SimulatedManager(simulated.SimulatedDevice):
             return simulated.CommandReply(behaviour.invalid_configure)
         primary = self._resolved(self.primary, values[:2], source)
         secondary = self._resolved(self.secondary, values[2:], source)
-        return simulated.CommandReply(MavResult.ACCEPTED, partial(
+        return simulated.CommandReply(mavlink.MAV_RESULT_ACCEPTED, partial(
             self._give_control, primary, secondary if behaviour.has_secondary else NO_COMPONENT))
 
     def _resolved(
@@ -377,11 +389,12 @@ class SimulatedManager(simulated.SimulatedDevice):
     def _clear_roi(self, now: float) -> None:
         # "After this command the gimbal manager should ... assume a neutral position."
         self._roi = None
-        self.mount.obey(Demand(MountFlags.NEUTRAL | LEVEL), self.behaviour, now)
+        self.mount.obey(Demand(mavlink.GIMBAL_DEVICE_FLAGS_NEUTRAL | LEVEL), self.behaviour, now)
 
     def _point_at_roi(self, now: float) -> None:
         if self._roi is not None and (angles := direction(self._position, self._roi)):
-            self.mount.obey(Demand(LEVEL | MountFlags.YAW_LOCK, YawFrame.EARTH, (0.0, *angles)),
+            self.mount.obey(Demand(LEVEL | mavlink.GIMBAL_DEVICE_FLAGS_YAW_LOCK, YawFrame.EARTH,
+                                   (0.0, *angles)),
                             self.behaviour, now)
 
     def snapshot(self, now: float) -> simulated.Snapshot:
@@ -415,7 +428,8 @@ def manager_properties(settings: Values, address: Address) -> ManagerProperties:
     profile, default = _profile(settings), ManagerProperties()
     described = properties(settings, address)
     mechanics = replace(described.mechanics, capabilities=(
-        described.mechanics.capabilities | Capabilities.CAN_POINT_LOCATION_GLOBAL)
+        described.mechanics.capabilities
+        | mavlink.GIMBAL_DEVICE_CAP_FLAGS_CAN_POINT_LOCATION_GLOBAL)
         & ~profile.lacks & ~settings.get('lacks', 0))
     return replace(
         default, gimbal=replace(described, mechanics=mechanics, behaviour=profile.behaviour),

@@ -22,20 +22,26 @@ from typing import NamedTuple
 
 from .axes import AT_LIMIT, HAS_AXIS, HAS_FOLLOW, HAS_LOCK, LEVEL, LOCKS, Range, Ranges, RESOLUTION
 from .manager_setpoint import Demand
-from .messages import Capabilities, ErrorFlags
-from ..payload.mount_attitude import AXES, MountFlags, UNSET_VECTOR, YawFrame
+from ..mavlink.dialect import mavlink
+from ..payload.mount_attitude import AXES, UNSET_VECTOR, YawFrame
 from ..payload.rotation import Quaternion, Vector
 
 # s without a heading from the vehicle after which its heading is unknown.
 HEADING_TIMEOUT = 2.0
 # The flags that a setpoint may set.
-SETTABLE = MountFlags.RETRACT | MountFlags.NEUTRAL | LEVEL | MountFlags.YAW_LOCK
+SETTABLE = (mavlink.GIMBAL_DEVICE_FLAGS_RETRACT | mavlink.GIMBAL_DEVICE_FLAGS_NEUTRAL | LEVEL
+            | mavlink.GIMBAL_DEVICE_FLAGS_YAW_LOCK)
 CAPABILITIES = (
-    Capabilities.HAS_RETRACT | Capabilities.HAS_NEUTRAL
-    | Capabilities.HAS_ROLL_AXIS | Capabilities.HAS_ROLL_FOLLOW | Capabilities.HAS_ROLL_LOCK
-    | Capabilities.HAS_PITCH_AXIS | Capabilities.HAS_PITCH_FOLLOW | Capabilities.HAS_PITCH_LOCK
-    | Capabilities.HAS_YAW_AXIS | Capabilities.HAS_YAW_FOLLOW | Capabilities.HAS_YAW_LOCK
-    | Capabilities.SUPPORTS_YAW_IN_EARTH_FRAME)
+    mavlink.GIMBAL_DEVICE_CAP_FLAGS_HAS_RETRACT | mavlink.GIMBAL_DEVICE_CAP_FLAGS_HAS_NEUTRAL
+    | mavlink.GIMBAL_DEVICE_CAP_FLAGS_HAS_ROLL_AXIS
+    | mavlink.GIMBAL_DEVICE_CAP_FLAGS_HAS_ROLL_FOLLOW
+    | mavlink.GIMBAL_DEVICE_CAP_FLAGS_HAS_ROLL_LOCK
+    | mavlink.GIMBAL_DEVICE_CAP_FLAGS_HAS_PITCH_AXIS
+    | mavlink.GIMBAL_DEVICE_CAP_FLAGS_HAS_PITCH_FOLLOW
+    | mavlink.GIMBAL_DEVICE_CAP_FLAGS_HAS_PITCH_LOCK
+    | mavlink.GIMBAL_DEVICE_CAP_FLAGS_HAS_YAW_AXIS | mavlink.GIMBAL_DEVICE_CAP_FLAGS_HAS_YAW_FOLLOW
+    | mavlink.GIMBAL_DEVICE_CAP_FLAGS_HAS_YAW_LOCK
+    | mavlink.GIMBAL_DEVICE_CAP_FLAGS_SUPPORTS_YAW_IN_EARTH_FRAME)
 
 
 def wrapped(angle: float) -> float:
@@ -62,7 +68,7 @@ class GimbalMechanics:
     yaw: Range = Range(*map(math.radians, (-170.0, 170.0)))
     rate: float = math.radians(60.0)
     drift: float = math.radians(0.5)
-    capabilities: Capabilities = CAPABILITIES
+    capabilities: int = CAPABILITIES
 
     @property
     def ranges(self) -> Ranges:
@@ -141,7 +147,7 @@ class GimbalMotion:
 
     mechanics: GimbalMechanics
     now: float
-    flags: MountFlags = LEVEL
+    flags: int = LEVEL
     frame: YawFrame = YawFrame.VEHICLE
     vehicle: VehicleAttitude = VehicleAttitude(0.0, 0.0, 0.0, math.nan, -math.inf)
     travelled: float = 0.0
@@ -191,11 +197,12 @@ class GimbalMotion:
         """
         self.advance(now)
         flags, angles, rates = demand.flags, demand.target, demand.rates
-        self.flags, self.frame = MountFlags(flags) & SETTABLE, demand.frame
-        if flags & (MountFlags.RETRACT | MountFlags.NEUTRAL):
+        self.flags, self.frame = flags & SETTABLE, demand.frame
+        if flags & (mavlink.GIMBAL_DEVICE_FLAGS_RETRACT | mavlink.GIMBAL_DEVICE_FLAGS_NEUTRAL):
             # RETRACT takes precedence (GIMBAL_DEVICE_FLAGS).
             mechanics = self.mechanics
-            angles = mechanics.retracted if flags & MountFlags.RETRACT else mechanics.neutral
+            angles = (mechanics.retracted if flags & mavlink.GIMBAL_DEVICE_FLAGS_RETRACT
+                      else mechanics.neutral)
             rates, self.frame = UNSET_VECTOR, YawFrame.VEHICLE
         references = self._references(now)
         for index, (axis, angle, rate) in enumerate(zip(self._axes, angles, rates, strict=True)):
@@ -260,10 +267,9 @@ class GimbalMotion:
         """Return whether an axis moves, slow drift aside."""
         return any(abs(rate) > self.mechanics.drift * 1.5 + RESOLUTION for rate in self.rates)
 
-    def limits(self) -> ErrorFlags:
+    def limits(self) -> int:
         """Return the flags of the axes that are stopped at the end of their range."""
-        return ErrorFlags(sum(flag for flag, axis in zip(AT_LIMIT, self._axes, strict=True)
-                              if axis.stopped))
+        return sum(flag for flag, axis in zip(AT_LIMIT, self._axes, strict=True) if axis.stopped)
 
     def attitude(self, frame: YawFrame) -> Quaternion:
         """Return the attitude in MAVLink's axes; the earth frame needs the heading."""

@@ -21,7 +21,7 @@ from typing import Generic, TypeVar
 
 from .messages import AutopilotStateForGimbalDevice
 from ..mavlink.messages import Address
-from ..payload.messages import Attitude, GeoPoint, GlobalPositionInt
+from ..payload.messages import Attitude, GeoPoint, GlobalPositionInt, is_finite, place_of
 from ..payload.rotation import Quaternion, Vector
 
 T = TypeVar('T')
@@ -67,14 +67,14 @@ class VehicleState:
     def take(self, message: Attitude | GlobalPositionInt, now: float) -> None:
         """Take a message of the autopilot; ignore values that are not finite, or no position."""
         if isinstance(message, Attitude):
-            if not (message.is_finite and math.isfinite(message.yawspeed)):
+            if not (is_finite(message) and math.isfinite(message.yawspeed)):
                 return
             self._attitude.set(Quaternion.from_euler(
                 message.roll, message.pitch, message.yaw), now, link=True)
             self._yaw_rate.set(message.yawspeed, now, link=True)
         elif message.lat or message.lon:
             # Autopilots send 0, 0 while they have no fix.
-            self._position.set(message.place, now, link=True)
+            self._position.set(place_of(message), now, link=True)
             self._velocity.set(
                 (message.vx / 100, message.vy / 100, message.vz / 100), now, link=True)
             self._home_altitude = (message.alt - message.relative_alt) / 1e3

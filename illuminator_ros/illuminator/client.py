@@ -28,14 +28,8 @@ from .model import Status
 from .mount_orientation import MountOrientations
 from ..mavlink.command_sender import Command, CommandSender
 from ..mavlink.component import Payload
-from ..mavlink.messages import (
-    Address,
-    ComponentInformationBasic,
-    Heartbeat,
-    MavCmd,
-    MavType,
-    Message,
-)
+from ..mavlink.dialect import mavlink
+from ..mavlink.messages import Address, ComponentInformationBasic, Heartbeat, Message, sender_of
 from ..payload.attempt import Done, Result
 from ..payload.discovery import Discovery
 from ..payload.identity import Identity
@@ -140,8 +134,8 @@ class IlluminatorClient(Payload):
         """See :meth:`Payload.receive`."""
         if isinstance(message, IlluminatorStatus):
             if light := self._discovery.hear(source, now, proved=True):
-                light.take_status(Status.from_message(message), now, message.sender)
-        elif isinstance(message, Heartbeat) and message.type == MavType.ILLUMINATOR:
+                light.take_status(Status.from_message(message), now, sender_of(message))
+        elif isinstance(message, Heartbeat) and message.type == mavlink.MAV_TYPE_ILLUMINATOR:
             if light := self._discovery.hear(source, now, proved=False):
                 light.heard(now)
         elif isinstance(message, self.mounts.messages):
@@ -157,7 +151,7 @@ class IlluminatorClient(Payload):
 
     def may_send_at_end(self, sent: Command | Message) -> bool:
         """See :meth:`Payload.may_send_at_end`."""
-        return (isinstance(sent, Command) and sent.command == MavCmd.ILLUMINATOR_ON_OFF
+        return (isinstance(sent, Command) and sent.command == mavlink.MAV_CMD_ILLUMINATOR_ON_OFF
                 and sent.params == SWITCHES[False].params)
 
     def close(self, now: float) -> None:

@@ -19,7 +19,7 @@ from __future__ import annotations
 from typing import NamedTuple
 
 from .model import Configuration, DIMMING_FLAGS, flag_names, Status, unexpected_differences
-from ..mavlink.messages import MavCmd
+from ..mavlink.dialect import mavlink
 
 CONFIRMED = 'confirmed by ILLUMINATOR_STATUS'
 
@@ -38,7 +38,7 @@ class Switch(NamedTuple):
 
     on: bool
     note: str = ''
-    command: int = MavCmd.ILLUMINATOR_ON_OFF
+    command: int = mavlink.MAV_CMD_ILLUMINATOR_ON_OFF
 
     @property
     def params(self) -> tuple[float, ...]:
@@ -78,7 +78,7 @@ class Configure(NamedTuple):
     configuration: Configuration
     names: list[str]
     note: str = ''
-    command: int = MavCmd.DO_ILLUMINATOR_CONFIGURE
+    command: int = mavlink.MAV_CMD_DO_ILLUMINATOR_CONFIGURE
 
     @property
     def params(self) -> tuple[float, ...]:

@@ -25,10 +25,11 @@ from .command_sources import LightSources
 from .light_configuration import LightConfiguration
 from .light_switch import LightSwitch, RULES, SwitchRule
 from .messages import STATUS_ID
-from .model import Changes, ErrorFlags, SafetyLimits, Status, StrobeRange
+from .model import Changes, SafetyLimits, Status, StrobeRange
 from .status_tracker import StatusTracker
 from ..mavlink.command_sender import CommandResult, CommandSender, format_seconds
-from ..mavlink.messages import Address, MavCmd
+from ..mavlink.dialect import mavlink
+from ..mavlink.messages import Address
 from ..payload.arbitration import Cause, HolderChanged
 from ..payload.attempt import Done, Result, Target
 from ..payload.command_sources import DEFAULT, SourceSettings
@@ -95,7 +96,7 @@ class _Newest:
         """Return the temperature, degC; None where it is not measured, or the sensor fails."""
         status = self.status
         if (status is None or not self.measures_temperature
-                or status.error_flags & ErrorFlags.THERMISTOR_FAILURE):
+                or status.error_flags & mavlink.ILLUMINATOR_ERROR_FLAGS_THERMISTOR_FAILURE):
             return None
         return status.temperature
 
@@ -325,7 +326,7 @@ class Light:
         interval = self._settings.status_interval
         if interval > 0:
             self._target.send(
-                MavCmd.SET_MESSAGE_INTERVAL, (float(STATUS_ID), interval * 1e6), now)
+                mavlink.MAV_CMD_SET_MESSAGE_INTERVAL, (float(STATUS_ID), interval * 1e6), now)
         self._status_query.begin(now)
         self._identity_query.ask(now)
 

@@ -28,8 +28,9 @@ import math
 from . import events
 from .commands import SWITCHES
 from .light_configuration import LightConfiguration
-from .model import DIMMING_FLAGS, ErrorFlags, Mode, Status
+from .model import DIMMING_FLAGS, Mode, Status
 from ..mavlink.command_sender import format_seconds
+from ..mavlink.dialect import mavlink
 from ..payload.attempt import Change, Done, Result, StatusReport, Target
 from ..payload.last_change import LastChange
 from ..payload.reconciler import decide, Desired, Reconciler, Rule
@@ -457,4 +458,4 @@ class LightSwitch:
 
 
 def _is_hot(status: Status) -> bool:
-    return bool(status.error_flags & ErrorFlags.OVER_TEMPERATURE_SHUTDOWN)
+    return bool(status.error_flags & mavlink.ILLUMINATOR_ERROR_FLAGS_OVER_TEMPERATURE_SHUTDOWN)

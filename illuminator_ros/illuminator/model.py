@@ -22,7 +22,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from enum import IntEnum, IntFlag
+from enum import IntEnum
 from functools import cached_property, lru_cache
 import math
 import reprlib
@@ -30,6 +30,8 @@ import struct
 from typing import Any
 
 from .messages import IlluminatorStatus
+from ..mavlink import dialect
+from ..mavlink.dialect import mavlink
 
 # Values of configuration fields by name, untyped: the mode is a Mode, the others are numbers.
 Changes = Mapping[str, Any]
@@ -47,37 +49,23 @@ FLOAT32_STEP = 1e-6
 SHORTEST_PERIOD = 1e-6
 
 
-class ErrorFlags(IntFlag):
-    """ILLUMINATOR_ERROR_FLAGS."""
-
-    THERMAL_THROTTLING = 1
-    OVER_TEMPERATURE_SHUTDOWN = 2
-    THERMISTOR_FAILURE = 4
-
-
-# The flags under which a light is less bright than it was set. Plain ints: each operation
-# of an IntFlag takes 1 us, and since Python 3.11 its complement has no unknown bits.
-DIMMING_FLAGS = int(ErrorFlags.THERMAL_THROTTLING | ErrorFlags.OVER_TEMPERATURE_SHUTDOWN)
-KNOWN_FLAGS = DIMMING_FLAGS | int(ErrorFlags.THERMISTOR_FAILURE)
+# The flags under which a light is less bright than it was set.
+DIMMING_FLAGS = (mavlink.ILLUMINATOR_ERROR_FLAGS_THERMAL_THROTTLING
+                 | mavlink.ILLUMINATOR_ERROR_FLAGS_OVER_TEMPERATURE_SHUTDOWN)
+KNOWN_FLAGS = DIMMING_FLAGS | mavlink.ILLUMINATOR_ERROR_FLAGS_THERMISTOR_FAILURE
 
 
 def flag_names(flags: int) -> list[str]:
     """Return readable names of error flags; unknown bits as one hexadecimal number."""
-    if not flags:
-        return []
-    names = [flag.name.lower().replace('_', ' ') for flag in ErrorFlags
-             if flag & flags and flag.name]
-    if unknown := flags & ~KNOWN_FLAGS:
-        names.append(f'unknown flags 0x{unknown:x}')
-    return names
+    return dialect.flag_names('ILLUMINATOR_ERROR_FLAGS', flags)
 
 
 class Mode(IntEnum):
     """ILLUMINATOR_MODE."""
 
-    UNKNOWN = 0
-    INTERNAL_CONTROL = 1
-    EXTERNAL_SYNC = 2
+    UNKNOWN = mavlink.ILLUMINATOR_MODE_UNKNOWN
+    INTERNAL_CONTROL = mavlink.ILLUMINATOR_MODE_INTERNAL_CONTROL
+    EXTERNAL_SYNC = mavlink.ILLUMINATOR_MODE_EXTERNAL_SYNC
 
     @cached_property
     def label(self) -> str:
@@ -286,7 +274,7 @@ class Status:
 
     :param uptime_ms: ms since the light started, wrapping at 2**32.
     :param mode_bitmask: as sent; its meaning differs between lights.
-    :param error_flags: as sent; see :class:`ErrorFlags`.
+    :param error_flags: as sent; see :class:`int`.
     :param brightness: %, 0..100.
     :param strobe_period: s, 0..:data:`MAX_STROBE_PERIOD`.
     :param strobe_duty_cycle: %, 0..100.

@@ -16,8 +16,9 @@
 
 from __future__ import annotations
 
-from ..mavlink.messages import Address, MAV_COMP_ID_AUTOPILOT1, Message
-from ..payload.messages import Attitude, GimbalDeviceAttitudeStatus
+from ..mavlink.dialect import mavlink
+from ..mavlink.messages import Address, Message
+from ..payload.messages import Attitude, GimbalDeviceAttitudeStatus, is_finite
 from ..payload.mount_attitude import MountAttitude, YawFrame
 from ..payload.rotation import flip, Quaternion
 
@@ -47,8 +48,8 @@ class MountOrientations:
                 except ValueError:
                     self._mounts[key] = None, now
                 return True
-        elif (isinstance(message, Attitude) and message.is_finite
-                and source.component == MAV_COMP_ID_AUTOPILOT1
+        elif (isinstance(message, Attitude) and is_finite(message)
+                and source.component == mavlink.MAV_COMP_ID_AUTOPILOT1
                 and (source.system in self._vehicles or len(self._vehicles) < MAX_MOUNTS)):
             self._vehicles[source.system] = message, now
         return False

@@ -36,7 +36,8 @@ from .simulated_properties import (
 )
 from .thermal import ThermalModel, ThermalProperties
 from ..mavlink import messages as mav
-from ..mavlink.command_receiver import AnyCommand
+from ..mavlink.dialect import mavlink
+from ..mavlink.messages import AnyCommand, params_of
 from ..payload.faults import Behaviour
 from ..payload.identity import Identity
 from ..payload.simulated import (
@@ -92,7 +93,8 @@ class SimulatedIlluminator(SimulatedDevice):
     :ivar configuration: as commanded.
     """
 
-    changes = frozenset({mav.MavCmd.ILLUMINATOR_ON_OFF, mav.MavCmd.DO_ILLUMINATOR_CONFIGURE})
+    changes = frozenset({mavlink.MAV_CMD_ILLUMINATOR_ON_OFF,
+                         mavlink.MAV_CMD_DO_ILLUMINATOR_CONFIGURE})
     sends = (IlluminatorStatus, mav.ComponentInformationBasic)
     faults = FAULTS
     commands = COMMANDS
@@ -144,7 +146,7 @@ class SimulatedIlluminator(SimulatedDevice):
             brightness = 0.0
         flags = thermal.flags | behaviour.false_flags
         if behaviour.inverted_flags and self.enabled:
-            flags ^= model.ErrorFlags.THERMAL_THROTTLING
+            flags ^= mavlink.ILLUMINATOR_ERROR_FLAGS_THERMAL_THROTTLING
         strobe_range = self.properties.strobe_range if behaviour.measures else model.StrobeRange()
         fields = (
             self.uptime_ms(now) if behaviour.has_clock else 0, int(self.enabled),
@@ -171,14 +173,14 @@ class SimulatedIlluminator(SimulatedDevice):
     def execute(self, source: mav.Address, command: AnyCommand, now: float) -> Reply:
         """See :meth:`SimulatedDevice.execute`."""
         self.warm(now)
-        if command.command == mav.MavCmd.ILLUMINATOR_ON_OFF:
+        if command.command == mavlink.MAV_CMD_ILLUMINATOR_ON_OFF:
             valid = command.param1 in (0.0, 1.0) or self.behaviour.accepts_out_of_range
             on = command.param1 == 1.0 and not (self.behaviour.toggles and self.enabled)
             return CommandReply(
-                mav.MavResult.ACCEPTED if valid else mav.MavResult.DENIED,
+                mavlink.MAV_RESULT_ACCEPTED if valid else mavlink.MAV_RESULT_DENIED,
                 partial(self._switch, on))
-        if command.command == mav.MavCmd.DO_ILLUMINATOR_CONFIGURE:
-            return self._configuration_reply(*command.params[:4])
+        if command.command == mavlink.MAV_CMD_DO_ILLUMINATOR_CONFIGURE:
+            return self._configuration_reply(*params_of(command)[:4])
         return None
 
     def _configuration_reply(
@@ -202,7 +204,7 @@ class SimulatedIlluminator(SimulatedDevice):
             accepted = behaviour.accepts_out_of_range
         else:
             accepted = True
-        return CommandReply(mav.MavResult.ACCEPTED if accepted else mav.MavResult.DENIED,
+        return CommandReply(mavlink.MAV_RESULT_ACCEPTED if accepted else mavlink.MAV_RESULT_DENIED,
                             partial(self._configure, configuration))
 
     def _switch(self, on: bool) -> None:

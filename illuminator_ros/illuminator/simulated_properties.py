@@ -20,11 +20,11 @@ from dataclasses import dataclass
 import functools
 from typing import NamedTuple
 
-from .messages import MAV_COMP_ID_ILLUMINATOR
-from .model import ErrorFlags, Mode, StrobeRange
+from .model import Mode, StrobeRange
 from .thermal import ThermalProperties
 from .. import __version__
 from ..mavlink import messages
+from ..mavlink.dialect import mavlink
 from ..payload.faults import Behaviour, Fault, FaultTable
 from ..payload.faults import FAULTS as COMPONENT_FAULTS
 from ..payload.identity import Identity
@@ -60,7 +60,7 @@ class IlluminatorBehaviour(Behaviour):
     :param thermistor_failed: whether its temperature sensor is broken.
     """
 
-    heartbeat_type: int = messages.MavType.ILLUMINATOR
+    heartbeat_type: int = mavlink.MAV_TYPE_ILLUMINATOR
     has_clock: bool = True
     measures: bool = True
     extension: Extension | None = None
@@ -88,7 +88,8 @@ FAULTS = FaultTable({
     'anything': Fault('accepts_out_of_range', 'accepts values out of range'),
     'toggle': Fault('toggles', 'is switched off by switching it on again'),
     'flags': Fault('false_flags', 'reports error flags without a reason',
-                   'FLAGS', integer(1, 0xFFFFFFFF), int(ErrorFlags.OVER_TEMPERATURE_SHUTDOWN)),
+                   'FLAGS', integer(1, 0xFFFFFFFF),
+                   mavlink.ILLUMINATOR_ERROR_FLAGS_OVER_TEMPERATURE_SHUTDOWN),
     'cold-throttling': Fault('inverted_flags', 'reports THERMAL_THROTTLING while it is on and '
                              'cool, not while it is hot'),
 })
@@ -108,7 +109,7 @@ class IlluminatorProperties:
     :param behaviour: how it behaves at first, and without faults.
     """
 
-    address: messages.Address = messages.Address(1, MAV_COMP_ID_ILLUMINATOR)
+    address: messages.Address = messages.Address(1, mavlink.MAV_COMP_ID_ILLUMINATOR)
     identity: Identity = Identity(
         'illuminator_ros', 'simulator', __version__, '1.0.0', 'SIM-1-243')
     strobe_range: StrobeRange = StrobeRange(0.05, 10.0)
@@ -147,7 +148,7 @@ PROFILES = {
                 'Illuminator Vendor', 'Illuminator Model', 'Illuminator Software Version',
                 'Illuminator Hardware Version', 'Illuminator Serial Number'),
             behaviour=IlluminatorBehaviour(
-                heartbeat_state=messages.MAV_STATE_UNINIT, has_clock=False, fixed_rate=True,
+                heartbeat_state=mavlink.MAV_STATE_UNINIT, has_clock=False, fixed_rate=True,
                 status_on_change=False, terminates=False, filters_target=False,
                 answers_command_int=False, acks_target=False, apply_after=0.005,
                 accepts_nan=True))),
@@ -155,12 +156,12 @@ PROFILES = {
         "a light of ArduSub: the autopilot's component and heartbeat, mode_bitmask 1 << mode, 0 "
         'for what it does not measure, brightness 0 is off',
         IlluminatorProperties(
-            address=messages.Address(1, messages.MAV_COMP_ID_AUTOPILOT1),
+            address=messages.Address(1, mavlink.MAV_COMP_ID_AUTOPILOT1),
             strobe_range=StrobeRange(0.0, 0.0),
             modes=(Mode.INTERNAL_CONTROL,), shifted_bitmask=True,
             behaviour=IlluminatorBehaviour(
-                heartbeat_type=messages.MavType.SUBMARINE,
-                heartbeat_autopilot=messages.MAV_AUTOPILOT_ARDUPILOTMEGA, measures=False,
+                heartbeat_type=mavlink.MAV_TYPE_SUBMARINE,
+                heartbeat_autopilot=mavlink.MAV_AUTOPILOT_ARDUPILOTMEGA, measures=False,
                 identifies=False, brightness_is_switch=True, status_on_change=False,
                 accepts_nan=True))),
     'extended': Profile(

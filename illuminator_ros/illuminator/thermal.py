@@ -19,14 +19,14 @@ from __future__ import annotations
 from dataclasses import dataclass
 import math
 
-from .model import ErrorFlags
+from ..mavlink.dialect import mavlink
 
 # degC; the reading of an open thermistor, which receivers take for "not measured".
 BROKEN_READING = 0.0
 # Plain ints: each operation of an IntFlag takes 1 us.
-_THROTTLING = int(ErrorFlags.THERMAL_THROTTLING)
-_SHUTDOWN = int(ErrorFlags.OVER_TEMPERATURE_SHUTDOWN)
-_FAILURE = int(ErrorFlags.THERMISTOR_FAILURE)
+_THROTTLING = mavlink.ILLUMINATOR_ERROR_FLAGS_THERMAL_THROTTLING
+_SHUTDOWN = mavlink.ILLUMINATOR_ERROR_FLAGS_OVER_TEMPERATURE_SHUTDOWN
+_FAILURE = mavlink.ILLUMINATOR_ERROR_FLAGS_THERMISTOR_FAILURE
 
 
 @dataclass(frozen=True)

@@ -23,25 +23,24 @@ acknowledged again but not executed again. COMMAND_INT has no such field.
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import replace
 import math
 from typing import NamedTuple
 
 from . import messages as mav
+from .dialect import encode, mavlink, replaced
 
 # Commands whose result is remembered, one of each kind from each sender.
 MAX_RESULTS = 256
 # s since the last frame of a command in which a frame with a confirmation above 0 repeats it.
 REPEAT_TIME = 5.0
 
-AnyCommand = mav.CommandLong | mav.CommandInt
 # Executes a command; None if it is not supported.
-Execute = Callable[[mav.Address, AnyCommand, float], mav.MavResult | None]
+Execute = Callable[[mav.Address, mav.AnyCommand, float], int | None]
 
 
 class _Executed(NamedTuple):
     payload: bytes
-    result: mav.MavResult
+    result: int
     at: float
 
 
@@ -57,7 +56,7 @@ class CommandReceiver:
         self._executed: dict[tuple[mav.Address, int], _Executed] = {}
 
     def take(
-        self, source: mav.Address, command: AnyCommand, now: float, execute: Execute,
+        self, source: mav.Address, command: mav.AnyCommand, now: float, execute: Execute,
     ) -> mav.CommandAck | None:
         """
         Take a command and return its acknowledgement.
@@ -72,23 +71,23 @@ class CommandReceiver:
         if result is None:
             if target != self._address:
                 return None
-            result = mav.MavResult.UNSUPPORTED
+            result = mavlink.MAV_RESULT_UNSUPPORTED
         return mav.CommandAck(command.command, result, 0, 0, *source)
 
     def _result(
-        self, source: mav.Address, command: AnyCommand, now: float, execute: Execute,
-    ) -> mav.MavResult | None:
+        self, source: mav.Address, command: mav.AnyCommand, now: float, execute: Execute,
+    ) -> int | None:
         if isinstance(command, mav.CommandInt):
             return execute(source, command, now)
         key = source, command.command
-        payload = replace(command, confirmation=0).encode()
-        last = self._executed.pop(key, _Executed(b'', mav.MavResult.FAILED, -math.inf))
+        payload = encode(replaced(command, confirmation=0))
+        last = self._executed.pop(key, _Executed(b'', mavlink.MAV_RESULT_FAILED, -math.inf))
         if command.confirmation and last.payload == payload and now < last.at + REPEAT_TIME:
-            result: mav.MavResult | None = last.result
+            result: int | None = last.result
         else:
             result = execute(source, command, now)
         # A repeat of a temporarily rejected command must be executed.
-        if result not in (None, mav.MavResult.TEMPORARILY_REJECTED):
+        if result not in (None, mavlink.MAV_RESULT_TEMPORARILY_REJECTED):
             self._executed[key] = _Executed(payload, result, now)
             if len(self._executed) > MAX_RESULTS:
                 del self._executed[next(iter(self._executed))]

@@ -32,7 +32,8 @@ import math
 from typing import NamedTuple
 
 from . import messages
-from .messages import Address, MavResult, Message
+from .dialect import mavlink
+from .messages import Address, Message
 
 # s between two reports of progress. The specification does not define it; MAVSDK also uses 3 s.
 PROGRESS_TIMEOUT = 3.0
@@ -125,7 +126,7 @@ class Command(NamedTuple):
     def key(self) -> Key:
         """Return the kind: commands of one kind wait for each other."""
         # As in MAVSDK: a request for one message must not wait for a request for another.
-        is_request = self.command == messages.MavCmd.REQUEST_MESSAGE and self.params
+        is_request = self.command == mavlink.MAV_CMD_REQUEST_MESSAGE and self.params
         return self.target, self.command, self.params[0] if is_request else 0.0
 
     def message(self, tries: int, as_int: bool) -> Message:
@@ -189,12 +190,12 @@ class CommandResult(NamedTuple):
     @property
     def accepted(self) -> bool:
         """Whether the target acknowledged with MAV_RESULT_ACCEPTED."""
-        return self.status is CommandStatus.ANSWERED and self.result == MavResult.ACCEPTED
+        return self.status is CommandStatus.ANSWERED and self.result == mavlink.MAV_RESULT_ACCEPTED
 
     @property
     def refused(self) -> bool:
         """Whether the target acknowledged with another MAV_RESULT."""
-        return self.status is CommandStatus.ANSWERED and self.result != MavResult.ACCEPTED
+        return self.status is CommandStatus.ANSWERED and self.result != mavlink.MAV_RESULT_ACCEPTED
 
     def may_answer_earlier(self, now: float) -> bool:
         """
@@ -315,13 +316,13 @@ class CommandState(Enum):
 
 # The state after an acknowledgement. Results that are not here end the command.
 TRANSITIONS: dict[tuple[CommandState, int], CommandState] = {
-    (CommandState.SENT, MavResult.IN_PROGRESS): CommandState.IN_PROGRESS,
-    (CommandState.SENT, MavResult.TEMPORARILY_REJECTED): CommandState.BACKOFF,
-    (CommandState.SENT, MavResult.COMMAND_INT_ONLY): CommandState.SENT,
-    (CommandState.BACKOFF, MavResult.IN_PROGRESS): CommandState.IN_PROGRESS,
-    (CommandState.BACKOFF, MavResult.TEMPORARILY_REJECTED): CommandState.BACKOFF,
-    (CommandState.BACKOFF, MavResult.COMMAND_INT_ONLY): CommandState.SENT,
-    (CommandState.IN_PROGRESS, MavResult.IN_PROGRESS): CommandState.IN_PROGRESS,
+    (CommandState.SENT, mavlink.MAV_RESULT_IN_PROGRESS): CommandState.IN_PROGRESS,
+    (CommandState.SENT, mavlink.MAV_RESULT_TEMPORARILY_REJECTED): CommandState.BACKOFF,
+    (CommandState.SENT, mavlink.MAV_RESULT_COMMAND_INT_ONLY): CommandState.SENT,
+    (CommandState.BACKOFF, mavlink.MAV_RESULT_IN_PROGRESS): CommandState.IN_PROGRESS,
+    (CommandState.BACKOFF, mavlink.MAV_RESULT_TEMPORARILY_REJECTED): CommandState.BACKOFF,
+    (CommandState.BACKOFF, mavlink.MAV_RESULT_COMMAND_INT_ONLY): CommandState.SENT,
+    (CommandState.IN_PROGRESS, mavlink.MAV_RESULT_IN_PROGRESS): CommandState.IN_PROGRESS,
 }
 
 
@@ -359,9 +360,9 @@ class _PendingCommand:
         A target rejects a try that arrives while it executes an earlier try or a copy of it. It
         may also refuse another COMMAND_LONG after the COMMAND_INT was sent.
         """
-        if result == MavResult.COMMAND_INT_ONLY:
+        if result == mavlink.MAV_RESULT_COMMAND_INT_ONLY:
             return self.as_int
-        return result == MavResult.TEMPORARILY_REJECTED and (
+        return result == mavlink.MAV_RESULT_TEMPORARILY_REJECTED and (
             self.state is CommandState.IN_PROGRESS or self.rejected == self.tries)
 
 
@@ -433,7 +434,7 @@ class CommandSender:
     def _is_refused(self, sent: Command | Message) -> bool:
         if self._may_send is None:
             return False
-        is_request = isinstance(sent, Command) and sent.command == messages.MavCmd.REQUEST_MESSAGE
+        is_request = isinstance(sent, Command) and sent.command == mavlink.MAV_CMD_REQUEST_MESSAGE
         return not (is_request or self._may_send(sent))
 
     def send(self, message: Message) -> None:

@@ -21,17 +21,17 @@ from collections import deque
 from collections.abc import Callable, Sequence
 import math
 
-from .command_receiver import AnyCommand, CommandReceiver
+from .command_receiver import CommandReceiver
 from .command_sender import Command, CommandSender, CommandStatus
 from .conflating_queue import StreamGroup
+from .dialect import mavlink
 from .frame import Frame
 from .messages import (
     Address,
+    AnyCommand,
     CommandAck,
     Heartbeat,
     heartbeat,
-    MavResult,
-    MavType,
     Message,
 )
 
@@ -118,7 +118,7 @@ class Payload(MessageHandler):
         """Return whether a command or a message may still be sent while the process ends."""
         return False
 
-    def execute(self, source: Address, command: AnyCommand, now: float) -> MavResult | None:
+    def execute(self, source: Address, command: AnyCommand, now: float) -> int | None:
         """
         Execute a command to this component, or to all components, and return its result.
 
@@ -172,7 +172,7 @@ class Component(Endpoint):
 
     def __init__(
         self, commands: CommandSender, payloads: Sequence[Payload], *,
-        mav_type: int = MavType.ONBOARD_CONTROLLER,
+        mav_type: int = mavlink.MAV_TYPE_ONBOARD_CONTROLLER,
     ) -> None:
         self.outgoing = commands.outgoing
         self.commands = commands
@@ -239,7 +239,7 @@ class Component(Endpoint):
             # Ahead of the messages that the command has caused.
             self.outgoing.insert(before, (self.address, ack))
 
-    def _execute(self, source: Address, command: AnyCommand, now: float) -> MavResult | None:
+    def _execute(self, source: Address, command: AnyCommand, now: float) -> int | None:
         return next((result for payload in self._receivers[type(command)]
                      if (result := payload.execute(source, command, now)) is not None), None)
 

@@ -18,6 +18,10 @@ MAVLink frames from and to bytes; no I/O and no clock.
 MAVLink 1 and 2 (MAVLink guide, "Packet Serialization"). A frame is valid only if its checksum is
 right. After anything else the search continues one byte later and never skips the length that a
 bad header claims. So no valid frame is lost, whatever bytes are between valid frames.
+
+Unlike it, pymavlink's parser trusts the length of a bad header: it loses 30 % of the frames
+between 0 to 40 bytes of noise (``bench`` measures both). It accepts frames of unknown messages
+unchecked.
 """
 
 from __future__ import annotations
@@ -30,7 +34,8 @@ from typing import cast, NamedTuple
 
 from fastcrc.crc16 import mcrf4xx
 
-from .messages import Address, LAYOUTS
+from .dialect import CRC_EXTRA, mavlink
+from .messages import Address
 
 STX_V1 = 0xFE
 STX_V2 = 0xFD
@@ -46,6 +51,11 @@ MAX_FRAME = HEADER_V2 + 255 + CHECKSUM + SIGNATURE
 # component id, and message id in two parts.
 _HEADER_V2 = struct.Struct('<BBBBBBBHB').unpack_from
 _START = re.compile(b'[\xfd\xfe]')
+
+
+def _known_size(message_id: int) -> int:
+    cls = mavlink.mavlink_map.get(message_id)
+    return cls.unpacker.size if cls else 255
 
 
 class Frame(NamedTuple):
@@ -122,7 +132,7 @@ class Decoder:
     Decodes checked frames from a stream of bytes, which may come in any pieces.
 
     Keeps at most one incomplete frame (:data:`MAX_FRAME` bytes). Frames with an id that is not
-    in :data:`~.messages.LAYOUTS` cannot be checked and are never returned.
+    in :data:`~.dialect.CRC_EXTRA` cannot be checked and are never returned.
 
     :ivar taken: the bytes taken, which are the position in the stream.
     :ivar rest: the beginning of a frame whose rest is awaited.
@@ -230,8 +240,8 @@ class Decoder:
             stx, length, flags, _, sequence, system, component, low, high = _HEADER_V2(data, start)
             id_ = low | high << 16
             crc_extra = foreign_extra = foreign.get(id_)
-            if crc_extra is None and (layout := LAYOUTS.get(id_)):
-                crc_extra = bytes((layout.crc_extra,))
+            if crc_extra is None and id_ in CRC_EXTRA:
+                crc_extra = bytes((CRC_EXTRA[id_],))
             end = start + HEADER_V2 + length
             if (stx != STX_V2 or flags or crc_extra is None or start + length > last
                     or mcrf4xx(data[start + 1:end] + crc_extra) != data[end] | data[end + 1] << 8):
@@ -267,17 +277,18 @@ class Decoder:
         length, flags = data[start + 1], data[start + 2] if version == 2 else 0
         sequence, system, component = data[at:at + 3]
         message_id = int.from_bytes(data[at + 3:start + header], 'little')
-        layout = LAYOUTS.get(message_id)
+        crc_extra = CRC_EXTRA.get(message_id)
         # "Incompatibility flags": a frame with a flag that is not understood must be dropped.
         # MAVLink 1 has no extensions, so a longer payload than the known one is noise. Waiting for
         # the rest of it would delay the valid frames after it.
-        if layout is None or flags & ~FLAG_SIGNED or version == 1 and length > layout.size:
+        if crc_extra is None or flags & ~FLAG_SIGNED or (
+                version == 1 and length > _known_size(message_id)):
             return 1, None
         end = start + header + length + CHECKSUM
         size = end - start + (SIGNATURE if flags else 0)
         if len(data) < start + size:
             return None
-        body = data[start + 1:end - CHECKSUM] + bytes((layout.crc_extra,))
+        body = data[start + 1:end - CHECKSUM] + bytes((crc_extra,))
         if mcrf4xx(body) != int.from_bytes(data[end - CHECKSUM:end], 'little'):
             self.counters.crc_errors += 1
             return 1, None

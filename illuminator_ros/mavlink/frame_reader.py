@@ -12,7 +12,12 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Authenticated frames from the bytes of many peers; no I/O, and time is passed in."""
+"""
+Authenticated frames from the bytes of many peers; no I/O, and time is passed in.
+
+pymavlink has one parser for all peers of a port, so a piece of a frame from one peer spoils the
+frames of another, and no limit on the wait for the rest of a frame.
+"""
 
 from __future__ import annotations
 
@@ -20,8 +25,8 @@ from collections.abc import Collection
 import math
 from typing import NamedTuple
 
+from .dialect import CRC_EXTRA
 from .frame import Decoder, DecoderCounters, ForeignFrames, Frame
-from .messages import LAYOUTS
 from .signing import Signing
 from .transport import Peer
 
@@ -64,8 +69,7 @@ class FrameReader:
         self._signing_is_off = not signing.signs
         # Making a Frame of each foreign frame takes twice the time on a busy link.
         self._foreign = {} if not self._signing_is_off else {
-            id_: bytes((layout.crc_extra,))
-            for id_, layout in LAYOUTS.items() if id_ not in handled}
+            id_: bytes((crc_extra,)) for id_, crc_extra in CRC_EXTRA.items() if id_ not in handled}
         self._streams: dict[Peer, _Stream] = {}
         self._waits: dict[Peer, _Wait] = {}
 

@@ -19,6 +19,7 @@ from __future__ import annotations
 from collections import deque
 import random
 
+from .dialect import base_size, encode
 from .frame import encode_frame, Frame
 from .messages import Address, Message
 from .signing import Signing, stamp_of
@@ -88,18 +89,18 @@ class FrameWriter:
         :raises ValueError: if MAVLink 1 cannot carry the message.
         :raises struct.error: if a value does not fit into its field.
         """
-        payload = message.encode()
+        payload = encode(message)
         if self._version == 1:
-            payload = payload[:message.base_size]
+            payload = payload[:base_size(type(message))]
         sequence = self.sequences.get(source, -1)
         if sequence < 0:
             # Two programs that were started together with one address can then be distinguished.
             sequence = random.randrange(256)
         frame = encode_frame(
-            message.id, payload, sequence=sequence, source=source, crc_extra=message.crc_extra,
-            signed=self._signs, version=self._version)
+            message.get_msgId(), payload, sequence=sequence, source=source,
+            crc_extra=message.crc_extra, signed=self._signs, version=self._version)
         self.sequences[source] = (sequence + 1) & 0xFF
-        self._loopback.sent(source, sequence, message.id, payload, now)
+        self._loopback.sent(source, sequence, message.get_msgId(), payload, now)
         if self._signs:
             frame = self._signing.sign(frame, unix_time)
             self._loopback.signed(self._signing.timestamp)

@@ -26,6 +26,7 @@ import selectors
 
 from .component import Endpoint
 from .connector import Connector
+from .dialect import decode, line_of
 from .fault_log import FaultLog
 from .frame import MAX_ID_V1
 from .frame_writer import FrameWriter
@@ -71,7 +72,7 @@ class Line:
         wall_clock: Callable[[], float],
     ) -> None:
         classes = dict.fromkeys((*endpoint.messages, *endpoint.sends))
-        if mavlink_version == 1 and (too_high := [c.name for c in classes if c.id > MAX_ID_V1]):
+        if mavlink_version == 1 and (too_high := [c.msgname for c in classes if c.id > MAX_ID_V1]):
             raise ValueError(f'MAVLink 1 cannot carry {", ".join(too_high)}: it has no message '
                              f'ids above {MAX_ID_V1}; use MAVLink 2')
         self.status = LinkStatus(label, clock())
@@ -250,8 +251,8 @@ class Line:
                 continue
             if self._endpoint.inspect is not None:
                 self._faults.call(self._endpoint.inspect, frame, cls)
-            message = cls.decode(frame.payload, sender)
+            message = decode(cls, frame.payload, sender)
             if _frame_log.isEnabledFor(logging.DEBUG):
-                _frame_log.debug('received from %s: %s', frame.source, message,
+                _frame_log.debug('received from %s: %s', frame.source, line_of(message),
                                  extra={'address': frame.source})
             self._faults.call(self._endpoint.receive, frame.source, message, now)

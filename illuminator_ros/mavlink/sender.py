@@ -22,6 +22,7 @@ import math
 import struct
 
 from .conflating_queue import ConflatingQueue, StreamGroup
+from .dialect import line_of
 from .fault_log import FaultLog
 from .frame_writer import FrameWriter
 from .messages import Address, Message, target_of
@@ -107,7 +108,7 @@ class Sender:
                 self._faults.log()
                 continue
             if _frame_log.isEnabledFor(logging.DEBUG):
-                _frame_log.debug('sent from %s: %s', source, message,
+                _frame_log.debug('sent from %s: %s', source, line_of(message),
                                  extra={'address': target_of(message)})
         if frames:
             self._write(channel, frames, peers, now)

@@ -18,6 +18,9 @@ MAVLink 2 message signing, on frames; no I/O, and time is passed in.
 https://mavlink.io/en/guide/message_signing.html. A frame is checked in this order: checksum (by
 the decoder), signature, time stamp. The frame is remembered only after these checks, so a forged
 one changes nothing.
+
+This is not pymavlink's, which remembers the time stamp before it checks the signature: one forged
+frame blocks its stream until the end of the program. The tests compare both.
 """
 
 from __future__ import annotations

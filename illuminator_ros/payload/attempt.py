@@ -30,7 +30,8 @@ import math
 from typing import Generic, NamedTuple, Protocol, TypeVar
 
 from ..mavlink import command_sender
-from ..mavlink.messages import Address, MavCmd, MavResult
+from ..mavlink.dialect import MAV_RESULT_COMMAND_UNSUPPORTED_MAV_FRAME, mavlink
+from ..mavlink.messages import Address
 
 # s from the acknowledgement to the status that shows the change.
 CONFIRMATION_TIMEOUT = 1.0
@@ -48,8 +49,9 @@ UNKNOWN_DELAY = 0.75
 MAX_DELAYS = 8
 
 PERMANENT_RESULTS = frozenset((
-    MavResult.DENIED, MavResult.UNSUPPORTED, MavResult.COMMAND_UNSUPPORTED_MAV_FRAME,
-    MavResult.COMMAND_LONG_ONLY, MavResult.COMMAND_INT_ONLY))
+    mavlink.MAV_RESULT_DENIED, mavlink.MAV_RESULT_UNSUPPORTED,
+    MAV_RESULT_COMMAND_UNSUPPORTED_MAV_FRAME,
+    mavlink.MAV_RESULT_COMMAND_LONG_ONLY, mavlink.MAV_RESULT_COMMAND_INT_ONLY))
 
 S = TypeVar('S')
 S_contra = TypeVar('S_contra', contravariant=True)
@@ -106,7 +108,7 @@ class Target:
         to: Address | None = None,
     ) -> None:
         """Request one message of the device or of another component."""
-        self.send(MavCmd.REQUEST_MESSAGE, (float(message_id),), now, done, to=to)
+        self.send(mavlink.MAV_CMD_REQUEST_MESSAGE, (float(message_id),), now, done, to=to)
 
     def request_status(self, now: float, done: command_sender.Done | None = None) -> None:
         """Request the status; without ``done`` only where no such request is under way."""
@@ -114,7 +116,7 @@ class Target:
             self.request_message(self._status_id, now, done, to=self._status_source)
         elif self._status_request is None:
             self._status_request = command_sender.Command(
-                self._status_source, MavCmd.REQUEST_MESSAGE, (float(self._status_id),))
+                self._status_source, mavlink.MAV_CMD_REQUEST_MESSAGE, (float(self._status_id),))
             self.start(self._status_request, now, self._status_answered)
 
     def cancel_status_request(self, now: float) -> None:

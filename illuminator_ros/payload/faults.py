@@ -30,6 +30,7 @@ from typing import TypeVar
 
 from .simulated_settings import integer, number, Values
 from ..mavlink import messages
+from ..mavlink.dialect import mavlink, short_names
 
 
 @dataclass(frozen=True)
@@ -74,10 +75,10 @@ class Behaviour:
     """
 
     heartbeat_type: int = 0
-    heartbeat_autopilot: int = messages.MAV_AUTOPILOT_INVALID
+    heartbeat_autopilot: int = mavlink.MAV_AUTOPILOT_INVALID
     heartbeat_base_mode: int = 0
     heartbeat_custom_mode: int = 0
-    heartbeat_state: int = messages.MAV_STATE_ACTIVE
+    heartbeat_state: int = mavlink.MAV_STATE_ACTIVE
     heartbeat_interval: float = 1.0
     fixed_rate: bool = False
     endless_stream: bool = False
@@ -97,7 +98,7 @@ class Behaviour:
     ignores_changes: bool = False
     silence: float = 0.0
     reboot_interval: float = 0.0
-    refuse: messages.MavResult | None = None
+    refuse: int | None = None
     rejections: int = 0
     progress: float = 0.0
     slow: float = 0.0
@@ -114,11 +115,12 @@ class FaultError(ValueError):
     """A fault that does not exist, or a value that it cannot have; the message says which."""
 
 
-def _result(text: str) -> messages.MavResult:
+def _result(text: str) -> int:
+    by_name = {name: value for value, name in short_names('MAV_RESULT').items()}
     name = text.upper().removeprefix('MAV_RESULT_')
-    if name not in messages.MavResult.__members__:
+    if name not in by_name:
         raise ValueError(f'{text!r} is not a MAV_RESULT')
-    return messages.MavResult[name]
+    return by_name[name]
 
 
 @dataclass(frozen=True)
@@ -150,7 +152,9 @@ class Fault:
             return ''
         if isinstance(value, str):
             return value
-        return value.name.lower() if isinstance(value, messages.MavResult) else f'{value:.10g}'
+        if self.read is _result and isinstance(value, int):
+            return short_names('MAV_RESULT')[value].lower()
+        return f'{value:.10g}'
 
 
 class FaultTable(dict[str, Fault]):
@@ -225,7 +229,7 @@ FAULTS = FaultTable({
     'reboot': Fault('reboot_interval', 'restarts every S seconds; on the console, '
                     'without S, once', 'S', _seconds, 10.0),
     'refuse': Fault('refuse', 'answers changes with RESULT, such as failed',
-                    'RESULT', _result, messages.MavResult.DENIED),
+                    'RESULT', _result, mavlink.MAV_RESULT_DENIED),
     'progress': Fault('progress', 'reports IN_PROGRESS for S seconds before each change',
                       'S', _seconds, 2.5),
     'busy': Fault('rejections', 'rejects N changes temporarily', 'N', integer(1, 1_000_000), 3),
@@ -241,7 +245,7 @@ FAULTS = FaultTable({
     'heartbeat': Fault('heartbeat_interval', 'sends a heartbeat every S seconds',
                        'S', _seconds, 4.0),
     'type': Fault('heartbeat_type', 'sends a heartbeat of MAV_TYPE N',
-                  'N', _uint8, int(messages.MavType.ONBOARD_CONTROLLER)),
+                  'N', _uint8, mavlink.MAV_TYPE_ONBOARD_CONTROLLER),
     'autopilot': Fault('heartbeat_autopilot', 'sends a heartbeat with MAV_AUTOPILOT N',
                        'N', _uint8, 3),
     'no-int': Fault('answers_command_int', 'does not answer COMMAND_INT', default=False),

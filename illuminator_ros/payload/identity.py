@@ -22,6 +22,7 @@ import math
 
 from .attempt import Target
 from ..mavlink.command_sender import CommandResult
+from ..mavlink.dialect import raw
 from ..mavlink.messages import ComponentInformationBasic
 
 # s from the acknowledgement to the message.
@@ -47,15 +48,15 @@ class Identity:
     @classmethod
     def from_message(cls, message: ComponentInformationBasic) -> Identity:
         """Read a message; a full field has no terminator, and some fields are not printable."""
-        return cls(*map(text, (
-            message.vendor_name, message.model_name, message.software_version,
-            message.hardware_version, message.serial_number)))
+        return cls(*(text(raw(message, field)) for field in (
+            'vendor_name', 'model_name', 'software_version', 'hardware_version',
+            'serial_number')))
 
 
 def text(field: bytes) -> str:
     """Return the printable text of a char field, up to its terminator if it has one."""
-    raw = field.partition(b'\0')[0].decode('utf-8', errors='replace')
-    return ''.join(c if c.isprintable() else '?' for c in raw).strip()
+    shown = field.partition(b'\0')[0].decode('utf-8', errors='replace')
+    return ''.join(c if c.isprintable() else '?' for c in shown).strip()
 
 
 class IdentityQuery:

@@ -23,12 +23,14 @@ and FRD: pitch up and yaw right are positive, and a yaw of 0 is north or ahead.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
-from enum import Enum, IntFlag
+from enum import Enum
 import math
 
 from .messages import GimbalDeviceAttitudeStatus
 from .rotation import enu_flu, flip, flu_frd, ned_frd, Quaternion, Vector
+from ..mavlink.dialect import mavlink
 
 # w, x, y, z of a message.
 Components = tuple[float, float, float, float]
@@ -40,21 +42,6 @@ AXES = ('roll', 'pitch', 'yaw')
 STILL: Vector = (0.0,) * 3
 
 
-class MountFlags(IntFlag):
-    """GIMBAL_DEVICE_FLAGS, and GIMBAL_MANAGER_FLAGS, which has the same values."""
-
-    RETRACT = 1
-    NEUTRAL = 2
-    ROLL_LOCK = 4
-    PITCH_LOCK = 8
-    YAW_LOCK = 16
-    YAW_IN_VEHICLE_FRAME = 32
-    YAW_IN_EARTH_FRAME = 64
-    ACCEPTS_YAW_IN_EARTH_FRAME = 128
-    RC_EXCLUSIVE = 256
-    RC_MIXED = 512
-
-
 class YawFrame(Enum):
     """The direction that a yaw is relative to; roll and pitch are relative to the horizon."""
 
@@ -62,22 +49,21 @@ class YawFrame(Enum):
     VEHICLE = 'vehicle'
 
     @property
-    def flag(self) -> MountFlags:
+    def flag(self) -> int:
         """Return the flag of messages that name the frame."""
         return _FLAGS[self]
 
 
-_FLAGS = {YawFrame.EARTH: MountFlags.YAW_IN_EARTH_FRAME,
-          YawFrame.VEHICLE: MountFlags.YAW_IN_VEHICLE_FRAME}
-# An operation on an IntFlag takes ten times as long as on an int.
-_EARTH_BIT = int(MountFlags.YAW_IN_EARTH_FRAME)
-_VEHICLE_BIT = int(MountFlags.YAW_IN_VEHICLE_FRAME)
-_LOCK_BIT = int(MountFlags.YAW_LOCK)
+_FLAGS = {YawFrame.EARTH: mavlink.GIMBAL_DEVICE_FLAGS_YAW_IN_EARTH_FRAME,
+          YawFrame.VEHICLE: mavlink.GIMBAL_DEVICE_FLAGS_YAW_IN_VEHICLE_FRAME}
+_EARTH_BIT = mavlink.GIMBAL_DEVICE_FLAGS_YAW_IN_EARTH_FRAME
+_VEHICLE_BIT = mavlink.GIMBAL_DEVICE_FLAGS_YAW_IN_VEHICLE_FRAME
+_LOCK_BIT = mavlink.GIMBAL_DEVICE_FLAGS_YAW_LOCK
 
 
 def names_frame(flags: int) -> bool:
     """Return whether flags name a yaw frame; those of old implementations do not."""
-    return bool(int(flags) & (_EARTH_BIT | _VEHICLE_BIT))
+    return bool(flags & (_EARTH_BIT | _VEHICLE_BIT))
 
 
 def yaw_frame(flags: int) -> YawFrame:
@@ -88,16 +74,15 @@ def yaw_frame(flags: int) -> YawFrame:
 
     :raises ValueError: if the flags name both frames.
     """
-    bits = int(flags)
-    earth, vehicle = bits & _EARTH_BIT, bits & _VEHICLE_BIT
+    earth, vehicle = flags & _EARTH_BIT, flags & _VEHICLE_BIT
     if earth and vehicle:
         raise ValueError('the flags name both yaw frames')
-    if not vehicle and (earth or bits & _LOCK_BIT):
+    if not vehicle and (earth or flags & _LOCK_BIT):
         return YawFrame.EARTH
     return YawFrame.VEHICLE
 
 
-def from_mavlink(q: Components, frame: YawFrame) -> Quaternion:
+def from_mavlink(q: Sequence[float], frame: YawFrame) -> Quaternion:
     """
     Return the rotation in ROS of a quaternion in MAVLink.
 

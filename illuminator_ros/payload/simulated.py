@@ -29,10 +29,10 @@ from .faults import Behaviour, FaultInjector, FAULTS, FaultTable
 from .listeners import Listeners
 from .simulated_settings import integer, Setting, Values
 from ..mavlink import messages
-from ..mavlink.command_receiver import AnyCommand
 from ..mavlink.component import Endpoint
 from ..mavlink.deadline_queue import DeadlineQueue
-from ..mavlink.messages import Address, MavResult, Message
+from ..mavlink.dialect import mavlink
+from ..mavlink.messages import Address, AnyCommand, Message
 
 # s; the shortest interval of a stream, which also serves requests for shorter ones.
 SHORTEST_INTERVAL = 0.01
@@ -52,7 +52,7 @@ R_co = TypeVar('R_co', covariant=True)
 class CommandReply(NamedTuple):
     """A device's reply to a command: the result, and the effect of the command."""
 
-    result: MavResult
+    result: int
     effect: Effect | None = None
 
 
@@ -375,7 +375,8 @@ class SimulatedComponent(Generic[D]):
         elif behaviour.rejections or message.command in self._in_progress:
             if behaviour.rejections:
                 self.device.behave(replace(behaviour, rejections=behaviour.rejections - 1), now)
-            self._acknowledge(source, message.command, MavResult.TEMPORARILY_REJECTED, now)
+            self._acknowledge(source, message.command, mavlink.MAV_RESULT_TEMPORARILY_REJECTED,
+                              now)
         elif behaviour.refuse is not None:
             self._acknowledge(source, message.command, behaviour.refuse, now)
         elif behaviour.progress:
@@ -402,7 +403,7 @@ class SimulatedComponent(Generic[D]):
             self._finish(source, message, now)
             return
         self._in_progress.add(message.command)
-        self._acknowledge(source, message.command, MavResult.IN_PROGRESS, now,
+        self._acknowledge(source, message.command, mavlink.MAV_RESULT_IN_PROGRESS, now,
                           int(100 * (now - begun) / duration))
         self._schedule.set(functools.partial(self._progress, source, message, begun),
                            min(now + PROGRESS_INTERVAL, begun + duration))
@@ -410,20 +411,21 @@ class SimulatedComponent(Generic[D]):
     def _finish(self, source: Address, message: AnyCommand, now: float) -> None:
         """Acknowledge a command and execute it."""
         behaviour = self.device.behaviour
-        if message.command == messages.MavCmd.REQUEST_MESSAGE:
+        if message.command == mavlink.MAV_CMD_REQUEST_MESSAGE:
             requested = self._requested(message.param1, now)
-            result = MavResult.ACCEPTED if requested else self._unknown(MavResult.DENIED)
+            result = mavlink.MAV_RESULT_ACCEPTED if requested else self._unknown(
+                mavlink.MAV_RESULT_DENIED)
             self._acknowledge(source, message.command, result, now)
             if requested:
                 self._send(requested, now)
             return
-        if message.command == messages.MavCmd.SET_MESSAGE_INTERVAL:
+        if message.command == mavlink.MAV_CMD_SET_MESSAGE_INTERVAL:
             self._acknowledge(source, message.command, self._set_interval(message, now), now)
             return
         reply = self.device.execute(source, message, now)
         if reply is None:
-            reply = CommandReply(self._unknown(MavResult.UNSUPPORTED))
-        accepted = reply.result == MavResult.ACCEPTED
+            reply = CommandReply(self._unknown(mavlink.MAV_RESULT_UNSUPPORTED))
+        accepted = reply.result == mavlink.MAV_RESULT_ACCEPTED
         self._acknowledge(source, message.command, reply.result, now)
         if reply.effect is None or not (
                 not behaviour.ignores_changes if accepted else behaviour.applies_rejected):
@@ -436,15 +438,15 @@ class SimulatedComponent(Generic[D]):
             return None
         return self.device.message(int(message_id), now) if message_id % 1 == 0 else None
 
-    def _unknown(self, result: MavResult) -> MavResult:
-        return MavResult.ACCEPTED if self.device.behaviour.accepts_unknown else result
+    def _unknown(self, result: int) -> int:
+        return mavlink.MAV_RESULT_ACCEPTED if self.device.behaviour.accepts_unknown else result
 
-    def _set_interval(self, message: AnyCommand, now: float) -> MavResult:
+    def _set_interval(self, message: AnyCommand, now: float) -> int:
         """Execute MAV_CMD_SET_MESSAGE_INTERVAL: param2 in µs, -1 to stop, 0 for the default."""
         behaviour, microseconds = self.device.behaviour, message.param2
         stream = next((one for id_, one in self._streams.items() if id_ == message.param1), None)
         if stream is None or not math.isfinite(microseconds):
-            return MavResult.DENIED
+            return mavlink.MAV_RESULT_DENIED
         default = stream.default or 1.0
         if microseconds == -1:
             stream.set(default if behaviour.endless_stream else 0.0, now)
@@ -453,8 +455,8 @@ class SimulatedComponent(Generic[D]):
         elif microseconds > 0:
             stream.set(max(microseconds / 1e6, SHORTEST_INTERVAL), now)
         else:
-            return MavResult.DENIED
-        return MavResult.ACCEPTED
+            return mavlink.MAV_RESULT_DENIED
+        return mavlink.MAV_RESULT_ACCEPTED
 
     def _send(self, message: Message | None, now: float) -> None:
         if message is None or now < self._silent_until:

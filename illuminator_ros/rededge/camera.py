@@ -25,6 +25,7 @@ from . import messages as rededge
 from .captures import Captures
 from .pings import Done, Pings
 from ..mavlink.command_sender import format_seconds
+from ..mavlink.dialect import mavlink
 from ..mavlink.messages import Address, Message
 
 # Successive PINGs without a reply after which the camera counts as not receiving.
@@ -121,7 +122,7 @@ class Camera:
     @property
     def target(self) -> Address:
         """Return the target of messages to the camera; its system id is 0 until it is heard."""
-        return self._address or Address(0, rededge.MAV_COMP_ID_CAMERA)
+        return self._address or Address(0, mavlink.MAV_COMP_ID_CAMERA)
 
     def snapshot(self, now: float) -> CameraSnapshot:
         """Return the camera at this moment."""

@@ -24,6 +24,7 @@ import math
 from . import messages as rededge
 from .pings import Done
 from ..mavlink.command_sender import format_seconds
+from ..mavlink.dialect import mavlink
 from ..mavlink.messages import Address, Message
 
 # s from DIGICAM_CONTROL to CAMERA_FEEDBACK.
@@ -96,7 +97,7 @@ class Captures:
 
     def take_status(self, message: rededge.CameraStatus, now: float) -> None:
         """Take CAMERA_STATUS, which reports that an image was triggered."""
-        if message.event_id == rededge.CameraStatusType.TRIGGER:
+        if message.event_id == mavlink.CAMERA_STATUS_TYPE_TRIGGER:
             if message.img_idx == self._triggered[0] and self._is_new(message.img_idx):
                 # Each image is triggered once: the camera has restarted and counts from the start.
                 self._triggered = 0, -math.inf
@@ -112,7 +113,7 @@ class Captures:
         self._take_index(message.img_idx, now)
         capture = self._capture
         if (capture is not None and capture.index == message.img_idx
-                and message.flags == rededge.CameraFeedbackFlags.CLOSEDLOOP):
+                and message.flags == mavlink.CAMERA_FEEDBACK_CLOSEDLOOP):
             self._end(True, f'image {capture.index} taken, confirmed after '
                             f'{format_seconds(now - capture.sent_at)}{note}')
 

@@ -30,6 +30,7 @@ from typing import NamedTuple, TypeAlias
 
 from . import conversions
 from . import messages as rededge
+from ..mavlink.dialect import mavlink
 from ..mavlink.messages import Address, Heartbeat, Message, target_of
 from ..payload.checks import component_requirements as component
 from ..payload.checks.requirement import (
@@ -131,7 +132,7 @@ class CameraTester:
         raise Failed(f'no answer to {PING_ATTEMPTS} requests within {PING_TIMEOUT:g} s each')
 
     async def capture(
-        self, shot: int = rededge.Shot.SURVEY, *, component: int = rededge.MAV_COMP_ID_CAMERA,
+        self, shot: int = rededge.Shot.SURVEY, *, component: int = mavlink.MAV_COMP_ID_CAMERA,
         system: int | None = None, timeout: float = FEEDBACK_TIMEOUT,
         state: Callable[[], Sequence[Message]] = tuple,
     ) -> Capture:
@@ -203,7 +204,7 @@ class CameraTester:
         """Return the version of the firmware, None if the camera does not report it."""
         for _ in range(0 if self._asked_version else VERSION_ATTEMPTS):
             self.session.send(rededge.ParamRequestRead(
-                self.session.device.system, rededge.MAV_COMP_ID_CAMERA, rededge.VERSION_PARAMETER,
+                self.session.device.system, mavlink.MAV_COMP_ID_CAMERA, rededge.VERSION_PARAMETER,
                 -1))
             for _, value in await self.session.receive_more(rededge.ParamValue, VERSION_TIMEOUT):
                 self._version = rededge.Firmware.from_value(value) or self._version
@@ -213,7 +214,7 @@ class CameraTester:
         return self._version
 
     async def image(
-        self, shot: int = rededge.Shot.SURVEY, *, component: int = rededge.MAV_COMP_ID_CAMERA,
+        self, shot: int = rededge.Shot.SURVEY, *, component: int = mavlink.MAV_COMP_ID_CAMERA,
         system: int | None = None, state: Callable[[], Sequence[Message]] = tuple,
     ) -> rededge.CameraFeedback:
         """
@@ -251,7 +252,7 @@ class CameraTester:
     def attitude(self, yaw: float, mount_roll: float) -> Sequence[Message]:
         """Return a level attitude with a yaw, and a mount with a roll, degrees."""
         return (Attitude(0, 0.0, 0.0, math.radians(yaw), 0.0, 0.0, 0.0),
-                rededge.MountStatus(self.session.device.system, rededge.MAV_COMP_ID_CAMERA, 0,
+                rededge.MountStatus(self.session.device.system, mavlink.MAV_COMP_ID_CAMERA, 0,
                                     round(mount_roll * 100), 0))
 
     def clock_error(self, feedback: rededge.CameraFeedback) -> float:
@@ -364,8 +365,9 @@ async def capture_status(tester: CameraTester) -> None:
     status = (await tester.first_capture()).status
     if status is None:
         raise Failed('no CAMERA_STATUS')
-    if status.event_id != rededge.CameraStatusType.TRIGGER:
-        raise Failed(f'event_id {status.event_id} instead of {rededge.CameraStatusType.TRIGGER:d}')
+    if status.event_id != mavlink.CAMERA_STATUS_TYPE_TRIGGER:
+        raise Failed(
+            f'event_id {status.event_id} instead of {mavlink.CAMERA_STATUS_TYPE_TRIGGER:d}')
 
 
 @with_captures('capture-feedback', 'confirms an image with CAMERA_FEEDBACK',
@@ -374,7 +376,7 @@ async def capture_feedback(tester: CameraTester) -> str:
     """Command an image, and measure the time."""
     begun = tester.session.now
     feedback = await tester.image()
-    expected = rededge.CameraFeedbackFlags.CLOSEDLOOP
+    expected = mavlink.CAMERA_FEEDBACK_CLOSEDLOOP
     if feedback.flags != expected:
         raise Failed(f'flags {feedback.flags} instead of {expected:d}')
     return f'after {tester.session.now - begun:.1f} s'
@@ -506,7 +508,7 @@ def _documented(one: Requirement[Tester], title: str = '') -> Requirement[Tester
 
 REQUIREMENTS: tuple[Requirement[CameraTester], ...] = (
     _documented(component.heartbeat,
-                f'sends HEARTBEAT from component {rededge.MAV_COMP_ID_CAMERA} '
+                f'sends HEARTBEAT from component {mavlink.MAV_COMP_ID_CAMERA} '
                 '(MAV_COMP_ID_CAMERA)'),
     ping, ping_sequence, ping_once, ping_target, system_id,
     capture_status, capture_feedback, capture_panel, shot_values,
@@ -527,7 +529,7 @@ def describe(message: Message) -> str:
     if isinstance(message, rededge.DigicamControl):
         return f'DIGICAM_CONTROL to {target_of(message)}: shot {message.shot}'
     if isinstance(message, rededge.ParamRequestRead | rededge.ParamValue):
-        return f'{message.name} {message.param_id.rstrip(bytes(1)).decode(errors="replace")}'
+        return f'{message.get_type()} {message.param_id}'
     if isinstance(message, rededge.CameraStatus):
         return f'CAMERA_STATUS image {message.img_idx}, event {message.event_id}'
     if isinstance(message, rededge.CameraFeedback):
@@ -539,8 +541,8 @@ def describe(message: Message) -> str:
 CHECKS: PayloadChecks[CameraTester] = PayloadChecks(
     payload='rededge', device='camera',
     messages=(rededge.Ping, rededge.ParamValue, rededge.CameraStatus, rededge.CameraFeedback),
-    is_device=lambda message: isinstance(message, Heartbeat), component=rededge.MAV_COMP_ID_CAMERA,
-    evidence=f'HEARTBEAT from component {rededge.MAV_COMP_ID_CAMERA}', describe=describe,
+    is_device=lambda message: isinstance(message, Heartbeat), component=mavlink.MAV_COMP_ID_CAMERA,
+    evidence=f'HEARTBEAT from component {mavlink.MAV_COMP_ID_CAMERA}', describe=describe,
     tester=CameraTester, requirements=REQUIREMENTS, mavlink_version=1,
     risk='take images with a false position',
     question='Some checks make camera {device} take about 15 images, most with a false position '

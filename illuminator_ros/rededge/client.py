@@ -25,6 +25,7 @@ from .feeder import Feeder, FeederSnapshot
 from .input_states import FeederSettings, InputChanged
 from ..mavlink.command_sender import CommandSender
 from ..mavlink.component import Payload
+from ..mavlink.dialect import mavlink
 from ..mavlink.messages import Address, Heartbeat, Message
 from ..payload.listeners import Listeners
 from ..payload.messages import Attitude, GlobalPositionInt, SystemTime
@@ -96,7 +97,7 @@ class RedEdgeClient(Payload):
 
     def receive(self, source: Address, message: Message, now: float) -> None:
         """See :meth:`Payload.receive`."""
-        if source.component != rededge.MAV_COMP_ID_CAMERA:
+        if source.component != mavlink.MAV_COMP_ID_CAMERA:
             return
         if isinstance(message, Heartbeat):
             self.camera.take_heartbeat(source, now)

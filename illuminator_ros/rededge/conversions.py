@@ -22,11 +22,11 @@ vehicle, the camera looks straight down with the top of its images ahead.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from enum import Enum
 import math
-from typing import TypeVar
+from typing import cast, TypeVar
 
 from .messages import CameraFeedback, GpsRawInt, GpsStatus, MountStatus
 from ..mavlink.messages import Message
@@ -180,7 +180,7 @@ FIELDS: Mapping[type[Message], Mapping[str, Field]] = {
 
 def _encode(cls: type[M], constants: Mapping[str, object], **values: float) -> M:
     fields = FIELDS[cls]
-    return cls(**constants, **{
+    return cast('Callable[..., M]', cls)(**constants, **{
         name: fields[name].encode(value) for name, value in values.items()})
 
 

@@ -22,18 +22,19 @@ from __future__ import annotations
 
 from collections import deque
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, field, fields, replace
+from dataclasses import dataclass, field, fields
 from enum import Enum
 from functools import partial
 import math
 from typing import Any, Generic, TypeVar
 
 from . import messages as rededge
+from ..mavlink.dialect import mavlink, raw, replaced
 from ..mavlink.messages import Address, Heartbeat, Message, target_of
 from ..payload import simulated
 from ..payload.faults import Behaviour, Fault, FaultTable
 from ..payload.faults import FAULTS as COMPONENT_FAULTS
-from ..payload.messages import Attitude, GeoPoint, GlobalPositionInt, SystemTime
+from ..payload.messages import Attitude, GeoPoint, GlobalPositionInt, is_finite, SystemTime
 from ..payload.rotation import Quaternion
 from ..payload.simulated_settings import geo_point, number, Setting, Values
 
@@ -133,7 +134,7 @@ FAULTS = FaultTable({
 class ExtendedCameraFeedback(rededge.CameraFeedback):
     """CAMERA_FEEDBACK as some libraries send it with MAVLink 1: 47 bytes instead of 45."""
 
-    base_size = rededge.CameraFeedback.full_size
+    mavlink_1_size = rededge.CameraFeedback.unpacker.size
 
 
 @dataclass(frozen=True, slots=True)
@@ -360,7 +361,7 @@ class SimulatedRedEdge(simulated.SimulatedDevice):
         if isinstance(message, rededge.ParamRequestRead):
             firmware = self.behaviour.firmware
             is_known = (firmware >= rededge.PARAMETERS
-                        and message.param_id.rstrip(b'\0') == rededge.VERSION_PARAMETER)
+                        and raw(message, 'param_id').rstrip(b'\0') == rededge.VERSION_PARAMETER)
             return (firmware.value(),) if is_known else ()
         if self.behaviour.injectable:
             self._inject(message, now)
@@ -370,8 +371,8 @@ class SimulatedRedEdge(simulated.SimulatedDevice):
         if any(target_of(ping)):
             return
         target = source if self.behaviour.ping_target else Address(0, 0)
-        yield replace(ping, seq=(ping.seq + self.behaviour.ping_sequence) & 0xFFFFFFFF,
-                      target_system=target.system, target_component=target.component)
+        yield replaced(ping, seq=(ping.seq + self.behaviour.ping_sequence) & 0xFFFFFFFF,
+                       target_system=target.system, target_component=target.component)
 
     def _inject(self, message: Message, now: float) -> None:
         if isinstance(message, rededge.GpsRawInt | GlobalPositionInt):
@@ -380,7 +381,7 @@ class SimulatedRedEdge(simulated.SimulatedDevice):
             self._time = Injected(message.time_usec / 1e6, now)
         elif isinstance(message, SystemTime):
             self._time = Injected(message.time_unix_usec / 1e6, now)
-        elif isinstance(message, Attitude) and message.is_finite:
+        elif isinstance(message, Attitude) and is_finite(message):
             self._attitude = Injected(message, now)
         elif isinstance(message, rededge.MountStatus):
             self._mount = Injected(message, now)
@@ -401,7 +402,7 @@ class SimulatedRedEdge(simulated.SimulatedDevice):
         if behaviour.triggers:
             yield rededge.CameraStatus(
                 _microseconds(image.time_utc_s), source.system, 0, self._index,
-                rededge.CameraStatusType.TRIGGER, 0.0, 0.0, 0.0, 0.0)
+                mavlink.CAMERA_STATUS_TYPE_TRIGGER, 0.0, 0.0, 0.0, 0.0)
 
     # Images
 
@@ -460,7 +461,7 @@ class SimulatedRedEdge(simulated.SimulatedDevice):
             round((image.latitude_deg or 0.0) * 1e7), round((image.longitude_deg or 0.0) * 1e7),
             altitude, altitude - (self._ground or 0.0), image.camera_roll_deg or 0.0,
             image.camera_pitch_deg or 0.0, image.camera_yaw_deg or 0.0, FOCAL_LENGTH,
-            rededge.CameraFeedbackFlags.CLOSEDLOOP)
+            mavlink.CAMERA_FEEDBACK_CLOSEDLOOP)
 
     # Time
 
@@ -526,7 +527,7 @@ def _make(settings: Values, address: Address) -> SimulatedRedEdge:
 
 SIMULATED = simulated.SimulatedType(
     'camera', 'cameras', SimulatedRedEdge, make=_make,
-    address=lambda settings: Address(DEFAULT_SYSTEM_ID, rededge.MAV_COMP_ID_CAMERA),
+    address=lambda settings: Address(DEFAULT_SYSTEM_ID, mavlink.MAV_COMP_ID_CAMERA),
     settings=SETTINGS,
     examples=(
         '--payload rededge --interval 1 --images flight.csv',

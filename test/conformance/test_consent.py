@@ -24,7 +24,7 @@ from illuminator_ros.illuminator.simulated_properties import (
     IlluminatorProperties,
     PROFILES,
 )
-from illuminator_ros.mavlink.messages import MavResult
+from illuminator_ros.mavlink.dialect import mavlink
 from illuminator_ros.payload.checks.requirement import Verdict
 from illuminator_ros.payload.simulated import CommandReply
 import pytest
@@ -60,7 +60,8 @@ def rejecting(
     run.lamp.configuration = configuration
     execute = run.light.device.execute
     run.light.device.execute = (  # type: ignore[method-assign]
-        lambda source, command, now: CommandReply(MavResult.FAILED) if command.command == 406
+        lambda source, command, now: CommandReply(mavlink.MAV_RESULT_FAILED)
+        if command.command == mavlink.MAV_CMD_DO_ILLUMINATOR_CONFIGURE
         else execute(source, command, now))
     seen = run.watch()
     return run.finish(), seen

@@ -16,8 +16,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import replace
+from collections.abc import Callable, Sequence
 import math
 from typing import Any, TypeAlias
 
@@ -25,6 +24,7 @@ from illuminator_ros.gimbal.checks import device, manager
 from illuminator_ros.gimbal.messages import GimbalDeviceSetAttitude
 from illuminator_ros.illuminator.checks import requirements as illuminator
 from illuminator_ros.illuminator.messages import IlluminatorStatus
+from illuminator_ros.mavlink.dialect import mavlink, replaced
 from illuminator_ros.mavlink.messages import Address, Message
 from illuminator_ros.payload.checks.requirement import PayloadChecks, Verdict
 from illuminator_ros.rededge import checks as rededge
@@ -34,7 +34,6 @@ from support.checks_run import ChecksRun
 from support.minimal_devices import (
     IN_EARTH_FRAME,
     IN_VEHICLE_FRAME,
-    MAV_TYPE_CAMERA,
     MinimalCamera,
     MinimalCapturingCamera,
     MinimalDevice,
@@ -141,7 +140,7 @@ class FractionLight(MinimalLight):
 
     def message(self, message_id: int) -> Message:
         status = super().message(message_id)
-        return replace(status, brightness=status.brightness / 100) if isinstance(
+        return replaced(status, brightness=status.brightness / 100) if isinstance(
             status, IlluminatorStatus) else status
 
 
@@ -152,13 +151,13 @@ class ObedientGimbal(MinimalGimbal):
 
 
 class CameraGimbal(MinimalGimbal):
-    mav_type = MAV_TYPE_CAMERA
+    mav_type = mavlink.MAV_TYPE_CAMERA
 
 
 class DegreeRateGimbal(MinimalGimbal):
 
     def obey(self, message: GimbalDeviceSetAttitude) -> None:
-        super().obey(replace(
+        super().obey(replaced(
             message, angular_velocity_y=math.radians(message.angular_velocity_y),
             angular_velocity_z=math.radians(message.angular_velocity_z)))
 
@@ -171,7 +170,7 @@ class ClaimingGimbal(MinimalGimbal):
 
 class ConjugatedCommandGimbal(MinimalGimbal):
 
-    def commanded(self, q: Q) -> tuple[float, float]:
+    def commanded(self, q: Sequence[float]) -> tuple[float, float]:
         w, x, y, z = q
         return super().commanded((w, -x, -y, -z))
 
@@ -228,7 +227,7 @@ class StaleCamera(MinimalCamera):
     """Answers PING with the sequence number before."""
 
     def send(self, message: Message) -> None:
-        super().send(replace(message, seq=message.seq - 1) if isinstance(
+        super().send(replaced(message, seq=message.seq - 1) if isinstance(
             message, Ping) and message.seq else message)
 
 

@@ -21,7 +21,7 @@ from types import ModuleType
 
 from illuminator_ros.mavlink import command_sender as command
 from illuminator_ros.mavlink import link_state
-from illuminator_ros.mavlink.messages import MavResult
+from illuminator_ros.mavlink.dialect import short_names
 from illuminator_ros.payload import attempt
 import pytest
 from support.tables import table
@@ -61,7 +61,7 @@ def test_a_diagram_has_the_transitions_of_the_table(module: ModuleType, first: s
     transitions = module.TRANSITIONS.items()
 
     assert sorted(drawn) == sorted(
-        (state.name, MavResult(by).name if isinstance(by, int) else by.name, after.name)
+        (state.name, short_names('MAV_RESULT')[by] if isinstance(by, int) else by.name, after.name)
         for (state, by), after in transitions if after.name != 'STOPPED')
 
 

@@ -48,7 +48,7 @@ def test_the_requirements_on_the_camera_are_numbered_without_a_gap() -> None:
 
 def test_the_page_of_the_camera_has_the_table_of_fields() -> None:
     assert table(REDEDGE, 'message') == [
-        [cls.name, f'`{name}`', field.source, field.unit,
+        [cls.msgname, f'`{name}`', field.source, field.unit,
          '' if field.scale is None else f'{field.scale:g}',
          f'{field.low:.10g} to {field.high:.10g}',
          '' if field.unknown is None else str(field.unknown)]

@@ -15,7 +15,6 @@
 """The pages about the ROS interface, compared with the bridge."""
 
 from collections.abc import Sequence
-import dataclasses
 import re
 from typing import Any
 
@@ -26,10 +25,10 @@ from illuminator_ros.cli.monitor.run import parser
 from illuminator_ros.gimbal.ros.gimbals import GIMBAL_PARAMETERS
 from illuminator_ros.gimbal.ros.manager_node import MANAGER_PARAMETERS
 from illuminator_ros.illuminator.messages import IlluminatorStatus
-from illuminator_ros.illuminator.model import ErrorFlags
 from illuminator_ros.illuminator.ros.diagnostics import FLAG_LEVELS
 from illuminator_ros.illuminator.ros.parameters import DEVICE_PARAMETERS, LIGHT_PARAMETERS
-from illuminator_ros.mavlink.messages import CommandAck, ComponentInformationBasic, MavCmd
+from illuminator_ros.mavlink.dialect import entry_names, mavlink, short_names
+from illuminator_ros.mavlink.messages import CommandAck, ComponentInformationBasic
 from illuminator_ros.rededge.ros import camera_node as camera
 from illuminator_ros.ros.parameters import LINK_PARAMETERS as SHARED_PARAMETERS
 from illuminator_ros.ros.parameters import ParameterSpec
@@ -128,7 +127,7 @@ def test_the_readme_has_the_executables() -> None:
 
 
 @pytest.mark.parametrize('message', [CommandAck, IlluminatorStatus, ComponentInformationBasic],
-                         ids=lambda message: message.name)
+                         ids=lambda message: message.msgname)
 def test_the_protocol_page_has_each_field_of_a_message(message: Any) -> None:
     fields: dict[str, set[str]] = {}
     name = ''
@@ -136,16 +135,18 @@ def test_the_protocol_page_has_each_field_of_a_message(message: Any) -> None:
         name = cells[0] or name
         fields.setdefault(name, set()).update(re.findall('`([^`]+)`', cells[1]))
 
-    assert fields[message.name] == {field.name for field in dataclasses.fields(message)}
+    assert fields[message.msgname] == {*message.fieldnames}
 
 
 def test_the_protocol_page_has_each_command_and_error_flag() -> None:
     assert {cells[0] for cells in table(PROTOCOL, 'command')} == {
-        f'MAV_CMD_{command.name} ({command.value})' for command in MavCmd}
+        f'{entry_names("MAV_CMD")[command]} ({command})' for command in (
+            mavlink.MAV_CMD_ILLUMINATOR_ON_OFF, mavlink.MAV_CMD_DO_ILLUMINATOR_CONFIGURE,
+            mavlink.MAV_CMD_SET_MESSAGE_INTERVAL, mavlink.MAV_CMD_REQUEST_MESSAGE)}
     rows = {cells[0]: cells[1:] for cells in table(PROTOCOL, 'ILLUMINATOR_ERROR_FLAGS')}
-    for flag in ErrorFlags:
+    for flag, name in short_names('ILLUMINATOR_ERROR_FLAGS').items():
         level, text = FLAG_LEVELS[flag]
-        assert rows[f'{flag.name} ({flag.value})'] == [LEVELS[level], text]
+        assert rows[f'{name} ({flag})'] == [LEVELS[level], text]
 
 
 def test_the_monitor_page_has_the_keys_states_and_limits_of_the_code() -> None:

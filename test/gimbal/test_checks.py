@@ -17,7 +17,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import replace
 import math
 from typing import Any
 
@@ -25,18 +24,15 @@ from illuminator_ros.gimbal import messages as gimbal
 from illuminator_ros.gimbal import simulated_device, simulated_manager
 from illuminator_ros.gimbal.checks import device, manager
 from illuminator_ros.gimbal.manager_setpoint import Demand
-from illuminator_ros.gimbal.messages import GimbalCommand
+from illuminator_ros.mavlink.dialect import mavlink, replaced
 from illuminator_ros.mavlink.messages import (
     Address,
     CommandAck,
     CommandInt,
     CommandLong,
-    MavCmd,
-    MavResult,
 )
 from illuminator_ros.payload.checks.requirement import PayloadChecks, Verdict
 from illuminator_ros.payload.messages import GimbalDeviceAttitudeStatus as AttitudeStatus
-from illuminator_ros.payload.mount_attitude import MountFlags
 from illuminator_ros.payload.simulated import (
     CommandReply,
     Description,
@@ -173,7 +169,7 @@ def _changed(cls: type[Any], **fields: Any) -> Callable[[ChecksRun], None]:
 
         def message(message_id: int, now: float) -> Any:
             found = original(message_id, now)
-            return replace(found, **fields) if isinstance(found, cls) else found
+            return replaced(found, **fields) if isinstance(found, cls) else found
         one.device.message = message
     return seed
 
@@ -192,9 +188,9 @@ def _forgets_at_minus_1(one: ChecksRun) -> None:
     original = one.device.execute
 
     def execute(source: Address, command: Any, now: float) -> Any:
-        unchanged = command.command == GimbalCommand.DO_GIMBAL_MANAGER_CONFIGURE and (
+        unchanged = command.command == mavlink.MAV_CMD_DO_GIMBAL_MANAGER_CONFIGURE and (
             command.param1 == command.param3 == -1)
-        return original(source, replace(
+        return original(source, replaced(
             command, param1=0.0, param2=0.0) if unchanged else command, now)
     one.device.execute = execute
 
@@ -204,8 +200,8 @@ def _accepts_what_it_ignores(one: ChecksRun) -> None:
 
     def execute(source: Address, command: Any, now: float) -> Any:
         reply = original(source, command, now)
-        denied = reply is not None and reply.result == MavResult.DENIED
-        return CommandReply(MavResult.ACCEPTED) if denied else reply
+        denied = reply is not None and reply.result == mavlink.MAV_RESULT_DENIED
+        return CommandReply(mavlink.MAV_RESULT_ACCEPTED) if denied else reply
     one.device.execute = execute
 
 
@@ -215,7 +211,7 @@ def _answers_requests(cls: type[Any], *answers: CommandAck) -> Callable[[ChecksR
         original = one.component.receive
 
         def receive(source: Address, message: Any, now: float) -> None:
-            if isinstance(message, cls) and message.command == MavCmd.REQUEST_MESSAGE:
+            if isinstance(message, cls) and message.command == mavlink.MAV_CMD_REQUEST_MESSAGE:
                 one.component.outgoing.extend((one.component.address, ack) for ack in answers)
             else:
                 original(source, message, now)
@@ -229,7 +225,7 @@ def _turns_with_the_vehicle(one: ChecksRun) -> None:
 
     def turned(demand: Demand, *others: Any) -> None:
         original(demand._replace(angles=(0.0, -0.26, 0.5)) if (
-            demand.flags & MountFlags.YAW_LOCK) else demand, *others)
+            demand.flags & mavlink.GIMBAL_DEVICE_FLAGS_YAW_LOCK) else demand, *others)
     mount.obey = turned
 
 
@@ -241,8 +237,9 @@ def _silent_at(param: float) -> Callable[[ChecksRun], None]:
     return seed
 
 
-ACCEPTED = CommandAck(MavCmd.REQUEST_MESSAGE, MavResult.ACCEPTED)
-BOTH_FRAMES = MountFlags.YAW_IN_VEHICLE_FRAME | MountFlags.YAW_IN_EARTH_FRAME
+ACCEPTED = CommandAck(mavlink.MAV_CMD_REQUEST_MESSAGE, mavlink.MAV_RESULT_ACCEPTED)
+BOTH_FRAMES = (mavlink.GIMBAL_DEVICE_FLAGS_YAW_IN_VEHICLE_FRAME
+               | mavlink.GIMBAL_DEVICE_FLAGS_YAW_IN_EARTH_FRAME)
 INFORMATION, STATUS = gimbal.GimbalDeviceInformation, gimbal.GimbalManagerStatus
 DEVIATIONS = {
     ('gimbal', 'device-id'): _changed(INFORMATION, gimbal_device_id=3),
@@ -322,7 +319,7 @@ def test_control_is_given_back_to_the_player_that_had_it() -> None:
     one = run('gimbal_manager')
     player = Address(1, 195)
     one.component.receive(player, CommandLong(
-        1, 154, GimbalCommand.DO_GIMBAL_MANAGER_CONFIGURE, 0, *player, *player, 0, 0, 0),
+        1, 154, mavlink.MAV_CMD_DO_GIMBAL_MANAGER_CONFIGURE, 0, *player, *player, 0, 0, 0),
         one.link.now)
     one.finish()
     assert one.failed == set()
@@ -343,7 +340,8 @@ def test_a_gimbal_that_cannot_be_turned_back_is_reported_with_its_former_pose() 
 @every_kind
 def test_the_gimbal_keeps_its_yaw_lock(kind: str) -> None:
     one = run(kind, drift=0.0)
-    motion, lock = one.device.mount.motion, MountFlags.YAW_LOCK | MountFlags.PITCH_LOCK
+    motion, lock = (one.device.mount.motion, mavlink.GIMBAL_DEVICE_FLAGS_YAW_LOCK
+                    | mavlink.GIMBAL_DEVICE_FLAGS_PITCH_LOCK)
     motion.obey(Demand(lock, angles=(0.0, -0.2, 0.1)), one.link.now)
     one.finish()
     assert motion.flags == lock

@@ -19,7 +19,8 @@ from __future__ import annotations
 from illuminator_ros.gimbal import client as limits
 from illuminator_ros.gimbal import events
 from illuminator_ros.gimbal.events import GimbalKey
-from illuminator_ros.mavlink.messages import Address, CommandLong, heartbeat, MavCmd, MavResult
+from illuminator_ros.mavlink.dialect import mavlink
+from illuminator_ros.mavlink.messages import Address, CommandLong, heartbeat
 import pytest
 from support.entries import entries
 from support.gimbals import AUTOPILOT, DEVICE, FakeManager, keys, NAN, OTHER, Rig
@@ -30,7 +31,7 @@ INFORMATION, DEVICE_INFORMATION = 280, 283
 def requests(rig: Rig, message_id: int = INFORMATION) -> list[tuple[float, Address]]:
     """Return when a message was requested, and of which component."""
     return [(at, Address(one.target_system, one.target_component)) for at, one in rig.sent
-            if isinstance(one, CommandLong) and one.command == MavCmd.REQUEST_MESSAGE
+            if isinstance(one, CommandLong) and one.command == mavlink.MAV_CMD_REQUEST_MESSAGE
             and one.param1 == message_id]
 
 
@@ -108,7 +109,7 @@ def test_gm_27_manager_that_tells_no_information_is_known_by_its_status() -> Non
     assert 3 <= len(requests(rig)) <= 15
 
 
-@pytest.mark.parametrize('answer', [MavResult.UNSUPPORTED, None])
+@pytest.mark.parametrize('answer', [mavlink.MAV_RESULT_UNSUPPORTED, None])
 def test_gm_27_hundred_components_are_asked_one_after_the_other(answer: int | None) -> None:
     rig = Rig()
     others = [Address(1, number) for number in range(30, 130)]
@@ -235,6 +236,6 @@ def test_attitude_interval_is_set_once_at_the_device() -> None:
     rig = Rig(FakeManager(), attitude_interval=0.05).run(20.0)
 
     intervals = [one for one in rig.messages(CommandLong)
-                 if one.command == MavCmd.SET_MESSAGE_INTERVAL]
+                 if one.command == mavlink.MAV_CMD_SET_MESSAGE_INTERVAL]
     assert [(one.target_component, one.param1, one.param2) for one in intervals] == [
         (154, 285, 50_000)]

@@ -23,19 +23,19 @@ from illuminator_ros.gimbal.commands import Control
 from illuminator_ros.gimbal.events import AutomaticTakeFailed, ControlChanged, GimbalKey
 from illuminator_ros.gimbal.gimbal import Gimbal, REPEATS
 from illuminator_ros.gimbal.messages import (
-    Capabilities,
-    GimbalCommand,
+    DEVICE_ID_PARAM,
     GimbalManagerSetAttitude,
     GimbalManagerStatus,
 )
 from illuminator_ros.mavlink import messages as mav
-from illuminator_ros.payload.mount_attitude import MountFlags, YawFrame
+from illuminator_ros.mavlink.dialect import mavlink, short_names
+from illuminator_ros.payload.mount_attitude import YawFrame
 from illuminator_ros.payload.request import Done
 from illuminator_ros.payload.rotation import Quaternion
 import pytest
 from support.gimbals import ALL, AUTOPILOT, DEVICE, FakeManager, in_control, OTHER, OURS, Rig
 
-CONFIGURE = GimbalCommand.DO_GIMBAL_MANAGER_CONFIGURE
+CONFIGURE = mavlink.MAV_CMD_DO_GIMBAL_MANAGER_CONFIGURE
 NONE = mav.Address(0, 0)
 Ask = Callable[[Gimbal, float, Done], None]
 
@@ -74,7 +74,7 @@ def test_gm_16_control_is_taken_and_released_as_the_status_shows(secondary: mav.
 
 
 @pytest.mark.parametrize(('fields', 'text'), [
-    ({'results': {CONFIGURE: mav.MavResult.DENIED}},
+    ({'results': {CONFIGURE: mavlink.MAV_RESULT_DENIED}},
      'manager 1/1 refused "take control": MAV_RESULT_DENIED (1 try, 0 ms); '
      '1/195 has control and must release it first'),
     ({'applies': False}, 'but GIMBAL_MANAGER_STATUS shows primary 1/195, secondary none'),
@@ -96,7 +96,7 @@ def test_a_refusal_that_may_answer_another_request_is_not_reported_as_a_refusal(
     rig = Rig(FakeManager(primary=OTHER, secondary=OURS, answers=False)).run(3.0)
     assert not asked(rig, Gimbal.take_control, 5.0)[0]
     rig.managers[0].answers = True
-    rig.managers[0].results[CONFIGURE] = mav.MavResult.DENIED
+    rig.managers[0].results[CONFIGURE] = mavlink.MAV_RESULT_DENIED
 
     success, message = asked(rig, Gimbal.release_control)
 
@@ -114,7 +114,8 @@ def test_release_without_control_sends_nothing() -> None:
 
 
 def test_temporary_refusal_is_not_explained_by_the_component_that_has_control() -> None:
-    manager = FakeManager(primary=OTHER, results={CONFIGURE: mav.MavResult.TEMPORARILY_REJECTED})
+    manager = FakeManager(primary=OTHER,
+                          results={CONFIGURE: mavlink.MAV_RESULT_TEMPORARILY_REJECTED})
     rig = Rig(manager).run(3.0)
 
     assert asked(rig, Gimbal.take_control)[1].endswith(
@@ -141,7 +142,7 @@ def test_gm_16_control_that_an_earlier_status_showed_is_asked_of_the_manager_aga
     rig = in_control()
     if is_restarted:
         # It rejects commands while it listens for other managers, and sends no status.
-        rig.managers[0].results[CONFIGURE] = mav.MavResult.TEMPORARILY_REJECTED
+        rig.managers[0].results[CONFIGURE] = mavlink.MAV_RESULT_TEMPORARILY_REJECTED
         rig.managers[0].reports = False
 
     assert asked(rig, Gimbal.take_control)[0] is not is_restarted
@@ -216,7 +217,7 @@ def test_gm_14_status_counts_unless_it_is_late(before: int, after: int, counts: 
 
 def status_requests(rig: Rig) -> int:
     return sum(one[0] == GimbalManagerStatus.id
-               for one in commands(rig, mav.MavCmd.REQUEST_MESSAGE))
+               for one in commands(rig, mavlink.MAV_CMD_REQUEST_MESSAGE))
 
 
 def test_gm_14_control_is_not_known_without_a_status_though_the_manager_is_heard() -> None:
@@ -288,7 +289,7 @@ def test_control_is_taken_automatically_only_where_no_component_has_it(
 
 
 def test_automatic_take_that_fails_is_told() -> None:
-    manager = FakeManager(results={CONFIGURE: mav.MavResult.DENIED})
+    manager = FakeManager(results={CONFIGURE: mavlink.MAV_RESULT_DENIED})
     rig = Rig(manager, auto_take_control=True).run(5.0)
 
     assert [event.message for event in rig.all_of(AutomaticTakeFailed)] == [
@@ -297,7 +298,7 @@ def test_automatic_take_that_fails_is_told() -> None:
 
 
 def test_gm_19_ardupilot_is_not_taken_for_a_manager_that_enforces_control() -> None:
-    rig = Rig(FakeManager(autopilot=mav.MAV_AUTOPILOT_ARDUPILOTMEGA)).run(3.0)
+    rig = Rig(FakeManager(autopilot=mavlink.MAV_AUTOPILOT_ARDUPILOTMEGA)).run(3.0)
 
     success, message = asked(rig, Gimbal.take_control)
 
@@ -307,35 +308,38 @@ def test_gm_19_ardupilot_is_not_taken_for_a_manager_that_enforces_control() -> N
     assert in_control().gimbal.snapshot(0.0).enforces_control
 
 
-FLAG_REQUESTS: list[tuple[Ask, MountFlags, bool, Capabilities]] = [
-    (Gimbal.set_neutral, MountFlags.NEUTRAL, True, Capabilities.HAS_NEUTRAL),
-    (Gimbal.retract, MountFlags.RETRACT, True, Capabilities.HAS_RETRACT),
-    (lambda gimbal, now, done: gimbal.set_yaw_lock(True, now, done), MountFlags.YAW_LOCK, True,
-     Capabilities.HAS_YAW_LOCK),
-    (lambda gimbal, now, done: gimbal.set_yaw_lock(False, now, done), MountFlags.YAW_LOCK,
-     False, Capabilities(0))]
+FLAG_REQUESTS: list[tuple[Ask, int, bool, int]] = [
+    (Gimbal.set_neutral, mavlink.GIMBAL_DEVICE_FLAGS_NEUTRAL, True,
+     mavlink.GIMBAL_DEVICE_CAP_FLAGS_HAS_NEUTRAL),
+    (Gimbal.retract, mavlink.GIMBAL_DEVICE_FLAGS_RETRACT, True,
+     mavlink.GIMBAL_DEVICE_CAP_FLAGS_HAS_RETRACT),
+    (lambda gimbal, now, done: gimbal.set_yaw_lock(True, now, done),
+     mavlink.GIMBAL_DEVICE_FLAGS_YAW_LOCK, True, mavlink.GIMBAL_DEVICE_CAP_FLAGS_HAS_YAW_LOCK),
+    (lambda gimbal, now, done: gimbal.set_yaw_lock(False, now, done),
+     mavlink.GIMBAL_DEVICE_FLAGS_YAW_LOCK, False, 0)]
 
 
 @pytest.mark.parametrize(('ask', 'flag', 'on', 'needed'), FLAG_REQUESTS)
 def test_gm_3_flag_is_set_by_command_and_shown_by_the_device(
-        ask: Ask, flag: MountFlags, on: bool, needed: Capabilities) -> None:
+        ask: Ask, flag: int, on: bool, needed: int) -> None:
     rig = in_control()
-    rig.managers[0].flags = MountFlags(0) if on else flag
+    rig.managers[0].flags = 0 if on else flag
     rig.run(1.0)
 
     success, message = asked(rig, ask)
 
     assert success, message
     ((p1, p2, p3, p4, flags, p6, device_id),) = commands(
-        rig, GimbalCommand.DO_GIMBAL_MANAGER_PITCHYAW)
+        rig, mavlink.MAV_CMD_DO_GIMBAL_MANAGER_PITCHYAW)
     # Angles and rates are left as they are, and the yaw frame is named.
     assert all(map(math.isnan, (p1, p2, p3, p4)))
     assert (p6, device_id) == (0, 154)
-    frame = (MountFlags.YAW_IN_EARTH_FRAME if int(flags) & MountFlags.YAW_LOCK else
-             MountFlags.YAW_IN_VEHICLE_FRAME)
+    frame = (mavlink.GIMBAL_DEVICE_FLAGS_YAW_IN_EARTH_FRAME if int(flags)
+             & mavlink.GIMBAL_DEVICE_FLAGS_YAW_LOCK else
+             mavlink.GIMBAL_DEVICE_FLAGS_YAW_IN_VEHICLE_FRAME)
     assert int(flags) & frame
     rig.managers[0].applies = False
-    rig.managers[0].flags = MountFlags(0) if on else flag
+    rig.managers[0].flags = 0 if on else flag
     rig.run(1.0)
     success, message = asked(rig, ask)
     assert not success
@@ -356,11 +360,12 @@ def test_flag_that_no_status_shows_is_not_a_success(ask: Ask) -> None:
 @pytest.mark.parametrize(('ask', 'needed'), [
     (ask, needed) for ask, _, _, needed in FLAG_REQUESTS if needed])
 def test_gm_3_request_for_what_the_gimbal_lacks_is_refused(
-        ask: Ask, needed: Capabilities) -> None:
+        ask: Ask, needed: int) -> None:
     rig = Rig(FakeManager(primary=OURS, capabilities=ALL & ~needed)).run(3.0)
 
-    assert asked(rig, ask) == (False, f'gimbal 1/154 does not have {needed.name}')
-    assert commands(rig, GimbalCommand.DO_GIMBAL_MANAGER_PITCHYAW) == []
+    assert asked(rig, ask) == (
+        False, f'gimbal 1/154 does not have {short_names("GIMBAL_DEVICE_CAP_FLAGS")[needed]}')
+    assert commands(rig, mavlink.MAV_CMD_DO_GIMBAL_MANAGER_PITCHYAW) == []
 
 
 def test_gm_8_place_to_point_at_is_sent_with_full_precision_above_sea_level() -> None:
@@ -375,7 +380,7 @@ def test_gm_8_place_to_point_at_is_sent_with_full_precision_above_sea_level() ->
     assert (sent.command, sent.frame, sent.param1, sent.x, sent.y, sent.z) == (
         195, 0, 154, 473977419, 85455938, 488.5)
     assert asked(rig, Gimbal.clear_roi)[0]
-    assert commands(rig, GimbalCommand.DO_SET_ROI_NONE) == [(154, 0, 0, 0, 0, 0, 0)]
+    assert commands(rig, mavlink.MAV_CMD_DO_SET_ROI_NONE) == [(154, 0, 0, 0, 0, 0, 0)]
 
 
 def set_roi(gimbal: Gimbal, now: float, done: Done) -> None:
@@ -402,13 +407,13 @@ def test_gm_8_place_without_an_answer_is_not_sent_again_after_a_later_setpoint_o
 
 
 @pytest.mark.parametrize(('ask', 'command', 'wish'), [
-    (FLAG_REQUESTS[2][0], GimbalCommand.DO_GIMBAL_MANAGER_PITCHYAW, 'lock yaw'),
-    (set_roi, GimbalCommand.DO_SET_ROI_LOCATION, 'point at 47, 8.5, 500 m'),
-    (Gimbal.clear_roi, GimbalCommand.DO_SET_ROI_NONE, 'point at no place')])
+    (FLAG_REQUESTS[2][0], mavlink.MAV_CMD_DO_GIMBAL_MANAGER_PITCHYAW, 'lock yaw'),
+    (set_roi, mavlink.MAV_CMD_DO_SET_ROI_LOCATION, 'point at 47, 8.5, 500 m'),
+    (Gimbal.clear_roi, mavlink.MAV_CMD_DO_SET_ROI_NONE, 'point at no place')])
 def test_refusal_names_the_request_the_manager_and_who_has_control(
         ask: Ask, command: int, wish: str) -> None:
     rig = in_control()
-    rig.managers[0].results[command] = mav.MavResult.DENIED
+    rig.managers[0].results[command] = mavlink.MAV_RESULT_DENIED
 
     refusal = f'manager 1/1 refused "{wish}": MAV_RESULT_DENIED (1 try, 0 ms); '
     assert asked(rig, ask) == (
@@ -428,26 +433,26 @@ def test_refusal_names_the_request_the_manager_and_who_has_control(
     assert rig.results[0].message.endswith('; 1/195 has control and must release it first')
 
 
-@pytest.mark.parametrize('result', [mav.MavResult.ACCEPTED, mav.MavResult.DENIED])
+@pytest.mark.parametrize('result', [mavlink.MAV_RESULT_ACCEPTED, mavlink.MAV_RESULT_DENIED])
 @pytest.mark.parametrize('ask', [*(ask for ask, *_ in FLAG_REQUESTS), Gimbal.clear_roi, set_roi])
-def test_request_during_a_rate_ends_it_with_a_zero(ask: Ask, result: mav.MavResult) -> None:
+def test_request_during_a_rate_ends_it_with_a_zero(ask: Ask, result: int) -> None:
     rig = in_control()
-    rig.managers[0].results = dict.fromkeys(GimbalCommand, result)
+    rig.managers[0].results = dict.fromkeys(DEVICE_ID_PARAM, result)
     rig.gimbal.set_rates((0.0, 0.2, 0.0), rig.now)
     rig.run(0.1)
 
-    assert asked(rig, ask)[0] is (result is mav.MavResult.ACCEPTED)
+    assert asked(rig, ask)[0] is (result == mavlink.MAV_RESULT_ACCEPTED)
 
     assert [one.angular_velocity_y for one in rig.messages(GimbalManagerSetAttitude)] == [-0.2, 0]
 
 
 @pytest.mark.parametrize(('result', 'zeros'), [
-    (mav.MavResult.ACCEPTED, 1), (mav.MavResult.DENIED, 1 + len(REPEATS))])
+    (mavlink.MAV_RESULT_ACCEPTED, 1), (mavlink.MAV_RESULT_DENIED, 1 + len(REPEATS))])
 @pytest.mark.parametrize('ask', [*(ask for ask, *_ in FLAG_REQUESTS), Gimbal.clear_roi, set_roi])
 def test_zero_before_a_request_is_sent_again_only_if_the_request_fails(
-        ask: Ask, result: mav.MavResult, zeros: int) -> None:
+        ask: Ask, result: int, zeros: int) -> None:
     rig = in_control()
-    rig.managers[0].results = dict.fromkeys(GimbalCommand, result)
+    rig.managers[0].results = dict.fromkeys(DEVICE_ID_PARAM, result)
     # The zero is lost, or the device turns to its neutral position.
     rig.managers[0].rates = (0.0, -0.2, 0.0)
     rig.gimbal.set_rates((0.0, 0.2, 0.0), rig.now)
@@ -464,13 +469,13 @@ def test_zero_before_a_request_is_sent_again_only_if_the_request_fails(
     (set_roi, Gimbal.set_neutral), (Gimbal.clear_roi, Gimbal.set_neutral),
     (Gimbal.set_neutral, set_roi), (Gimbal.set_neutral, Gimbal.clear_roi)])
 @pytest.mark.parametrize('refusal', [
-    mav.MavResult.DENIED, mav.MavResult.TEMPORARILY_REJECTED], ids=['at once', 'later'])
+    mavlink.MAV_RESULT_DENIED, mavlink.MAV_RESULT_TEMPORARILY_REJECTED], ids=['at once', 'later'])
 def test_zero_is_not_sent_again_to_a_gimbal_that_follows_another_request(
-        asks: tuple[Ask, Ask], refusal: mav.MavResult) -> None:
+        asks: tuple[Ask, Ask], refusal: int) -> None:
     rig = in_control()
     manager = rig.managers[0]
     manager.results = dict.fromkeys(
-        (GimbalCommand.DO_SET_ROI_LOCATION, GimbalCommand.DO_SET_ROI_NONE), refusal)
+        (mavlink.MAV_CMD_DO_SET_ROI_LOCATION, mavlink.MAV_CMD_DO_SET_ROI_NONE), refusal)
     # The device turns to its neutral position, and shows the flag late.
     manager.rates, manager.applies = (0.0, -0.2, 0.0), False
     rig.gimbal.set_rates((0.0, 0.2, 0.0), rig.now)
@@ -479,7 +484,7 @@ def test_zero_is_not_sent_again_to_a_gimbal_that_follows_another_request(
     for ask in asks:
         ask(rig.gimbal, rig.now, rig.done)
     rig.run(0.7)
-    manager.flags |= MountFlags.NEUTRAL
+    manager.flags |= mavlink.GIMBAL_DEVICE_FLAGS_NEUTRAL
     rig.run(3.0)
 
     assert sorted(one.success for one in rig.results) == [False, True]
@@ -506,7 +511,7 @@ def test_place_after_a_failed_request_ends_with_the_control_of_the_node(
         ask: Ask, answers: bool) -> None:
     rig = in_control()
     assert asked(rig, set_roi)[0]
-    rig.managers[0].results = dict.fromkeys(GimbalCommand, mav.MavResult.DENIED)
+    rig.managers[0].results = dict.fromkeys(DEVICE_ID_PARAM, mavlink.MAV_RESULT_DENIED)
     rig.managers[0].answers = answers
     assert not asked(rig, ask)[0]
     rig.managers[0].results, rig.managers[0].answers = {}, True
@@ -523,7 +528,7 @@ def test_attitude_before_a_refused_request_is_still_the_one_that_angles_change(
     rig = in_control()
     if before:
         rig.gimbal.set_angles(before, YawFrame.VEHICLE, rig.now)
-    rig.managers[0].results = dict.fromkeys(GimbalCommand, mav.MavResult.DENIED)
+    rig.managers[0].results = dict.fromkeys(DEVICE_ID_PARAM, mavlink.MAV_RESULT_DENIED)
     assert not asked(rig, set_roi)[0]
 
     rig.gimbal.set_angles((math.nan, math.nan, 0.3), YawFrame.VEHICLE, rig.now)
@@ -542,7 +547,7 @@ def test_gm_14_request_without_control_is_not_sent_and_tells_who_has_it(
     rig = Rig(FakeManager(primary=primary)).run(3.0)
 
     assert asked(rig, ask) == (False, f'no control of gimbal 1/154: {reason}')
-    assert not {one.command for one in rig.managers[0].commands} & set(GimbalCommand)
+    assert not {one.command for one in rig.managers[0].commands} & set(DEVICE_ID_PARAM)
 
 
 @pytest.mark.parametrize('second', [2, 171])

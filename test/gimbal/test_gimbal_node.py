@@ -23,14 +23,12 @@ from pathlib import Path
 from typing import Any
 
 from illuminator_ros.gimbal.messages import (
-    Capabilities,
-    ErrorFlags,
-    GimbalCommand,
     NO_COMPONENT,
 )
+from illuminator_ros.mavlink.dialect import mavlink
 from illuminator_ros.mavlink.link import Link
-from illuminator_ros.mavlink.messages import CommandInt, MavResult
-from illuminator_ros.payload.mount_attitude import from_mavlink, MountFlags, to_mavlink, YawFrame
+from illuminator_ros.mavlink.messages import CommandInt
+from illuminator_ros.payload.mount_attitude import from_mavlink, to_mavlink, YawFrame
 from illuminator_ros.payload.rotation import Quaternion
 import pytest
 
@@ -148,7 +146,8 @@ def test_gm_2_attitude_is_flu_and_its_frame_tells_what_yaw_is_relative_to(
     assert lock.wait().data is False
 
     gimbal.q, gimbal.rates = to_mavlink(TURNED, YawFrame.EARTH), (NAN,) * 3
-    gimbal.flags = MountFlags.YAW_LOCK | MountFlags.YAW_IN_EARTH_FRAME
+    gimbal.flags = (mavlink.GIMBAL_DEVICE_FLAGS_YAW_LOCK
+                    | mavlink.GIMBAL_DEVICE_FLAGS_YAW_IN_EARTH_FRAME)
     lock.wait_value(True)
     earth = angles.wait(lambda one: one.header.frame_id == 'map')
     assert values(earth.vector) == pytest.approx(ROS_ANGLES, abs=1e-6)
@@ -187,19 +186,19 @@ def test_gm_16_control_is_taken_and_released_by_services(
         assert answer.success, answer.message
         assert 'confirmed by GIMBAL_MANAGER_STATUS' in answer.message
         assert gimbal.primary == primary
-    gimbal.results[GimbalCommand.DO_GIMBAL_MANAGER_CONFIGURE] = MavResult.DENIED
+    gimbal.results[mavlink.MAV_CMD_DO_GIMBAL_MANAGER_CONFIGURE] = mavlink.MAV_RESULT_DENIED
     answer = trigger(ros, 'take_control')
     assert not answer.success
     assert answer.message.startswith('manager 1/1 refused "take control": MAV_RESULT_DENIED')
 
 
 @pytest.mark.parametrize(('name', 'request_', 'flag', 'on'), [
-    ('neutral', Trigger.Request(), MountFlags.NEUTRAL, True),
-    ('retract', Trigger.Request(), MountFlags.RETRACT, True),
-    ('set_yaw_lock', SetBool.Request(data=True), MountFlags.YAW_LOCK, True),
-    ('set_yaw_lock', SetBool.Request(data=False), MountFlags.YAW_LOCK, False)])
+    ('neutral', Trigger.Request(), mavlink.GIMBAL_DEVICE_FLAGS_NEUTRAL, True),
+    ('retract', Trigger.Request(), mavlink.GIMBAL_DEVICE_FLAGS_RETRACT, True),
+    ('set_yaw_lock', SetBool.Request(data=True), mavlink.GIMBAL_DEVICE_FLAGS_YAW_LOCK, True),
+    ('set_yaw_lock', SetBool.Request(data=False), mavlink.GIMBAL_DEVICE_FLAGS_YAW_LOCK, False)])
 def test_gm_3_positions_and_yaw_lock_are_set_by_services(
-        name: str, request_: Any, flag: MountFlags, on: bool, ros: Ros,
+        name: str, request_: Any, flag: int, on: bool, ros: Ros,
         gimbal: FakeManager) -> None:
     take_control(ros, gimbal)
     gimbal.flags = gimbal.flags & ~flag if on else gimbal.flags | flag
@@ -208,7 +207,9 @@ def test_gm_3_positions_and_yaw_lock_are_set_by_services(
 
     assert answer.success, answer.message
     assert bool(gimbal.flags & flag) is on
-    ros.subscribe(Bool, '/gimbal/yaw_lock').wait_value(bool(gimbal.flags & MountFlags.YAW_LOCK))
+    ros.subscribe(Bool,
+                  '/gimbal/yaw_lock').wait_value(bool(gimbal.flags
+                                                      & mavlink.GIMBAL_DEVICE_FLAGS_YAW_LOCK))
 
 
 def test_place_to_point_at_is_converted_from_the_ellipsoid_and_cleared_by_a_service(
@@ -344,7 +345,8 @@ def test_diagnostics_name_flags_limits_identity_and_control(
             'pitch_max_rad': '1.5'}.items() <= shown.items()
     assert 'has yaw lock' in shown['capabilities']
 
-    gimbal.failure_flags = ErrorFlags.MOTOR_ERROR | ErrorFlags.AT_PITCH_LIMIT | 1 << 20
+    gimbal.failure_flags = (mavlink.GIMBAL_DEVICE_ERROR_FLAGS_MOTOR_ERROR
+                            | mavlink.GIMBAL_DEVICE_ERROR_FLAGS_AT_PITCH_LIMIT | 1 << 20)
     status = report(ros, 'motor error')
     assert status.level == DiagnosticStatus.ERROR
     assert status.message == 'motor error; unknown flags 0x100000; at pitch limit'
@@ -407,7 +409,8 @@ def test_the_release_at_the_end_is_in_the_log_of_the_node_of_the_gimbal(
 
 def test_gm_3_earth_frame_is_refused_where_the_gimbal_lacks_it(
         own_ros: Ros) -> None:
-    lacking = ALL & ~Capabilities.HAS_YAW_LOCK & ~Capabilities.SUPPORTS_YAW_IN_EARTH_FRAME
+    lacking = (ALL & ~mavlink.GIMBAL_DEVICE_CAP_FLAGS_HAS_YAW_LOCK
+               & ~mavlink.GIMBAL_DEVICE_CAP_FLAGS_SUPPORTS_YAW_IN_EARTH_FRAME)
     manager = FakeManager(primary=OURS, capabilities=lacking)
     with bridge(own_ros, manager, attitude_interval=0.05, earth_frame='odom') as program:
         own_ros.subscribe(Bool, '/gimbal/in_control').wait_value(True)

@@ -19,9 +19,9 @@ from __future__ import annotations
 from illuminator_ros.gimbal.manager import GimbalManager, ManagerSettings
 from illuminator_ros.gimbal.manager_control import Role
 from illuminator_ros.gimbal.manager_state import ManagerState
-from illuminator_ros.gimbal.messages import MAV_TYPE_GIMBAL
 from illuminator_ros.mavlink.command_sender import CommandSender
 from illuminator_ros.mavlink.component import Component
+from illuminator_ros.mavlink.dialect import mavlink
 from illuminator_ros.mavlink.messages import Address, heartbeat, Message
 from illuminator_ros.mavlink.signing import Signing, SigningMode
 from support.frames import Codec
@@ -43,7 +43,7 @@ class Rig:
             signing=Signing(mode, KEY))
         self.good = Codec(Signing(mode, KEY))
         for _ in range(8):
-            self.send(self.good, DEVICE, heartbeat(MAV_TYPE_GIMBAL))
+            self.send(self.good, DEVICE, heartbeat(mavlink.MAV_TYPE_GIMBAL))
             self.link.run(1.0)
         assert self.manager.tracker.state is ManagerState.ACTIVE
 

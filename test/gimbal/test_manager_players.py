@@ -31,6 +31,7 @@ from hypothesis import strategies as st
 from illuminator_ros.gimbal import messages as gimbal
 from illuminator_ros.gimbal.manager_control import ControlSettings, Role, RoleHolderChanged
 from illuminator_ros.mavlink import messages as mav
+from illuminator_ros.mavlink.dialect import decode, mavlink
 from illuminator_ros.mavlink.frame import Decoder
 from illuminator_ros.payload.arbitration import Cause, Policy
 from illuminator_ros.payload.rotation import Quaternion
@@ -77,7 +78,7 @@ class Player:
             return
         if now >= self.heartbeat_due:
             self.heartbeat_due = now + 1.0
-            self._transmit(self.number, mav.heartbeat(mav.MavType.GCS), now)
+            self._transmit(self.number, mav.heartbeat(mavlink.MAV_TYPE_GCS), now)
         rate = 0.5 if self.kind == 'floods' else 0.03
         if self.random.random() < rate:
             number = self.number
@@ -143,9 +144,9 @@ class Arena:
 
     def _give(self, source: mav.Address, message_id: int, payload: bytes) -> None:
         [cls] = [cls for cls in self.rig.component.messages if cls.id == message_id]
-        message = cls.decode(payload)
+        message = decode(cls, payload)
         events, holder = len(self.rig.events), self.rig.manager.control.holder(Role.PRIMARY)
-        if cls.name == 'HEARTBEAT':
+        if cls.msgname == 'HEARTBEAT':
             self.heard[source] = self.rig.now
         sent = self.rig.give(source, message)
         answers = [(ack.command, ack.target_system, ack.target_component)
@@ -161,7 +162,7 @@ class Arena:
             self.obeyed = source
         elif is_setpoint and commanded and source not in (
                 holder, self.rig.manager.control.holder(Role.SECONDARY)):
-            assert of(mav.CommandAck, sent)[0].result == mav.MavResult.DENIED
+            assert of(mav.CommandAck, sent)[0].result == mavlink.MAV_RESULT_DENIED
         self._check_sent(sent, source)
 
     def _check_sent(self, sent: list[Any], source: mav.Address | None) -> None:
@@ -218,6 +219,6 @@ def test_gm_16_of_1000_players_that_take_control_at_once_one_has_it() -> None:
 
     results = [rig.take(player) for player in players]
 
-    assert results == [mav.MavResult.ACCEPTED, *[mav.MavResult.DENIED] * 999]
+    assert results == [mavlink.MAV_RESULT_ACCEPTED, *[mavlink.MAV_RESULT_DENIED] * 999]
     assert rig.manager.control.holder(Role.PRIMARY) == players[0]
     assert [player for player in players if rig.points(player)] == players[:1]

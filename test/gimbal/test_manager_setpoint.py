@@ -35,7 +35,7 @@ from illuminator_ros.gimbal.manager_setpoint import (
     turned_by,
 )
 from illuminator_ros.payload.messages import GeoPoint
-from illuminator_ros.payload.mount_attitude import MountFlags, STILL, YawFrame
+from illuminator_ros.payload.mount_attitude import STILL, YawFrame
 from illuminator_ros.payload.rotation import Quaternion, Vector
 import pytest
 from support.gimbal_manager import information
@@ -50,7 +50,7 @@ RANGES = st.tuples(*(st.tuples(st.floats(-3, 0), st.floats(0, 3)).map(lambda end
 
 
 def made_of(angles: Vector, turning: Vector = STILL) -> Setpoint:
-    return Setpoint(MountFlags(0), YawFrame.VEHICLE, Quaternion.from_euler(*angles),
+    return Setpoint(0, YawFrame.VEHICLE, Quaternion.from_euler(*angles),
                     turning=turning)
 
 

@@ -17,7 +17,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import replace
 import math
 from pathlib import Path
 import re
@@ -35,7 +34,8 @@ from illuminator_ros.gimbal.messages import (
     GimbalManagerInformation,
     GimbalManagerStatus,
 )
-from illuminator_ros.mavlink.messages import Address, CommandLong, MavResult, Message
+from illuminator_ros.mavlink.dialect import mavlink, replaced
+from illuminator_ros.mavlink.messages import Address, CommandLong, Message
 import pytest
 from support.gimbal_manager import (
     attitude_status,
@@ -123,7 +123,7 @@ def test_gm_18_another_manager_of_the_device_makes_ours_inactive_and_is_named(
         when, ManagerState.INACTIVE, DEVICE.component, DEVICE, OTHER)
     assert rig.messages(GimbalManagerStatus, begun) == []
     assert [rig.result(PILOT, command) for command in (
-        configure(*PILOT), request(GimbalManagerInformation))] == [MavResult.DENIED] * 2
+        configure(*PILOT), request(GimbalManagerInformation))] == [mavlink.MAV_RESULT_DENIED] * 2
 
 
 def test_gm_19_an_inactive_manager_gives_the_device_no_setpoint() -> None:
@@ -236,7 +236,7 @@ def test_gm_18_of_two_managers_that_begin_together_one_becomes_active(
 
 
 @pytest.mark.parametrize('message', [
-    replace(attitude_status(), gimbal_device_id=1), information(gimbal_device_id=1)])
+    replaced(attitude_status(), gimbal_device_id=1), information(gimbal_device_id=1)])
 def test_an_autopilot_that_reports_a_gimbal_on_its_outputs_is_not_taken_for_a_device(
         message: Message) -> None:
     rig = reached(ManagerState.NO_DEVICE)

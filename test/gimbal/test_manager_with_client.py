@@ -30,7 +30,7 @@ from illuminator_ros.gimbal.manager_with_client import ManagerWithClient
 from illuminator_ros.gimbal.messages import GimbalDeviceSetAttitude, GimbalManagerStatus
 from illuminator_ros.mavlink.command_sender import CommandSender
 from illuminator_ros.mavlink.component import Component
-from illuminator_ros.mavlink.messages import MavResult
+from illuminator_ros.mavlink.dialect import mavlink
 from illuminator_ros.payload.mount_attitude import YawFrame
 from illuminator_ros.payload.request import Result
 from illuminator_ros.payload.rotation import Quaternion
@@ -114,7 +114,7 @@ def test_ros_keeps_control_without_heartbeats_on_the_link_and_others_are_denied(
     rig.run(30.0)
 
     assert rig.manager.control.holder(Role.PRIMARY) == OURS
-    assert rig.take(GUEST) is MavResult.DENIED
+    assert rig.take(GUEST) == mavlink.MAV_RESULT_DENIED
 
 
 def test_ros_gets_the_attitude_of_the_device_and_a_region_of_interest() -> None:

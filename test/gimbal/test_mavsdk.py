@@ -25,12 +25,13 @@ from illuminator_ros.gimbal.client import GimbalClient
 from illuminator_ros.gimbal.events import ControlChanged
 from illuminator_ros.gimbal.gimbal import Gimbal, GimbalSettings
 from illuminator_ros.gimbal.manager_control import ControlSettings, Role
-from illuminator_ros.gimbal.messages import GimbalCommand
+from illuminator_ros.gimbal.messages import DEVICE_ID_PARAM
 from illuminator_ros.gimbal.simulated_device import SimulatedGimbal
 from illuminator_ros.gimbal.simulated_manager import ManagerProperties, SimulatedManager
 from illuminator_ros.mavlink.command_sender import CommandSender
 from illuminator_ros.mavlink.component import Component, Endpoint
-from illuminator_ros.mavlink.messages import Address, MavResult
+from illuminator_ros.mavlink.dialect import mavlink
+from illuminator_ros.mavlink.messages import Address
 from illuminator_ros.payload.mount_attitude import to_mavlink, YawFrame
 from illuminator_ros.payload.request import Result
 from illuminator_ros.payload.rotation import Quaternion, Vector
@@ -133,9 +134,9 @@ def test_mavsdk_lists_controls_and_releases_and_a_second_one_is_denied() -> None
         eventually(lambda: abs(gimbal.get_attitude(GIMBAL).euler_angle_north.yaw_deg - 90) < 1)
         assert result(second.take_control, GIMBAL, primary) == DENIED
         assert result(second.set_angles, GIMBAL, 0.0, -20.0, 0.0, follow, once) == DENIED
-        answers = [ack.result for ack in vehicle.acks if ack.command in set(GimbalCommand)
+        answers = [ack.result for ack in vehicle.acks if ack.command in set(DEVICE_ID_PARAM)
                    and (ack.target_system, ack.target_component) == SECOND]
-        assert answers[-2:] == [MavResult.DENIED] * 2
+        assert answers[-2:] == [mavlink.MAV_RESULT_DENIED] * 2
         assert manager.control.holder(Role.PRIMARY) == FIRST
 
         assert result(gimbal.release_control, GIMBAL) == 'SUCCESS'

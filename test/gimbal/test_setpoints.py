@@ -21,19 +21,17 @@ import math
 
 from illuminator_ros.gimbal.gimbal import REPEATS
 from illuminator_ros.gimbal.messages import (
-    Capabilities,
-    GimbalCommand,
     GimbalManagerSetAttitude,
 )
-from illuminator_ros.mavlink.messages import MavResult
-from illuminator_ros.payload.mount_attitude import from_mavlink, MountFlags, to_mavlink, YawFrame
+from illuminator_ros.mavlink.dialect import mavlink
+from illuminator_ros.payload.mount_attitude import from_mavlink, to_mavlink, YawFrame
 from illuminator_ros.payload.rotation import Quaternion, Vector
 import pytest
 from pytest import approx
 from support.gimbals import ALL, FakeManager, in_control, NAN, OTHER, OURS, Rig
 
 EARTH, VEHICLE = YawFrame.EARTH, YawFrame.VEHICLE
-LEVEL = MountFlags.ROLL_LOCK | MountFlags.PITCH_LOCK
+LEVEL = mavlink.GIMBAL_DEVICE_FLAGS_ROLL_LOCK | mavlink.GIMBAL_DEVICE_FLAGS_PITCH_LOCK
 # 45 degrees down and 30 to the left, in ROS and in MAVLink.
 DOWN_LEFT = (0.0, math.radians(45), math.radians(30))
 
@@ -59,9 +57,10 @@ def test_gm_2_gm_4_attitude_is_sent_in_the_frame_and_the_signs_of_mavlink() -> N
     assert euler(relative) == approx((0, -45, -30))
     # A yaw of 30 degrees from east to the left is 60 degrees from north to the right.
     assert euler(absolute) == approx((0, -45, 60))
-    assert relative.flags == LEVEL | MountFlags.YAW_IN_VEHICLE_FRAME
+    assert relative.flags == LEVEL | mavlink.GIMBAL_DEVICE_FLAGS_YAW_IN_VEHICLE_FRAME
     # PX4 and ArduPilot read the lock as the frame.
-    assert absolute.flags == LEVEL | MountFlags.YAW_IN_EARTH_FRAME | MountFlags.YAW_LOCK
+    assert (absolute.flags == LEVEL | mavlink.GIMBAL_DEVICE_FLAGS_YAW_IN_EARTH_FRAME
+            | mavlink.GIMBAL_DEVICE_FLAGS_YAW_LOCK)
     assert (relative.target_system, relative.target_component, relative.gimbal_device_id) == (
         1, 1, 154)
     assert all(map(math.isnan, (relative.angular_velocity_x, relative.angular_velocity_y,
@@ -113,8 +112,10 @@ def test_rate_of_zero_needs_no_second_zero() -> None:
 
 
 @pytest.mark.parametrize(('shown', 'sent'), [
-    (MountFlags.YAW_IN_VEHICLE_FRAME, LEVEL | MountFlags.YAW_IN_VEHICLE_FRAME),
-    (MountFlags.YAW_LOCK, LEVEL | MountFlags.YAW_IN_EARTH_FRAME | MountFlags.YAW_LOCK)])
+    (mavlink.GIMBAL_DEVICE_FLAGS_YAW_IN_VEHICLE_FRAME, LEVEL
+     | mavlink.GIMBAL_DEVICE_FLAGS_YAW_IN_VEHICLE_FRAME),
+    (mavlink.GIMBAL_DEVICE_FLAGS_YAW_LOCK, LEVEL | mavlink.GIMBAL_DEVICE_FLAGS_YAW_IN_EARTH_FRAME
+     | mavlink.GIMBAL_DEVICE_FLAGS_YAW_LOCK)])
 def test_gm_2_rate_leaves_the_yaw_lock_as_the_device_has_it(shown: int, sent: int) -> None:
     rig = in_control()
     rig.managers[0].flags = shown
@@ -134,14 +135,15 @@ def send_attitude(rig: Rig, lock: bool) -> None:
 
 @pytest.mark.parametrize('lock', [True, False])
 @pytest.mark.parametrize(('change', 'result', 'changes'), [
-    (request_lock, MavResult.ACCEPTED, True), (request_lock, MavResult.DENIED, False),
-    (send_attitude, MavResult.ACCEPTED, True)])
+    (request_lock, mavlink.MAV_RESULT_ACCEPTED, True),
+    (request_lock, mavlink.MAV_RESULT_DENIED, False),
+    (send_attitude, mavlink.MAV_RESULT_ACCEPTED, True)])
 def test_gm_2_rate_leaves_a_yaw_lock_that_the_device_does_not_report_yet(
-        change: Callable[[Rig, bool], None], result: MavResult, changes: bool,
+        change: Callable[[Rig, bool], None], result: int, changes: bool,
         lock: bool) -> None:
     rig = in_control()
-    rig.managers[0].flags = MountFlags(0) if lock else MountFlags.YAW_LOCK
-    rig.managers[0].results[GimbalCommand.DO_GIMBAL_MANAGER_PITCHYAW] = result
+    rig.managers[0].flags = 0 if lock else mavlink.GIMBAL_DEVICE_FLAGS_YAW_LOCK
+    rig.managers[0].results[mavlink.MAV_CMD_DO_GIMBAL_MANAGER_PITCHYAW] = result
     rig.run(1.0)
 
     change(rig, lock)
@@ -149,7 +151,7 @@ def test_gm_2_rate_leaves_a_yaw_lock_that_the_device_does_not_report_yet(
     rig.gimbal.set_rates((0.0, 0.2, 0.0), rig.now)
     rig.run(0.02)
 
-    has_lock = bool(setpoints(rig)[-1][1].flags & MountFlags.YAW_LOCK)
+    has_lock = bool(setpoints(rig)[-1][1].flags & mavlink.GIMBAL_DEVICE_FLAGS_YAW_LOCK)
     assert has_lock is (lock is changes)
 
 
@@ -277,12 +279,15 @@ def test_gm_14_setpoint_without_control_is_not_sent(
 
 
 @pytest.mark.parametrize(('has', 'sent'), [
-    (Capabilities(0), None),
-    (Capabilities.HAS_YAW_LOCK, MountFlags.YAW_IN_EARTH_FRAME | MountFlags.YAW_LOCK),
-    (Capabilities.SUPPORTS_YAW_IN_EARTH_FRAME, MountFlags.YAW_IN_EARTH_FRAME)])
+    (0, None),
+    (mavlink.GIMBAL_DEVICE_CAP_FLAGS_HAS_YAW_LOCK, mavlink.GIMBAL_DEVICE_FLAGS_YAW_IN_EARTH_FRAME
+     | mavlink.GIMBAL_DEVICE_FLAGS_YAW_LOCK),
+    (mavlink.GIMBAL_DEVICE_CAP_FLAGS_SUPPORTS_YAW_IN_EARTH_FRAME,
+     mavlink.GIMBAL_DEVICE_FLAGS_YAW_IN_EARTH_FRAME)])
 def test_gm_3_yaw_relative_to_the_earth_is_sent_only_to_a_gimbal_that_has_it(
-        has: Capabilities, sent: MountFlags | None) -> None:
-    lacking = ALL & ~Capabilities.HAS_YAW_LOCK & ~Capabilities.SUPPORTS_YAW_IN_EARTH_FRAME
+        has: int, sent: int | None) -> None:
+    lacking = (ALL & ~mavlink.GIMBAL_DEVICE_CAP_FLAGS_HAS_YAW_LOCK
+               & ~mavlink.GIMBAL_DEVICE_CAP_FLAGS_SUPPORTS_YAW_IN_EARTH_FRAME)
     rig = Rig(FakeManager(primary=OURS, capabilities=lacking | has)).run(3.0)
 
     reason = rig.gimbal.set_attitude(Quaternion(), EARTH, rig.now)
@@ -296,7 +301,7 @@ def test_gm_3_yaw_relative_to_the_earth_is_sent_only_to_a_gimbal_that_has_it(
 
 def turned(roll: float, pitch: float, yaw: float, frame: YawFrame) -> FakeManager:
     """Return a manager whose device has an attitude, given in ROS, rad."""
-    lock = MountFlags.YAW_LOCK if frame is EARTH else MountFlags(0)
+    lock = mavlink.GIMBAL_DEVICE_FLAGS_YAW_LOCK if frame is EARTH else 0
     return FakeManager(primary=OURS, flags=frame.flag | lock,
                        q=to_mavlink(Quaternion.from_euler(roll, pitch, yaw), frame))
 

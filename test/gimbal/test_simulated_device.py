@@ -21,7 +21,6 @@ import math
 
 from illuminator_ros.gimbal import messages as gimbal
 from illuminator_ros.gimbal.axes import Range
-from illuminator_ros.gimbal.messages import Capabilities, ErrorFlags
 from illuminator_ros.gimbal.simulated_device import (
     GimbalBehaviour,
     GimbalProperties,
@@ -29,17 +28,18 @@ from illuminator_ros.gimbal.simulated_device import (
     SIMULATED,
     SimulatedGimbal,
 )
-from illuminator_ros.mavlink.messages import Address, CommandAck, CommandLong, MavResult, Message
+from illuminator_ros.mavlink.dialect import mavlink
+from illuminator_ros.mavlink.messages import Address, CommandAck, CommandLong, Message
 from illuminator_ros.payload.messages import GimbalDeviceAttitudeStatus
-from illuminator_ros.payload.mount_attitude import MountFlags, YawFrame
+from illuminator_ros.payload.mount_attitude import YawFrame
 from illuminator_ros.payload.rotation import Quaternion
 from illuminator_ros.payload.simulated import Description, SimulatedComponents
 import pytest
 
 NAN = math.nan
 DEVICE, MANAGER, OTHER = Address(1, 154), Address(1, 191), Address(1, 190)
-FOLLOW = MountFlags.ROLL_LOCK | MountFlags.PITCH_LOCK
-LOCK = FOLLOW | MountFlags.YAW_LOCK
+FOLLOW = mavlink.GIMBAL_DEVICE_FLAGS_ROLL_LOCK | mavlink.GIMBAL_DEVICE_FLAGS_PITCH_LOCK
+LOCK = FOLLOW | mavlink.GIMBAL_DEVICE_FLAGS_YAW_LOCK
 UNSET = (NAN, NAN, NAN)
 
 
@@ -124,16 +124,17 @@ MOTIONS: dict[str, tuple[dict[str, object], list[Step]]] = {
     'a locked pitch is held against the horizon': ({}, [
         (to(0, -10, 0), 1, (0, -10, 0)), (pitch_vehicle, 1, (0, -10, 0))]),
     'a pitch without a lock follows the vehicle': ({}, [
-        (to(0, -10, 0, flags=MountFlags.ROLL_LOCK | VEHICLE), 1, (0, -10, 0)),
+        (to(0, -10, 0, flags=mavlink.GIMBAL_DEVICE_FLAGS_ROLL_LOCK | VEHICLE), 1, (0, -10, 0)),
         (pitch_vehicle, 1, (0, 10, 0))]),
     'NEUTRAL takes precedence over the attitude': ({}, [
         (to(0, -20, 30), 2, (0, -20, 30)),
-        (to(0, -20, 30, flags=MountFlags.NEUTRAL | VEHICLE), 2, (0, 0, 0))]),
+        (to(0, -20, 30, flags=mavlink.GIMBAL_DEVICE_FLAGS_NEUTRAL | VEHICLE), 2, (0, 0, 0))]),
     'NEUTRAL is relative to the vehicle, whatever the yaw frame': ({}, [
         (to(0, -20, 30), 2, (0, -20, 30)), (lambda bench: bench.heading(40.0), 0.1, (0, -20, 30)),
-        (to(flags=MountFlags.NEUTRAL | YawFrame.EARTH.flag), 1, (0, 0, 0))]),
+        (to(flags=mavlink.GIMBAL_DEVICE_FLAGS_NEUTRAL | YawFrame.EARTH.flag), 1, (0, 0, 0))]),
     'RETRACT takes precedence over NEUTRAL': ({}, [
-        (to(flags=MountFlags.RETRACT | MountFlags.NEUTRAL | VEHICLE), 2, (0, 45, 0))]),
+        (to(flags=mavlink.GIMBAL_DEVICE_FLAGS_RETRACT | mavlink.GIMBAL_DEVICE_FLAGS_NEUTRAL
+            | VEHICLE), 2, (0, 45, 0))]),
 }
 
 
@@ -151,11 +152,11 @@ def test_it_moves_as_its_setpoint_says(case: str) -> None:
 
 
 @pytest.mark.parametrize(('degrees', 'reached', 'flag'), [
-    ((0.0, 50.0, 0.0), (0.0, 45.0, 0.0), ErrorFlags.AT_PITCH_LIMIT),
-    ((60.0, 0.0, 0.0), (45.0, 0.0, 0.0), ErrorFlags.AT_ROLL_LIMIT),
-    ((0.0, 0.0, 175.0), (0.0, 0.0, 170.0), ErrorFlags.AT_YAW_LIMIT)])
+    ((0.0, 50.0, 0.0), (0.0, 45.0, 0.0), mavlink.GIMBAL_DEVICE_ERROR_FLAGS_AT_PITCH_LIMIT),
+    ((60.0, 0.0, 0.0), (45.0, 0.0, 0.0), mavlink.GIMBAL_DEVICE_ERROR_FLAGS_AT_ROLL_LIMIT),
+    ((0.0, 0.0, 175.0), (0.0, 0.0, 170.0), mavlink.GIMBAL_DEVICE_ERROR_FLAGS_AT_YAW_LIMIT)])
 def test_an_axis_stops_at_the_end_of_its_range_and_reports_it(
-        degrees: tuple[float, ...], reached: tuple[float, ...], flag: ErrorFlags) -> None:
+        degrees: tuple[float, ...], reached: tuple[float, ...], flag: int) -> None:
     bench = Bench()
     bench.point(*degrees)
     assert bench.angles(4.0) == reached
@@ -168,7 +169,7 @@ def test_an_axis_stops_at_the_end_of_its_range_and_reports_it(
 
 def test_gm_19_a_device_obeys_the_component_of_its_system_that_announces_it() -> None:
     bench = Bench(announced=False)
-    assert bench.after(0.0).failure_flags == ErrorFlags.NO_MANAGER
+    assert bench.after(0.0).failure_flags == mavlink.GIMBAL_DEVICE_ERROR_FLAGS_NO_MANAGER
     bench.announce(device_id=155)
     bench.announce(Address(2, 191))
     bench.point(0.0, -10.0, 0.0)
@@ -212,7 +213,7 @@ def test_gm_19_the_messages_and_commands_to_managers_move_no_device() -> None:
     bench.give(CommandLong(*DEVICE, 1000, 0, -20.0, 0.0, NAN, NAN, 0, 0, 154))
     assert bench.angles(1.0) == (0.0, 0.0, 0.0)
     (ack,) = [one for _, one in bench.endpoint.outgoing if isinstance(one, CommandAck)]
-    assert ack.result == MavResult.UNSUPPORTED
+    assert ack.result == mavlink.MAV_RESULT_UNSUPPORTED
 
 
 def test_a_setpoint_for_another_component_or_with_both_frames_is_ignored() -> None:
@@ -230,7 +231,7 @@ def test_gm_3_without_a_heading_yaw_relative_to_north_is_not_accepted() -> None:
     bench.point(0.0, 0.0, 30.0, flags=LOCK | YawFrame.EARTH.flag)
     status = bench.after(1.0)
     assert bench.angles() == (0.0, 0.0, 0.0)
-    assert not status.flags & MountFlags.ACCEPTS_YAW_IN_EARTH_FRAME
+    assert not status.flags & mavlink.GIMBAL_DEVICE_FLAGS_ACCEPTS_YAW_IN_EARTH_FRAME
     assert math.isnan(status.delta_yaw)
 
 
@@ -249,12 +250,13 @@ def test_gm_3_a_locked_yaw_follows_the_heading_and_drifts_without_one() -> None:
 
 @pytest.mark.parametrize('lock', [FOLLOW, LOCK])
 def test_gm_2_the_frame_of_the_number_and_the_mode_of_the_axis_are_independent(
-        lock: MountFlags) -> None:
+        lock: int) -> None:
     bench = Bench()
     bench.heading(40.0)
     bench.point(0.0, -20.0, 30.0, flags=lock | YawFrame.EARTH.flag)
     status = bench.after(1.0)
-    assert status.flags == lock | YawFrame.EARTH.flag | MountFlags.ACCEPTS_YAW_IN_EARTH_FRAME
+    assert (status.flags == lock | YawFrame.EARTH.flag
+            | mavlink.GIMBAL_DEVICE_FLAGS_ACCEPTS_YAW_IN_EARTH_FRAME)
     assert bench.angles() == (0.0, -20.0, 30.0)
     assert math.degrees(status.delta_yaw) == pytest.approx(40.0)
     bench.heading(50.0)
@@ -268,7 +270,8 @@ def test_gm_5_an_axis_that_it_lacks_does_not_move_and_is_not_offered() -> None:
     assert bench.angles(2.0) == (0.0, -20.0, 0.0)
     information = bench.device.message(gimbal.GimbalDeviceInformation.id, bench.now)
     assert isinstance(information, gimbal.GimbalDeviceInformation)
-    assert not information.cap_flags & (Capabilities.HAS_YAW_AXIS | Capabilities.HAS_YAW_LOCK)
+    assert not information.cap_flags & (mavlink.GIMBAL_DEVICE_CAP_FLAGS_HAS_YAW_AXIS
+                                        | mavlink.GIMBAL_DEVICE_CAP_FLAGS_HAS_YAW_LOCK)
 
 
 # A person
@@ -294,7 +297,7 @@ def test_a_wrong_setting_is_refused_with_the_reason(name: str, text: str, reason
 
 def test_a_yaw_without_a_stop_is_offered() -> None:
     mechanics = Bench(yaw_range=Range(-math.pi, math.pi)).device.properties.mechanics
-    assert mechanics.capabilities & Capabilities.SUPPORTS_INFINITE_YAW
+    assert mechanics.capabilities & mavlink.GIMBAL_DEVICE_CAP_FLAGS_SUPPORTS_INFINITE_YAW
 
 
 def test_without_settings_it_is_the_gimbal_of_the_properties() -> None:

@@ -20,15 +20,15 @@ import math
 from typing import Any
 
 from illuminator_ros.gimbal import messages as gimbal
-from illuminator_ros.gimbal.messages import Capabilities, GimbalCommand
 from illuminator_ros.gimbal.simulated_manager import PROFILES, SIMULATED, SimulatedManager
 from illuminator_ros.mavlink import messages as mav
+from illuminator_ros.mavlink.dialect import MAV_RESULT_COMMAND_UNSUPPORTED_MAV_FRAME, mavlink
 from illuminator_ros.payload.messages import (
     Attitude,
     GimbalDeviceAttitudeStatus,
     GlobalPositionInt,
 )
-from illuminator_ros.payload.mount_attitude import MountFlags, YawFrame
+from illuminator_ros.payload.mount_attitude import YawFrame
 from illuminator_ros.payload.rotation import Quaternion
 from illuminator_ros.payload.simulated import Description, SimulatedComponents
 import pytest
@@ -36,12 +36,13 @@ import pytest
 NAN = math.nan
 UNSET = (NAN, NAN, NAN)
 PLAYER, OTHER = mav.Address(1, 195), mav.Address(255, 190)
-ACCEPTED, DENIED, FAILED = mav.MavResult.ACCEPTED, mav.MavResult.DENIED, mav.MavResult.FAILED
-CONFIGURE, PITCHYAW = (GimbalCommand.DO_GIMBAL_MANAGER_CONFIGURE,
-                       GimbalCommand.DO_GIMBAL_MANAGER_PITCHYAW)
-ROI, ROI_NONE = GimbalCommand.DO_SET_ROI_LOCATION, GimbalCommand.DO_SET_ROI_NONE
-FOLLOW = MountFlags.ROLL_LOCK | MountFlags.PITCH_LOCK
-LOCK = FOLLOW | MountFlags.YAW_LOCK
+ACCEPTED, DENIED, FAILED = (mavlink.MAV_RESULT_ACCEPTED, mavlink.MAV_RESULT_DENIED,
+                            mavlink.MAV_RESULT_FAILED)
+CONFIGURE, PITCHYAW = (mavlink.MAV_CMD_DO_GIMBAL_MANAGER_CONFIGURE,
+                       mavlink.MAV_CMD_DO_GIMBAL_MANAGER_PITCHYAW)
+ROI, ROI_NONE = mavlink.MAV_CMD_DO_SET_ROI_LOCATION, mavlink.MAV_CMD_DO_SET_ROI_NONE
+FOLLOW = mavlink.GIMBAL_DEVICE_FLAGS_ROLL_LOCK | mavlink.GIMBAL_DEVICE_FLAGS_PITCH_LOCK
+LOCK = FOLLOW | mavlink.GIMBAL_DEVICE_FLAGS_YAW_LOCK
 every_profile = pytest.mark.parametrize('profile', PROFILES)
 
 
@@ -60,7 +61,7 @@ class Bench:
     def command(
         self, command: int, *params: float, source: mav.Address = PLAYER, as_int: bool = False,
         frame: int = 0,
-    ) -> mav.MavResult:
+    ) -> int:
         """Send a command, and return its result."""
         self.endpoint.outgoing.clear()
         one, two, three, four, five, six, seven = [*params, *[0.0] * (7 - len(params))]
@@ -68,12 +69,12 @@ class Bench:
             *self.address, frame, command, 0, 0, one, two, three, four, int(five), int(six),
             seven) if as_int else mav.CommandLong(
             *self.address, command, 0, one, two, three, four, five, six, seven), self.now)
-        return next(mav.MavResult(message.result) for _, message in self.endpoint.outgoing
+        return next(int(message.result) for _, message in self.endpoint.outgoing
                     if isinstance(message, mav.CommandAck))
 
     def take(
         self, source: mav.Address = PLAYER, secondary: mav.Address = gimbal.NO_COMPONENT,
-    ) -> mav.MavResult:
+    ) -> int:
         return self.command(CONFIGURE, *source, *secondary, source=source)
 
     def point(
@@ -106,11 +107,12 @@ def test_gm_27_it_announces_its_gimbal_and_streams_status_and_attitude(profile: 
     assert dict(bench.device.streams()) == {281: 0.2, 285: 0.1}
     information = bench.message(gimbal.GimbalManagerInformation)
     assert information.gimbal_device_id == 1
-    assert information.cap_flags & Capabilities.CAN_POINT_LOCATION_GLOBAL
-    assert bool(information.cap_flags & Capabilities.HAS_RETRACT) is (profile != 'px4')
+    assert information.cap_flags & mavlink.GIMBAL_DEVICE_CAP_FLAGS_CAN_POINT_LOCATION_GLOBAL
+    assert bool(information.cap_flags
+                & mavlink.GIMBAL_DEVICE_CAP_FLAGS_HAS_RETRACT) is (profile != 'px4')
     assert bench.message(GimbalDeviceAttitudeStatus).gimbal_device_id == 1
     assert bench.message(gimbal.GimbalDeviceInformation).gimbal_device_id == 1
-    assert bench.command(mav.MavCmd.REQUEST_MESSAGE, 280) == ACCEPTED
+    assert bench.command(mavlink.MAV_CMD_REQUEST_MESSAGE, 280) == ACCEPTED
 
 
 # Control
@@ -130,7 +132,7 @@ def test_gm_27_it_announces_its_gimbal_and_streams_status_and_attitude(profile: 
     ('ardupilot', (-2, -2, -2, -2), ACCEPTED, (255, 190, 0, 0)),
     ('ardupilot', (-4, 256, 0, 0), FAILED, (1, 195, 0, 0))])
 def test_configure_gives_control_as_the_status_shows(
-        profile: str, values: tuple[float, ...], result: mav.MavResult, control: tuple[int, ...],
+        profile: str, values: tuple[float, ...], result: int, control: tuple[int, ...],
 ) -> None:
     bench = Bench(profile)
     assert bench.command(CONFIGURE, *values, source=OTHER) == result
@@ -224,10 +226,10 @@ def test_gm_8_it_keeps_pointing_at_the_place_while_the_vehicle_moves_until_the_n
 
 @pytest.mark.parametrize(('params', 'frame', 'result'), [
     ((1, 0, 0, 0, 910000000, 0, 0), 0, DENIED), ((1, 0, 0, 0, 0, 0, NAN), 0, DENIED),
-    ((1, 0, 0, 0, 0, 0, 0), 10, mav.MavResult.COMMAND_UNSUPPORTED_MAV_FRAME),
+    ((1, 0, 0, 0, 0, 0, 0), 10, MAV_RESULT_COMMAND_UNSUPPORTED_MAV_FRAME),
     ((3, 0, 0, 0, 0, 0, 0), 0, DENIED)])
 def test_a_place_that_does_not_exist_is_refused(
-        params: tuple[float, ...], frame: int, result: mav.MavResult) -> None:
+        params: tuple[float, ...], frame: int, result: int) -> None:
     assert Bench().command(ROI, *params, as_int=True, frame=frame) == result
 
 

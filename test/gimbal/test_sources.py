@@ -21,7 +21,7 @@ import random
 from typing import Any
 
 from illuminator_ros.gimbal.events import GimbalHeld
-from illuminator_ros.gimbal.messages import GimbalCommand, GimbalManagerSetAttitude
+from illuminator_ros.gimbal.messages import DEVICE_ID_PARAM, GimbalManagerSetAttitude
 from illuminator_ros.mavlink.messages import CommandInt, CommandLong
 from illuminator_ros.payload.arbitration import Cause, HolderChanged
 from illuminator_ros.payload.command_sources import SourceSettings
@@ -146,7 +146,7 @@ def test_a_takeover_ends_the_commands_of_the_lower_source_and_their_resends() ->
     assert rig.results[0].message == 'held by safety'
     assert not [one for at, one in rig.sent if at > taken_at
                 and isinstance(one, CommandLong | CommandInt)
-                and one.command in set(GimbalCommand)]
+                and one.command in set(DEVICE_ID_PARAM)]
 
 
 @pytest.mark.parametrize(('source', 'refusal'), [

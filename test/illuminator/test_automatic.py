@@ -22,7 +22,7 @@ from illuminator_ros.illuminator.events import AutomaticSwitch, ChangedByOther
 from illuminator_ros.illuminator.light import Settings
 from illuminator_ros.illuminator.light_configuration import LATE_TIME
 from illuminator_ros.illuminator.model import SafetyLimits
-from illuminator_ros.mavlink.messages import MavCmd, MavResult
+from illuminator_ros.mavlink.dialect import mavlink
 from illuminator_ros.payload.command_sources import SourceSettings
 import pytest
 from support.back_to_back import Pair, START
@@ -30,7 +30,7 @@ from support.fake_light import FakeLight
 from support.faulty_wire import Faults
 from support.shared_address import SharedAddress
 
-ON_OFF, CONFIGURE = MavCmd.ILLUMINATOR_ON_OFF, MavCmd.DO_ILLUMINATOR_CONFIGURE
+ON_OFF, CONFIGURE = mavlink.MAV_CMD_ILLUMINATOR_ON_OFF, mavlink.MAV_CMD_DO_ILLUMINATOR_CONFIGURE
 SILENCE = 5.0
 
 
@@ -109,7 +109,7 @@ def test_an_off_that_one_of_two_lights_at_an_address_refuses_is_repeated_after_2
     lights = FakeLight(enable=1), FakeLight()
     pair = Pair(SharedAddress(*lights, offset=0.3),
                 settings=Settings(off_after_silence=20.0)).settle()
-    lights[0].results[ON_OFF] = MavResult.FAILED
+    lights[0].results[ON_OFF] = mavlink.MAV_RESULT_FAILED
     pair.run(28.0)
     times = [at for at, _ in pair.commands_at(ON_OFF)]
 
@@ -121,7 +121,8 @@ def test_off_after_silence_is_repeated_until_the_light_shows_it() -> None:
     light = FakeLight()
     pair = silenced(light, drop=0.3)
     pair.run_until(lambda: pair.enable(True).success)
-    light.results[ON_OFF] = [MavResult.FAILED] * 3 + [None] * 9 + [MavResult.ACCEPTED]
+    light.results[ON_OFF] = [mavlink.MAV_RESULT_FAILED] * 3 + [None] * 9 + [
+        mavlink.MAV_RESULT_ACCEPTED]
     pair.run(40.0)
 
     assert light.fields['enable'] == 0
@@ -141,12 +142,13 @@ def test_a_light_without_status_that_may_have_executed_an_on_goes_off_after_sile
 
 
 @pytest.mark.parametrize('results', [
-    [None], [MavResult.TEMPORARILY_REJECTED], [MavResult.IN_PROGRESS, MavResult.ACCEPTED]],
+    [None], [mavlink.MAV_RESULT_TEMPORARILY_REJECTED],
+    [mavlink.MAV_RESULT_IN_PROGRESS, mavlink.MAV_RESULT_ACCEPTED]],
     ids=['lost', 'rejected', 'in progress'])
 # A lost ON is due to be sent again after 0.5 s.
 @pytest.mark.parametrize('silence', [0.3, 0.5])
 def test_an_on_under_way_ends_at_the_silence_with_an_off(
-        results: list[MavResult | None], silence: float) -> None:
+        results: list[int | None], silence: float) -> None:
     light = FakeLight()
     pair = Pair(light, settings=Settings(off_after_silence=silence)).settle()
     light.results[ON_OFF] = [*results]
@@ -181,7 +183,7 @@ def test_a_light_that_is_lost_before_or_during_its_off_goes_off_when_it_is_heard
     light = FakeLight()
     pair = silenced(light)
     pair.enable(True)
-    light.results[ON_OFF] = MavResult.FAILED
+    light.results[ON_OFF] = mavlink.MAV_RESULT_FAILED
     pair.run(before)
     pair.close()
     reported = len(pair.recorder.others)
@@ -228,7 +230,7 @@ def test_a_light_that_another_sender_switches_on_stays_on_until_silence(before: 
     if before == 'throttling':
         light.fields['error_status'] = 1
     else:
-        light.results[ON_OFF] = MavResult.DENIED
+        light.results[ON_OFF] = mavlink.MAV_RESULT_DENIED
         assert not pair.enable(True).success
         light.results.clear()
     pair.run(SILENCE + 2.0)
@@ -272,7 +274,7 @@ def test_a_light_that_no_request_has_switched_on_is_not_switched_on_again() -> N
 @pytest.mark.parametrize(('fields', 'kind', 'change'), [
     ({'brightness': 90.0}, CONFIGURE, 'brightness 90 %'), ({'enable': 1}, ON_OFF, 'on')])
 def test_a_sender_that_insists_is_left_alone_after_three_times_in_a_row(
-        fields: dict[str, float], kind: MavCmd, change: str) -> None:
+        fields: dict[str, float], kind: int, change: str) -> None:
     light, pair = reasserting()
     insist(light, pair, 20.0, **fields)
     times = [at for at, command in pair.commands_at(kind) if not command.confirmation]
@@ -391,7 +393,7 @@ def test_an_off_of_a_light_that_no_source_holds_is_not_undone_where_release_is_o
 def test_an_off_whose_undoing_failed_is_not_undone_after_a_restart() -> None:
     light, pair = reasserting()
     assert pair.enable(True).success
-    light.results[ON_OFF] = MavResult.FAILED
+    light.results[ON_OFF] = mavlink.MAV_RESULT_FAILED
     light.fields['enable'] = 0
     pair.run_until(lambda: pair.commands(ON_OFF)[1:])
     # The answer arrives, and the next try is due later.
@@ -437,7 +439,7 @@ def test_a_brightness_from_before_an_off_is_not_sent_after_it_where_that_is_the_
     for on in (True, False, True):
         assert pair.enable(on).success
         pair.run(5.0)
-    light.results[CONFIGURE] = [None, None, MavResult.ACCEPTED]
+    light.results[CONFIGURE] = [None, None, mavlink.MAV_RESULT_ACCEPTED]
     for brightness in setpoints:
         pair.light.set_brightness(brightness, pair.now)
         pair.turn()
@@ -472,7 +474,7 @@ def test_a_configuration_that_is_restored_is_not_sent_after_an_off_where_brightn
 ) -> None:
     light = FakeLight(brightness=50.0)
     pair = learned(light)
-    light.results[CONFIGURE] = [None, MavResult.ACCEPTED]
+    light.results[CONFIGURE] = [None, mavlink.MAV_RESULT_ACCEPTED]
     light.restart(pair.now, enable=1)
     pair.run_until(lambda: pair.light.restarts)
 
@@ -484,7 +486,7 @@ def test_a_configuration_that_is_restored_is_not_sent_after_an_off_where_brightn
 def test_a_setpoint_that_an_off_replaces_is_not_reported_where_brightness_is_the_switch() -> None:
     light = FakeLight(brightness=50.0)
     pair = learned(light)
-    light.results[CONFIGURE] = [None, MavResult.ACCEPTED]
+    light.results[CONFIGURE] = [None, mavlink.MAV_RESULT_ACCEPTED]
     pair.light.set_brightness(30.0, pair.now)
     pair.turn()
 

@@ -23,7 +23,7 @@ from illuminator_ros.illuminator.client import enable_all
 from illuminator_ros.illuminator.events import AutomaticSwitch, DesiredStateFailed, LightHeld
 from illuminator_ros.illuminator.light import Settings
 from illuminator_ros.illuminator.model import SafetyLimits
-from illuminator_ros.mavlink.messages import MavCmd, MavResult
+from illuminator_ros.mavlink.dialect import mavlink
 from illuminator_ros.payload.arbitration import Cause
 from illuminator_ros.payload.command_sources import SourceSettings
 import pytest
@@ -32,7 +32,7 @@ from support.fake_light import FakeLight
 from support.faulty_wire import Faults
 from support.records import Answer
 
-ON_OFF, CONFIGURE = MavCmd.ILLUMINATOR_ON_OFF, MavCmd.DO_ILLUMINATOR_CONFIGURE
+ON_OFF, CONFIGURE = mavlink.MAV_CMD_ILLUMINATOR_ON_OFF, mavlink.MAV_CMD_DO_ILLUMINATOR_CONFIGURE
 NAMES = ('safety', 'operator', 'default', 'autonomy')
 TIMEOUT, SILENCE = 2.3, 6.0
 
@@ -75,7 +75,7 @@ class Shared:
     def holder(self) -> str | None:
         return self.pair.snapshot.holder
 
-    def sent(self, kind: MavCmd, since: float = 0.0) -> list[float]:
+    def sent(self, kind: int, since: float = 0.0) -> list[float]:
         return [command.param1 if kind is ON_OFF else command.param2
                 for command in self.pair.commands(kind, since=since)]
 
@@ -183,9 +183,9 @@ def test_an_on_under_way_is_answered_though_its_source_releases_the_light() -> N
 @pytest.mark.parametrize('end', [
     lambda shared: shared.release('operator'),
     lambda shared: shared.pair.run_until(lambda: not shared.holder)], ids=['release', 'silence'])
-@pytest.mark.parametrize('result', [None, MavResult.TEMPORARILY_REJECTED])
+@pytest.mark.parametrize('result', [None, mavlink.MAV_RESULT_TEMPORARILY_REJECTED])
 def test_an_on_is_not_resent_after_the_hold_of_its_source(
-    end: Callable[[Shared], None], result: MavResult | None,
+    end: Callable[[Shared], None], result: int | None,
 ) -> None:
     shared = Shared()
     shared.pair.settle()
@@ -207,7 +207,7 @@ def test_an_on_is_not_resent_after_the_hold_of_its_source(
 def test_an_off_under_way_is_resent_though_its_source_releases_the_light() -> None:
     shared = Shared(light=FakeLight(brightness=50.0, enable=1))
     shared.pair.settle()
-    shared.light.results[ON_OFF] = [None, MavResult.ACCEPTED]
+    shared.light.results[ON_OFF] = [None, mavlink.MAV_RESULT_ACCEPTED]
     answer = shared.enable('operator', False)
     shared.release('operator')
 
@@ -263,7 +263,7 @@ def test_an_off_at_a_release_is_repeated_though_a_source_that_dims_takes_the_lig
     shared = Shared(off_on_release=True, timeout=60.0)
     shared.pair.settle()
     shared.pair.wait_for(shared.enable('operator', True))
-    shared.light.results[ON_OFF] = MavResult.FAILED
+    shared.light.results[ON_OFF] = mavlink.MAV_RESULT_FAILED
     shared.release('operator')
     shared.pair.run(0.5)
     shared.dim('autonomy', 20.0)
@@ -404,7 +404,7 @@ def test_a_requested_state_that_the_light_refuses_is_reported() -> None:
     shared.enable('safety', False)
     shared.pair.run(1.0)
     shared.enable('autonomy', True)
-    shared.light.results[ON_OFF] = MavResult.DENIED
+    shared.light.results[ON_OFF] = mavlink.MAV_RESULT_DENIED
     shared.release('safety')
     shared.pair.run(1.0)
 

@@ -23,15 +23,16 @@ from illuminator_ros.illuminator.events import ChangeCause
 from illuminator_ros.illuminator.light import Settings
 from illuminator_ros.illuminator.light_configuration import RESTORE_INTERVAL
 from illuminator_ros.illuminator.model import Configuration, float32, Mode, SafetyLimits
-from illuminator_ros.mavlink.messages import CommandAck, MavCmd, MavResult
+from illuminator_ros.mavlink.dialect import mavlink
+from illuminator_ros.mavlink.messages import CommandAck, result_name
 from illuminator_ros.payload.attempt import Result
 import pytest
 from support.back_to_back import Pair, START
 from support.fake_light import FakeLight
 from support.faulty_wire import Faults
 
-CONFIGURE, ON_OFF = MavCmd.DO_ILLUMINATOR_CONFIGURE, MavCmd.ILLUMINATOR_ON_OFF
-ACCEPTED, DENIED = MavResult.ACCEPTED, MavResult.DENIED
+CONFIGURE, ON_OFF = mavlink.MAV_CMD_DO_ILLUMINATOR_CONFIGURE, mavlink.MAV_CMD_ILLUMINATOR_ON_OFF
+ACCEPTED, DENIED = mavlink.MAV_RESULT_ACCEPTED, mavlink.MAV_RESULT_DENIED
 ALL = {'mode': 'internal_control', 'brightness': 70, 'strobe_period': 1, 'strobe_duty_cycle': 10}
 
 
@@ -369,7 +370,7 @@ def test_the_last_setpoint_is_verified(fake: FakeLight, faked: Pair) -> None:
 
 
 def test_a_stream_goes_on_after_a_failure(fake: FakeLight, faked: Pair) -> None:
-    fake.results[CONFIGURE] = [MavResult.FAILED, ACCEPTED]
+    fake.results[CONFIGURE] = [mavlink.MAV_RESULT_FAILED, ACCEPTED]
     publish(faked, 30.0, 40.0)
     faked.run(0.5)
     assert faked.recorder.failed_setpoints[0].startswith('refused: MAV_RESULT_FAILED')
@@ -431,26 +432,29 @@ def test_overrides_within_the_limits_are_sent_as_one_command(
     assert confirmed(pair).brightness == 5.0
 
 
-@pytest.mark.parametrize('result', [DENIED, MavResult.UNSUPPORTED, MavResult.COMMAND_LONG_ONLY])
+@pytest.mark.parametrize('result',
+                         [DENIED, mavlink.MAV_RESULT_UNSUPPORTED,
+                          mavlink.MAV_RESULT_COMMAND_LONG_ONLY])
 def test_overrides_that_are_refused_are_reported_once_and_not_sent_again(
-    fake: FakeLight, result: MavResult,
+    fake: FakeLight, result: int,
 ) -> None:
     fake.results[CONFIGURE] = result
     pair = overriding(fake, brightness=30.0).settle(60.0)
     assert len(sent(pair)) == 1
     (success, message), = pair.recorder.restorations
     assert not success
-    assert result.name in message
-    assert result.name in pair.snapshot.discrepancy
+    assert result_name(result) in message
+    assert result_name(result) in pair.snapshot.discrepancy
     fake.results.clear()
     assert pair.configure(brightness=40).success
     assert pair.snapshot.discrepancy == ''
 
 
 @pytest.mark.parametrize('result', [
-    None, MavResult.TEMPORARILY_REJECTED, MavResult.IN_PROGRESS, MavResult.FAILED])
+    None, mavlink.MAV_RESULT_TEMPORARILY_REJECTED, mavlink.MAV_RESULT_IN_PROGRESS,
+    mavlink.MAV_RESULT_FAILED])
 def test_overrides_that_fail_otherwise_are_sent_until_they_succeed(
-    fake: FakeLight, result: MavResult | None,
+    fake: FakeLight, result: int | None,
 ) -> None:
     fake.results[CONFIGURE] = result
     pair = overriding(fake, brightness=30.0).settle(20.0)
@@ -489,7 +493,7 @@ def test_overrides_and_a_restored_configuration_reach_a_light_that_answers_too_l
 @pytest.mark.parametrize(('result', 'text'), [
     (DENIED, 'refused: MAV_RESULT_DENIED'), (ACCEPTED, 'shows brightness 100 %')])
 def test_overrides_that_a_light_does_not_take_and_answers_late_are_given_up(
-    fake: FakeLight, latency: float, result: MavResult, text: str,
+    fake: FakeLight, latency: float, result: int, text: str,
 ) -> None:
     fake.results[CONFIGURE] = result
     fake.applies = False

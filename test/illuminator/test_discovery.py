@@ -21,14 +21,15 @@ from typing import Any
 from illuminator_ros.illuminator import events
 from illuminator_ros.illuminator.light import Settings
 from illuminator_ros.mavlink import messages as mav
+from illuminator_ros.mavlink.dialect import mavlink
 from illuminator_ros.payload.discovery import CANDIDATE_TIME, MAX_CANDIDATES, MAX_DEVICES
 import pytest
 from support.back_to_back import BRIDGE, Pair
 from support.client import Client
 from support.fake_light import FakeLight, LIGHT, status_message
 
-ILLUMINATOR = mav.heartbeat(mav.MavType.ILLUMINATOR)
-ANSWER = mav.CommandAck(mav.MavCmd.REQUEST_MESSAGE, 0, 0, 0, *BRIDGE)
+ILLUMINATOR = mav.heartbeat(mavlink.MAV_TYPE_ILLUMINATOR)
+ANSWER = mav.CommandAck(mavlink.MAV_CMD_REQUEST_MESSAGE, 0, 0, 0, *BRIDGE)
 FORGED = [mav.Address(system, component) for system in (2, 3) for component in range(1, 200)]
 
 
@@ -67,7 +68,7 @@ def test_a_light_is_found_by_its_messages_at_any_address(
 
 
 @pytest.mark.parametrize('message', [
-    ILLUMINATOR, mav.heartbeat(mav.MavType.ONBOARD_CONTROLLER), mav.heartbeat(0), ANSWER,
+    ILLUMINATOR, mav.heartbeat(mavlink.MAV_TYPE_ONBOARD_CONTROLLER), mav.heartbeat(0), ANSWER,
     mav.ComponentInformationBasic(0, 0, 0, b'maker', b'torch', b'1', b'1', b'n'),
 ], ids=lambda message: type(message).__name__)
 def test_one_message_that_any_component_may_send_announces_no_light(

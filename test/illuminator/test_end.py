@@ -27,7 +27,8 @@ from illuminator_ros.illuminator.simulated_properties import (
     IlluminatorBehaviour,
     IlluminatorProperties,
 )
-from illuminator_ros.mavlink.messages import Address, MavCmd, MavResult
+from illuminator_ros.mavlink.dialect import mavlink
+from illuminator_ros.mavlink.messages import Address
 from illuminator_ros.payload.attempt import Result
 from illuminator_ros.payload.command_sources import SourceSettings
 import pytest
@@ -37,7 +38,7 @@ from support.faulty_wire import Faults
 from support.records import Answer
 from support.shared_address import SharedAddress
 
-ON_OFF, CONFIGURE = MavCmd.ILLUMINATOR_ON_OFF, MavCmd.DO_ILLUMINATOR_CONFIGURE
+ON_OFF, CONFIGURE = mavlink.MAV_CMD_ILLUMINATOR_ON_OFF, mavlink.MAV_CMD_DO_ILLUMINATOR_CONFIGURE
 ENDING = 'the bridge is ending'
 # s that the bridge waits for the lights.
 LIMIT = 0.6
@@ -319,10 +320,11 @@ def test_of_lights_that_share_an_address_each_must_show_off() -> None:
 
 
 @pytest.mark.parametrize(('results', 'sends_status', 'reason', 'is_permanent'), [
-    (MavResult.DENIED, True, 'refused: MAV_RESULT_DENIED (1 try, ', True),
-    (MavResult.FAILED, True, 'refused: MAV_RESULT_FAILED (1 try, ', False),
+    (mavlink.MAV_RESULT_DENIED, True, 'refused: MAV_RESULT_DENIED (1 try, ', True),
+    (mavlink.MAV_RESULT_FAILED, True, 'refused: MAV_RESULT_FAILED (1 try, ', False),
     (None, True, '', False),
-    (MavResult.ACCEPTED, False, 'off not confirmed: MAV_RESULT_ACCEPTED (1 try, ', False)])
+    (mavlink.MAV_RESULT_ACCEPTED, False, 'off not confirmed: MAV_RESULT_ACCEPTED (1 try, ',
+     False)])
 def test_a_light_that_does_not_show_off_is_reported_with_the_reason(
     ending: Ending, light: FakeLight, results: int | None, sends_status: bool, reason: str,
     is_permanent: bool,

@@ -16,15 +16,15 @@
 
 from typing import Any
 
-from illuminator_ros.illuminator.model import ErrorFlags
 from illuminator_ros.illuminator.simulated_properties import FAULTS, IlluminatorBehaviour
-from illuminator_ros.mavlink.messages import CommandAck, Heartbeat, MavCmd, MavResult
+from illuminator_ros.mavlink.dialect import mavlink
+from illuminator_ros.mavlink.messages import CommandAck, Heartbeat
 from illuminator_ros.payload.faults import FaultError
 from illuminator_ros.payload.simulated import MAX_DELAYED
 import pytest
 from support.light_bench import LightBench
 
-ON = (MavCmd.ILLUMINATOR_ON_OFF, 1)
+ON = (mavlink.MAV_CMD_ILLUMINATOR_ON_OFF, 1)
 NORMAL = IlluminatorBehaviour()
 
 
@@ -49,9 +49,9 @@ def test_a_silent_light_neither_sends_nor_obeys_until_its_silence_is_over() -> N
 def test_a_hot_light_reports_its_heat_as_soon_as_its_sensor_is_mended() -> None:
     bench = LightBench('thermistor')
     bench.lamp.heat_to(85.0, bench.now)
-    assert bench.status().error_status == ErrorFlags.THERMISTOR_FAILURE
+    assert bench.status().error_status == mavlink.ILLUMINATOR_ERROR_FLAGS_THERMISTOR_FAILURE
     bench.component.behave(NORMAL, bench.now)
-    assert bench.status().error_status == ErrorFlags.THERMAL_THROTTLING
+    assert bench.status().error_status == mavlink.ILLUMINATOR_ERROR_FLAGS_THERMAL_THROTTLING
 
 
 @pytest.mark.parametrize('fault', ['slow=2', 'progress=2', 'delay=3'])
@@ -78,7 +78,7 @@ def test_progress_is_reported_until_the_change_and_rejects_a_second_command() ->
     bench = LightBench('progress=2')
     bench.command(*ON)
     bench.run(1.9)
-    assert bench.result(*ON) == MavResult.TEMPORARILY_REJECTED
+    assert bench.result(*ON) == mavlink.MAV_RESULT_TEMPORARILY_REJECTED
     assert not bench.lamp.enabled
     bench.run(0.2)
     reported = [(at, ack.result, ack.progress) for at, ack in bench.of(CommandAck)]

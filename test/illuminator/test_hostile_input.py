@@ -22,6 +22,7 @@ import itertools
 from typing import Any
 
 from illuminator_ros.mavlink import messages as mav
+from illuminator_ros.mavlink.dialect import CRC_EXTRA
 from illuminator_ros.mavlink.signing import MAX_STREAMS, SigningMode
 from illuminator_ros.payload.attempt import Result
 from illuminator_ros.payload.discovery import MAX_DEVICES
@@ -67,7 +68,7 @@ def forged(count: int) -> list[mav.Address]:
 
 
 def unknown_ids() -> Iterator[int]:
-    return (number for number in range(1 << 20, 1 << 24) if number not in mav.LAYOUTS)
+    return (number for number in range(1 << 20, 1 << 24) if number not in CRC_EXTRA)
 
 
 def assert_bounded(attacked: AttackedLink, frames: list[bytes], *, peers: int = 1) -> None:

@@ -22,12 +22,13 @@ from illuminator_ros.illuminator.light import Settings
 from illuminator_ros.illuminator.messages import STATUS_ID
 from illuminator_ros.illuminator.simulated_properties import IlluminatorProperties
 from illuminator_ros.mavlink import messages as mav
+from illuminator_ros.mavlink.dialect import decode, encode, mavlink
 from illuminator_ros.payload.identity import Identity, MAX_QUESTIONS, SETTLING_TIME, text
 import pytest
 from support.back_to_back import Pair, START
 from support.fake_light import FakeLight
 
-CONFIGURE, REQUEST = mav.MavCmd.DO_ILLUMINATOR_CONFIGURE, mav.MavCmd.REQUEST_MESSAGE
+CONFIGURE, REQUEST = mavlink.MAV_CMD_DO_ILLUMINATOR_CONFIGURE, mavlink.MAV_CMD_REQUEST_MESSAGE
 
 
 def requests_of(pair: Pair, message_id: int, since: float = 0.0) -> int:
@@ -146,7 +147,7 @@ def test_the_interval_of_the_settings_is_requested_at_first_and_after_a_restart(
     pair = Pair(fake, settings=Settings(status_interval=interval)).settle(30.0)
     expected = [(STATUS_ID, pytest.approx(interval * 1e6))] if interval else []
     assert [(command.param1, command.param2) for command in pair.commands(
-        mav.MavCmd.SET_MESSAGE_INTERVAL)] == expected
+        mavlink.MAV_CMD_SET_MESSAGE_INTERVAL)] == expected
     assert fake.stream == pytest.approx(interval or 1.0)
     assert requests_of(pair, STATUS_ID, since=START + 3.0) == 0
     fake.restart(pair.now)
@@ -184,7 +185,7 @@ def test_a_temperature_is_measured_from_the_first_that_is_not_0_unless_the_senso
 class Selective(FakeLight):
     """A light that answers a request for its identity with one result, or not at all."""
 
-    def __init__(self, result: mav.MavResult | None, **options: Any) -> None:
+    def __init__(self, result: int | None, **options: Any) -> None:
         super().__init__(**options)
         self.result = result
 
@@ -206,7 +207,7 @@ def test_a_char_field_is_read_as_printable_text_up_to_its_terminator(
 ) -> None:
     assert text(field) == expected
     sent = mav.ComponentInformationBasic(0, 0, 0, b'm' * 32, field, b'1', b'2', b'n-1')
-    message = mav.ComponentInformationBasic.decode(sent.encode())
+    message = decode(mav.ComponentInformationBasic, encode(sent))
     assert Identity.from_message(message) == Identity('m' * 32, expected, '1', '2', 'n-1')
 
 
@@ -226,8 +227,8 @@ def test_the_identity_is_requested_once_and_again_after_a_loss(
 
 
 @pytest.mark.parametrize(('light', 'count', 'failure'), [
-    (Selective(mav.MavResult.DENIED), 1, 'refused: MAV_RESULT_DENIED'),
-    (Selective(mav.MavResult.UNSUPPORTED), 1, 'refused: MAV_RESULT_UNSUPPORTED'),
+    (Selective(mavlink.MAV_RESULT_DENIED), 1, 'refused: MAV_RESULT_DENIED'),
+    (Selective(mavlink.MAV_RESULT_UNSUPPORTED), 1, 'refused: MAV_RESULT_UNSUPPORTED'),
     (Selective(None), 4, 'no acknowledgement'),
     (FakeLight(), MAX_QUESTIONS, 'acknowledged, but not sent'),
 ])
@@ -260,8 +261,8 @@ def test_a_light_that_ignores_the_request_for_its_identity_confirms_changes_as_f
 
 def test_a_light_that_supports_its_own_two_commands_only_is_served() -> None:
     pair = Pair(FakeLight(stream=0.5, results={
-        REQUEST: mav.MavResult.UNSUPPORTED,
-        mav.MavCmd.SET_MESSAGE_INTERVAL: mav.MavResult.UNSUPPORTED}),
+        REQUEST: mavlink.MAV_RESULT_UNSUPPORTED,
+        mavlink.MAV_CMD_SET_MESSAGE_INTERVAL: mavlink.MAV_RESULT_UNSUPPORTED}),
         settings=Settings(status_interval=0.1)).settle()
     assert pair.enable(True).success
     assert pair.configure(brightness=50).success

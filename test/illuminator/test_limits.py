@@ -20,13 +20,13 @@ from hypothesis import given, settings, strategies
 from illuminator_ros.illuminator.events import LimitExceeded, SetpointClipped
 from illuminator_ros.illuminator.light import Settings
 from illuminator_ros.illuminator.model import float32, SafetyLimits
-from illuminator_ros.mavlink.messages import MavCmd
+from illuminator_ros.mavlink.dialect import mavlink
 import pytest
 from support.back_to_back import Pair
 from support.fake_light import FakeLight
 from support.faulty_wire import Faults
 
-CONFIGURE = MavCmd.DO_ILLUMINATOR_CONFIGURE
+CONFIGURE = mavlink.MAV_CMD_DO_ILLUMINATOR_CONFIGURE
 LIMITS = SafetyLimits(max_brightness=60.0, min_strobe_period=0.34)
 LIMITED = Settings(limits=LIMITS)
 percent = strategies.floats(0, 100)

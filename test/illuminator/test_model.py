@@ -25,6 +25,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from illuminator_ros.illuminator import model
 from illuminator_ros.illuminator.messages import IlluminatorStatus, STATUS_ID
+from illuminator_ros.mavlink.dialect import encode
 import pytest
 from support.fake_light import status_message
 from support.messages import decode_payload
@@ -178,7 +179,7 @@ def test_error_flags_have_readable_names(flags: int, names: list[str]) -> None:
 
 def read(**fields: Any) -> model.Status:
     """Return a status as it comes from the wire."""
-    message = decode_payload(STATUS_ID, status_message(**fields).encode())
+    message = decode_payload(STATUS_ID, encode(status_message(**fields)))
     assert isinstance(message, IlluminatorStatus)
     return model.Status.from_message(message)
 

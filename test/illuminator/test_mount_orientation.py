@@ -25,9 +25,9 @@ from illuminator_ros.illuminator.mount_orientation import (
     MAX_MOUNTS,
     MountOrientations,
 )
+from illuminator_ros.mavlink.dialect import mavlink
 from illuminator_ros.mavlink.messages import Address
 from illuminator_ros.payload.messages import Attitude, GimbalDeviceAttitudeStatus
-from illuminator_ros.payload.mount_attitude import MountFlags
 from illuminator_ros.payload.rotation import Quaternion, Vector
 import pytest
 from pytest import approx
@@ -36,7 +36,8 @@ Rotation = pytest.importorskip('scipy.spatial.transform').Rotation
 
 GIMBAL, AUTOPILOT = Address(1, 154), Address(1, 1)
 NAN = math.nan
-EARTH, VEHICLE = MountFlags.YAW_IN_EARTH_FRAME, MountFlags.YAW_IN_VEHICLE_FRAME
+EARTH, VEHICLE = (mavlink.GIMBAL_DEVICE_FLAGS_YAW_IN_EARTH_FRAME,
+                  mavlink.GIMBAL_DEVICE_FLAGS_YAW_IN_VEHICLE_FRAME)
 angles = st.floats(-3.1, 3.1)
 tilts = st.floats(-1.4, 1.4)
 

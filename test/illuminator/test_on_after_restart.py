@@ -24,7 +24,7 @@ from illuminator_ros.illuminator.light import Light, Settings
 from illuminator_ros.illuminator.messages import STATUS_ID
 from illuminator_ros.illuminator.model import SafetyLimits
 from illuminator_ros.illuminator.status_tracker import RESTART_CHECK_TIME
-from illuminator_ros.mavlink.messages import MavCmd, MavResult
+from illuminator_ros.mavlink.dialect import mavlink
 from illuminator_ros.payload.command_sources import SourceSettings
 import pytest
 from support.back_to_back import Pair, START
@@ -33,7 +33,7 @@ from support.faulty_wire import Faults
 from support.records import Answer
 from support.shared_address import SharedAddress
 
-CONFIGURE, ON_OFF = MavCmd.DO_ILLUMINATOR_CONFIGURE, MavCmd.ILLUMINATOR_ON_OFF
+CONFIGURE, ON_OFF = mavlink.MAV_CMD_DO_ILLUMINATOR_CONFIGURE, mavlink.MAV_CMD_ILLUMINATOR_ON_OFF
 LIMITED = Settings(limits=SafetyLimits(max_brightness=60.0))
 COMPLETE = {'mode': 'internal_control', 'brightness': 30, 'strobe_period': 0,
             'strobe_duty_cycle': 0}
@@ -231,7 +231,7 @@ def test_an_on_that_waits_fails_at_once_when_the_light_is_lost() -> None:
     assert light.shone == []
 
 
-@pytest.mark.parametrize('result', [MavResult.DENIED, None])
+@pytest.mark.parametrize('result', [mavlink.MAV_RESULT_DENIED, None])
 def test_a_light_that_cannot_be_configured_is_switched_on_after_one_attempt(
     result: int | None,
 ) -> None:
@@ -285,7 +285,7 @@ def test_a_light_that_is_lost_before_it_has_its_configuration_is_configured_befo
     light.restart(pair.now)
     pair.run(1.2)
     pair.close()
-    light.results[CONFIGURE] = [None, MavResult.ACCEPTED]
+    light.results[CONFIGURE] = [None, mavlink.MAV_RESULT_ACCEPTED]
     pair.open()
 
     answer = switch_on_at_connection(pair)
@@ -322,7 +322,7 @@ def test_a_restarted_light_is_switched_on_once_configured_over_a_lossy_line(seed
 def test_an_on_of_the_next_holder_waits_for_an_interrupted_configuration() -> None:
     light = FakeLight()
     pair = lost(light, Settings(sources=SourceSettings(('safety', 'default'))))
-    light.results[CONFIGURE] = [None, MavResult.ACCEPTED]
+    light.results[CONFIGURE] = [None, mavlink.MAV_RESULT_ACCEPTED]
     light.restart(pair.now)
     restarted_at = pair.now
     pair.run_until(lambda: pair.commands(CONFIGURE, since=restarted_at))
@@ -475,11 +475,11 @@ def test_an_on_that_undoes_an_off_and_waits_is_not_sent_to_a_light_that_has_rest
     assert light.shone == []
 
 
-@pytest.mark.parametrize('first', [MavResult.TEMPORARILY_REJECTED, None])
+@pytest.mark.parametrize('first', [mavlink.MAV_RESULT_TEMPORARILY_REJECTED, None])
 def test_an_on_waits_for_the_limits_though_a_parameter_is_being_set(first: int | None) -> None:
     light = FakeLight()
     pair = lost(light, replace(LIMITED, restore_configuration=False))
-    light.results[CONFIGURE] = [first, first, MavResult.ACCEPTED]
+    light.results[CONFIGURE] = [first, first, mavlink.MAV_RESULT_ACCEPTED]
     light.restart(pair.now)
     heartbeat_first(light, pair.now)
     pair.run_until(lambda: pair.light.connected)
@@ -495,7 +495,8 @@ def test_an_on_waits_for_the_limits_though_a_change_was_to_be_undone() -> None:
     for _ in range(2):
         light.fields['brightness'] = 50.0
         pair.run(1.1)
-    light.results[CONFIGURE] = [MavResult.TEMPORARILY_REJECTED, MavResult.ACCEPTED]
+    light.results[CONFIGURE] = [mavlink.MAV_RESULT_TEMPORARILY_REJECTED,
+                                mavlink.MAV_RESULT_ACCEPTED]
     pair.close()
     light.restart(pair.now)
     pair.open()

@@ -16,12 +16,13 @@
 
 from illuminator_ros.illuminator.simulated import properties
 from illuminator_ros.illuminator.simulated_properties import IlluminatorProperties, PROFILES
-from illuminator_ros.mavlink.messages import CommandInt, MavCmd
+from illuminator_ros.mavlink.dialect import encode, mavlink
+from illuminator_ros.mavlink.messages import CommandInt
 import pytest
 from support.back_to_back import Pair
 from support.light_bench import LightBench
 
-ON_OFF, CONFIGURE = MavCmd.ILLUMINATOR_ON_OFF, MavCmd.DO_ILLUMINATOR_CONFIGURE
+ON_OFF, CONFIGURE = mavlink.MAV_CMD_ILLUMINATOR_ON_OFF, mavlink.MAV_CMD_DO_ILLUMINATOR_CONFIGURE
 
 
 def described(profile: str, **settings: object) -> IlluminatorProperties:
@@ -88,5 +89,5 @@ def test_a_light_of_ardusub_is_off_at_brightness_0_and_on_restores_the_last_one(
 def test_three_bytes_follow_the_common_35_with_the_same_crc_extra(profile: str) -> None:
     status = LightBench(properties=described(
         profile, zoom_level=7, color_mode=2, gimbal_device_id=154)).status()
-    payload = status.encode()
+    payload = encode(status)
     assert (len(payload), payload[35:], status.crc_extra) == (38, bytes([7, 2, 154]), 66)

@@ -26,6 +26,7 @@ from illuminator_ros.illuminator.light import REFRESH_LIMIT
 from illuminator_ros.illuminator.messages import STATUS_ID
 from illuminator_ros.illuminator.simulated_properties import IlluminatorProperties
 from illuminator_ros.mavlink import messages as mav
+from illuminator_ros.mavlink.dialect import mavlink
 from illuminator_ros.payload.attempt import Result
 from illuminator_ros.payload.identity import Identity
 from illuminator_ros.payload.reconciler import MAX_CALLERS, PROGRESS_LIMIT
@@ -35,11 +36,11 @@ from support.fake_light import FakeLight
 from support.faulty_wire import Faults
 from support.records import Answer
 
-ON_OFF, CONFIGURE = mav.MavCmd.ILLUMINATOR_ON_OFF, mav.MavCmd.DO_ILLUMINATOR_CONFIGURE
-REQUEST = mav.MavCmd.REQUEST_MESSAGE
+ON_OFF, CONFIGURE = mavlink.MAV_CMD_ILLUMINATOR_ON_OFF, mavlink.MAV_CMD_DO_ILLUMINATOR_CONFIGURE
+REQUEST = mavlink.MAV_CMD_REQUEST_MESSAGE
 ACCEPTED, DENIED, IN_PROGRESS, REJECTED = (
-    mav.MavResult.ACCEPTED, mav.MavResult.DENIED, mav.MavResult.IN_PROGRESS,
-    mav.MavResult.TEMPORARILY_REJECTED)
+    mavlink.MAV_RESULT_ACCEPTED, mavlink.MAV_RESULT_DENIED, mavlink.MAV_RESULT_IN_PROGRESS,
+    mavlink.MAV_RESULT_TEMPORARILY_REJECTED)
 # The end of a message: tries and time.
 TIMING = re.compile(r' \((\d+) (?:try|tries), (?:(\d+) ms|(\d+\.\d\d) s)\)$')
 NO_STATUS: dict[str, Any] = {'stream': 0.0, 'answers': set()}
@@ -81,7 +82,7 @@ def change(fake: FakeLight, **attributes: Any) -> None:
      'on not confirmed: MAV_RESULT_ACCEPTED, but no ILLUMINATOR_STATUS came within 1.00 s'),
     (True, {'results': {ON_OFF: None}}, False, 'no acknowledgement'),
     *((True, {'results': {ON_OFF: result}}, False, f'refused: {mav.result_name(result)}')
-      for result in (DENIED, mav.MavResult.UNSUPPORTED, mav.MavResult.FAILED, 11, 200)),
+      for result in (DENIED, mavlink.MAV_RESULT_UNSUPPORTED, mavlink.MAV_RESULT_FAILED, 11, 200)),
 ])
 def test_the_answer_to_a_switch_says_what_the_light_did(
     fake: FakeLight, faked: Pair, on: bool, light: dict[str, Any], success: bool, text: str,
@@ -347,7 +348,7 @@ def test_many_lights_are_served_at_once_and_a_dead_one_delays_no_other() -> None
 
 
 @pytest.mark.parametrize('kind', [ON_OFF, CONFIGURE])
-def test_an_answer_may_start_the_next_request(pair: Pair, kind: mav.MavCmd) -> None:
+def test_an_answer_may_start_the_next_request(pair: Pair, kind: int) -> None:
     log: list[bool] = []
 
     def ask(now: float) -> None:
@@ -409,7 +410,7 @@ LIGHTS: dict[str, dict[str, Any]] = {
         'results': {CONFIGURE: None}, 'stream': 0.1, 'status': lambda now: PROGRESS},
     'always rejected': {'results': {CONFIGURE: REJECTED}},
     'accepted at the fourth try': {'results': {CONFIGURE: [REJECTED] * 3 + [ACCEPTED]}},
-    'COMMAND_INT only': {'results': {CONFIGURE: mav.MavResult.COMMAND_INT_ONLY}},
+    'COMMAND_INT only': {'results': {CONFIGURE: mavlink.MAV_RESULT_COMMAND_INT_ONLY}},
     'not done': {'applies': False},
     'done late': {'apply_after': 0.7},
     'no status any more': {'stream': 0.0, 'answers': {mav.INFORMATION_ID}},
@@ -471,7 +472,7 @@ def test_a_refresh_requests_status_and_identity_and_takes_both(
 
 @pytest.mark.parametrize(('light', 'success', 'status', 'identity'), [
     ({'answers': {STATUS_ID}}, True, 'received', 'acknowledged, but not sent'),
-    ({'stream': 0.0, 'results': {REQUEST: mav.MavResult.UNSUPPORTED}}, False,
+    ({'stream': 0.0, 'results': {REQUEST: mavlink.MAV_RESULT_UNSUPPORTED}}, False,
      'refused: MAV_RESULT_UNSUPPORTED', 'refused: MAV_RESULT_UNSUPPORTED'),
     ({'stream': 0.0, 'answers': {mav.INFORMATION_ID}}, False, 'nothing came', 'received'),
     (NO_STATUS, False, 'nothing came', 'acknowledged, but not sent'),

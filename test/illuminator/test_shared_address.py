@@ -27,14 +27,15 @@ from illuminator_ros.illuminator.events import (
 from illuminator_ros.illuminator.model import Status
 from illuminator_ros.illuminator.simulated_properties import FAULTS
 from illuminator_ros.illuminator.status_tracker import AddressConflict
-from illuminator_ros.mavlink.messages import Address, MavCmd
+from illuminator_ros.mavlink.dialect import mavlink
+from illuminator_ros.mavlink.messages import Address
 import pytest
 from support.back_to_back import Pair
 from support.fake_light import FakeLight, status_message
 from support.shared_address import SharedAddress, TwoDevices
 
 AUTOPILOT = Address(1, 1)
-ON_OFF, CONFIGURE = MavCmd.ILLUMINATOR_ON_OFF, MavCmd.DO_ILLUMINATOR_CONFIGURE
+ON_OFF, CONFIGURE = mavlink.MAV_CMD_ILLUMINATOR_ON_OFF, mavlink.MAV_CMD_DO_ILLUMINATOR_CONFIGURE
 
 
 def two(
@@ -139,7 +140,7 @@ def test_a_switch_fails_where_one_of_two_lights_does_not_obey(
     pair.settle(15.0)
     assert pair.snapshot.shared_address
     # The second light only streams: it answers neither commands nor requests.
-    lights[1].results = {ON_OFF: None, MavCmd.REQUEST_MESSAGE: None}
+    lights[1].results = {ON_OFF: None, mavlink.MAV_CMD_REQUEST_MESSAGE: None}
     lights[1].applies = False
     for _ in range(10):
         result = pair.enable(True)

@@ -21,15 +21,16 @@ from illuminator_ros.illuminator.messages import IlluminatorStatus, STATUS_ID
 from illuminator_ros.illuminator.simulated_properties import IlluminatorProperties
 from illuminator_ros.illuminator.thermal import ThermalProperties
 from illuminator_ros.mavlink import messages as mav
+from illuminator_ros.mavlink.dialect import encode, mavlink
 from illuminator_ros.payload.identity import Identity
 import pytest
 from support.light_bench import GROUND, LightBench
 from support.simulated_lights import simulated_lights
 
 NAN, INF = float('nan'), float('inf')
-ON_OFF, CONFIGURE = mav.MavCmd.ILLUMINATOR_ON_OFF, mav.MavCmd.DO_ILLUMINATOR_CONFIGURE
-REQUEST, SET_INTERVAL = mav.MavCmd.REQUEST_MESSAGE, mav.MavCmd.SET_MESSAGE_INTERVAL
-ACCEPTED, DENIED = mav.MavResult.ACCEPTED, mav.MavResult.DENIED
+ON_OFF, CONFIGURE = mavlink.MAV_CMD_ILLUMINATOR_ON_OFF, mavlink.MAV_CMD_DO_ILLUMINATOR_CONFIGURE
+REQUEST, SET_INTERVAL = mavlink.MAV_CMD_REQUEST_MESSAGE, mavlink.MAV_CMD_SET_MESSAGE_INTERVAL
+ACCEPTED, DENIED = mavlink.MAV_RESULT_ACCEPTED, mavlink.MAV_RESULT_DENIED
 HOT = ThermalProperties(ambient=40.0, rise=80.0, time_constant=10.0)
 
 
@@ -62,7 +63,7 @@ def test_the_uptime_counts_from_the_start_and_wraps_at_32_bits(bench: LightBench
 def test_strings_that_are_too_long_are_cut_and_terminated() -> None:
     bench = LightBench(identity=Identity('v' * 40, 'm' * 40, 's' * 40, 'h' * 40, 'n' * 40))
     _, information = bench.command(REQUEST, mav.INFORMATION_ID)
-    assert information.encode()[16:] == (
+    assert encode(information)[16:] == (
         b'v' * 31 + b'\0' + b'm' * 31 + b'\0' + b's' * 23 + b'\0' + b'h' * 23 + b'\0'
         + b'n' * 31 + b'\0')
 
@@ -149,10 +150,10 @@ def test_a_strobe_heats_by_its_duty_cycle_and_not_at_0_percent(
     *((REQUEST, (message_id,), DENIED) for message_id in (0, 1, 33, NAN, INF, -1, 440.5)),
     *((SET_INTERVAL, (message_id, 1e5), DENIED) for message_id in (0, mav.INFORMATION_ID, NAN)),
     *((SET_INTERVAL, (STATUS_ID, interval), DENIED) for interval in (NAN, INF, -INF, -2, -0.5)),
-    *((command, (), mav.MavResult.UNSUPPORTED) for command in (0, 80, 176, 404, 407, 65535)),
+    *((command, (), mavlink.MAV_RESULT_UNSUPPORTED) for command in (0, 80, 176, 404, 407, 65535)),
     *((ON_OFF, (value,), DENIED) for value in (-1, 2, 0.5, 1.5, 255, NAN, INF, -INF))])
 def test_a_command_that_the_light_cannot_do_is_refused_and_changes_nothing(
-    bench: LightBench, command: mav.MavCmd, params: tuple[float, ...], result: mav.MavResult,
+    bench: LightBench, command: int, params: tuple[float, ...], result: int,
 ) -> None:
     (ack,) = bench.command(command, *params)
     assert ack.result == result

@@ -16,12 +16,12 @@
 
 import dataclasses
 
-from illuminator_ros.illuminator.model import ErrorFlags
 from illuminator_ros.illuminator.thermal import ThermalModel, ThermalProperties
+from illuminator_ros.mavlink.dialect import mavlink
 import pytest
 
-THROTTLING = ErrorFlags.THERMAL_THROTTLING
-SHUTDOWN = ErrorFlags.OVER_TEMPERATURE_SHUTDOWN
+THROTTLING = mavlink.ILLUMINATOR_ERROR_FLAGS_THERMAL_THROTTLING
+SHUTDOWN = mavlink.ILLUMINATOR_ERROR_FLAGS_OVER_TEMPERATURE_SHUTDOWN
 
 
 def model(**properties: float) -> ThermalModel:
@@ -55,9 +55,9 @@ def test_a_light_in_too_hot_an_environment_is_throttled_from_the_start() -> None
 def test_thresholds_have_a_hysteresis() -> None:
     one = model()
     for temperature, flags, output in (
-            (79.9, ErrorFlags(0), 1.0), (80.0, THROTTLING, 0.5), (94.9, THROTTLING, 0.5),
+            (79.9, 0, 1.0), (80.0, THROTTLING, 0.5), (94.9, THROTTLING, 0.5),
             (95.0, THROTTLING | SHUTDOWN, 0.0), (70.1, THROTTLING | SHUTDOWN, 0.0),
-            (69.9, SHUTDOWN, 0.0), (65.1, SHUTDOWN, 0.0), (64.9, ErrorFlags(0), 1.0)):
+            (69.9, SHUTDOWN, 0.0), (65.1, SHUTDOWN, 0.0), (64.9, 0, 1.0)):
         one.set_temperature(temperature)
         assert (one.flags, one.output) == (flags, output), temperature
 

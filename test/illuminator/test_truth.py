@@ -28,9 +28,10 @@ from illuminator_ros.illuminator.events import (
     StatusReceived,
 )
 from illuminator_ros.illuminator.light import Settings
-from illuminator_ros.illuminator.model import ErrorFlags, Mode
+from illuminator_ros.illuminator.model import Mode
 from illuminator_ros.mavlink.command_sender import MAX_SAMPLES
-from illuminator_ros.mavlink.messages import CommandAck, MavCmd, MavResult
+from illuminator_ros.mavlink.dialect import mavlink
+from illuminator_ros.mavlink.messages import CommandAck
 from illuminator_ros.payload.command_sources import SourceSettings
 import pytest
 from support.back_to_back import BRIDGE, Pair
@@ -38,7 +39,7 @@ from support.fake_light import FakeLight, LIGHT, status_message
 from support.faulty_wire import Faults
 from support.records import Answer
 
-ON_OFF, CONFIGURE = MavCmd.ILLUMINATOR_ON_OFF, MavCmd.DO_ILLUMINATOR_CONFIGURE
+ON_OFF, CONFIGURE = mavlink.MAV_CMD_ILLUMINATOR_ON_OFF, mavlink.MAV_CMD_DO_ILLUMINATOR_CONFIGURE
 
 
 def events_of(pair: Pair) -> list[LightEvent]:
@@ -115,7 +116,7 @@ def test_off_is_sent_until_an_acknowledgement_cannot_be_that_of_on(
     fake.applies = False
     faked.near.wire.faults = Faults(drop=1.0)
     answer = faked.ask_enable(False)
-    fake.send(CommandAck(ON_OFF, MavResult.ACCEPTED, 0, 0, *BRIDGE))
+    fake.send(CommandAck(ON_OFF, mavlink.MAV_RESULT_ACCEPTED, 0, 0, *BRIDGE))
     faked.run(0.01)
     assert not answer.results
     faked.run(4.0)
@@ -136,7 +137,7 @@ def test_a_status_from_before_the_last_repeat_does_not_confirm(
     shows_off = fake.status(faked.now)
     fake.fields['enable'] = 1
     for _ in range(10):
-        fake.send(CommandAck(ON_OFF, MavResult.ACCEPTED, 0, 0, *BRIDGE))
+        fake.send(CommandAck(ON_OFF, mavlink.MAV_RESULT_ACCEPTED, 0, 0, *BRIDGE))
         faked.run(0.05)
     fake.send(shows_off)
     assert not faked.wait_for(answer).success
@@ -150,7 +151,7 @@ def test_a_status_that_comes_sooner_than_any_answer_does_not_confirm(fake: FakeL
         assert pair.enable(on).success
         pair.run(6.0)
     fake.applies, fake.stream = False, 0.0
-    acknowledgement = CommandAck(ON_OFF, MavResult.ACCEPTED, 0, 0, *BRIDGE)
+    acknowledgement = CommandAck(ON_OFF, mavlink.MAV_RESULT_ACCEPTED, 0, 0, *BRIDGE)
     fake.send(acknowledgement)
     pair.run(0.5)
     fake.send(acknowledgement)
@@ -194,7 +195,7 @@ def test_a_line_that_stays_ambiguous_confirms_changes_and_nothing_else(
             pair.run(6.0)
     pair.near.wire.faults = pair.far.wire.faults = Faults(latency=latency)
     for on in (True, False) * MAX_SAMPLES:
-        fake.send(CommandAck(1, MavResult.ACCEPTED, 0, 0, *BRIDGE))
+        fake.send(CommandAck(1, mavlink.MAV_RESULT_ACCEPTED, 0, 0, *BRIDGE))
         pair.run(0.1)
         begun = pair.now
         assert pair.enable(on).success
@@ -202,7 +203,7 @@ def test_a_line_that_stays_ambiguous_confirms_changes_and_nothing_else(
     assert taken < 4 * latency + 0.1
 
     fake.applies = False
-    fake.send(CommandAck(ON_OFF, MavResult.ACCEPTED, 0, 0, *BRIDGE))
+    fake.send(CommandAck(ON_OFF, mavlink.MAV_RESULT_ACCEPTED, 0, 0, *BRIDGE))
     fake.send(status_message(fake.uptime_ms(pair.now), **{**fake.fields, 'enable': 1}))
     pair.run(latency / 2)
     assert not pair.enable(True).success
@@ -211,13 +212,13 @@ def test_a_line_that_stays_ambiguous_confirms_changes_and_nothing_else(
 def test_a_late_copy_of_a_refusal_does_not_refuse_the_next_command(
     fake: FakeLight, faked: Pair,
 ) -> None:
-    fake.results[ON_OFF] = MavResult.DENIED
+    fake.results[ON_OFF] = mavlink.MAV_RESULT_DENIED
     assert faked.enable(True).message.startswith('refused: MAV_RESULT_DENIED')
-    fake.results[ON_OFF] = MavResult.ACCEPTED
+    fake.results[ON_OFF] = mavlink.MAV_RESULT_ACCEPTED
     answer = faked.ask_enable(True)
     faked.near.wire.receive(faked.now)
     faked.controller.receive(
-        LIGHT, CommandAck(ON_OFF, MavResult.DENIED, 0, 0, *BRIDGE), faked.now)
+        LIGHT, CommandAck(ON_OFF, mavlink.MAV_RESULT_DENIED, 0, 0, *BRIDGE), faked.now)
     fake.fields['enable'] = 1
     result = faked.wait_for(answer)
     assert result.success
@@ -227,19 +228,20 @@ def test_a_late_copy_of_a_refusal_does_not_refuse_the_next_command(
 
 
 @pytest.mark.parametrize('fields', [
-    {'mode': Mode.EXTERNAL_SYNC}, {'error_status': ErrorFlags.THERMAL_THROTTLING},
+    {'mode': Mode.EXTERNAL_SYNC},
+    {'error_status': mavlink.ILLUMINATOR_ERROR_FLAGS_THERMAL_THROTTLING},
     {'brightness': math.nan}], ids=['follows another signal', 'is hot', 'reports no brightness'])
 def test_each_refusal_counts_where_the_status_cannot_show_the_change(
     fake: FakeLight, faked: Pair, fields: dict[str, float],
 ) -> None:
     fake.fields |= {'brightness': 30.0, **fields}
     faked.run(2.0)
-    fake.results[CONFIGURE] = MavResult.DENIED
+    fake.results[CONFIGURE] = mavlink.MAV_RESULT_DENIED
     for _ in range(2):
         result = faked.configure(brightness=50.0)
         assert not result.success
         assert result.message.startswith('refused: MAV_RESULT_DENIED')
-    fake.results[CONFIGURE] = MavResult.ACCEPTED
+    fake.results[CONFIGURE] = mavlink.MAV_RESULT_ACCEPTED
     faked.run(10.0)
     fake.applies = False
     assert faked.configure(brightness=50.0).success
@@ -265,7 +267,7 @@ def test_a_refusal_that_may_answer_another_request_is_reported_as_doubtful(
     fake.results[ON_OFF] = None
     assert not faked.enable(before).success
     answer = faked.ask_enable(True)
-    fake.send(CommandAck(ON_OFF, MavResult.DENIED, 0, 0, *BRIDGE))
+    fake.send(CommandAck(ON_OFF, mavlink.MAV_RESULT_DENIED, 0, 0, *BRIDGE))
     result = faked.wait_for(answer)
     assert not result.success
     assert result.message.startswith(text)

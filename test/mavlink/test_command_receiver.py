@@ -20,9 +20,11 @@ import math
 from typing import Any
 
 from illuminator_ros.mavlink import messages as mav
-from illuminator_ros.mavlink.command_receiver import AnyCommand, MAX_RESULTS, REPEAT_TIME
+from illuminator_ros.mavlink.command_receiver import MAX_RESULTS, REPEAT_TIME
 from illuminator_ros.mavlink.command_sender import CommandSender
 from illuminator_ros.mavlink.component import Component, Payload
+from illuminator_ros.mavlink.dialect import mavlink
+from illuminator_ros.mavlink.messages import AnyCommand
 import pytest
 
 OURS, PILOT, OTHER = mav.Address(1, 194), mav.Address(255, 190), mav.Address(255, 191)
@@ -34,7 +36,7 @@ class Turner(Payload):
 
     messages = (mav.CommandLong, mav.CommandInt)
 
-    def __init__(self, commands: CommandSender, supported: int, *results: mav.MavResult) -> None:
+    def __init__(self, commands: CommandSender, supported: int, *results: int) -> None:
         self.commands = commands
         self.supported = supported
         self.results = list(results)
@@ -45,18 +47,18 @@ class Turner(Payload):
 
     def execute(
         self, source: mav.Address, command: AnyCommand, now: float,
-    ) -> mav.MavResult | None:
+    ) -> int | None:
         if command.command != self.supported:
             return None
         self.executed.append(command)
         self.commands.send(mav.heartbeat(26))
-        return self.results.pop(0) if self.results else mav.MavResult.ACCEPTED
+        return self.results.pop(0) if self.results else mavlink.MAV_RESULT_ACCEPTED
 
 
 class Rig:
     """A component with two payloads, of which the second supports the command."""
 
-    def __init__(self, *results: mav.MavResult) -> None:
+    def __init__(self, *results: int) -> None:
         commands = CommandSender(OURS)
         self.turner = Turner(commands, SUPPORTED, *results)
         self.component = Component(commands, [Turner(commands, 1001), self.turner])
@@ -78,23 +80,23 @@ def whole(command: int = SUPPORTED, *, to: mav.Address = OURS) -> mav.CommandInt
     return mav.CommandInt(*to, 0, command, 0, 0, *(0.0,) * 4, 0, 0, 0.0)
 
 
-def ack(result: mav.MavResult, command: int = SUPPORTED) -> mav.CommandAck:
+def ack(result: int, command: int = SUPPORTED) -> mav.CommandAck:
     return mav.CommandAck(command, result, 0, 0, *PILOT)
 
 
 @pytest.mark.parametrize('make', [long, whole])
 def test_a_command_is_acknowledged_before_the_messages_that_it_causes(make: Any) -> None:
-    first, second = Rig(mav.MavResult.DENIED).give(make())
+    first, second = Rig(mavlink.MAV_RESULT_DENIED).give(make())
 
-    assert first == ack(mav.MavResult.DENIED)
+    assert first == ack(mavlink.MAV_RESULT_DENIED)
     assert isinstance(second, mav.Heartbeat)
 
 
 @pytest.mark.parametrize(('to', 'command', 'result'), [
-    (OURS, SUPPORTED, mav.MavResult.ACCEPTED),
-    (mav.Address(1, 0), SUPPORTED, mav.MavResult.ACCEPTED),
-    (mav.Address(0, 0), SUPPORTED, mav.MavResult.ACCEPTED),
-    (OURS, 31000, mav.MavResult.UNSUPPORTED),
+    (OURS, SUPPORTED, mavlink.MAV_RESULT_ACCEPTED),
+    (mav.Address(1, 0), SUPPORTED, mavlink.MAV_RESULT_ACCEPTED),
+    (mav.Address(0, 0), SUPPORTED, mavlink.MAV_RESULT_ACCEPTED),
+    (OURS, 31000, mavlink.MAV_RESULT_UNSUPPORTED),
     (mav.Address(1, 0), 31000, None),
     (mav.Address(0, 0), 31000, None),
     (mav.Address(1, 1), SUPPORTED, None),
@@ -102,13 +104,13 @@ def test_a_command_is_acknowledged_before_the_messages_that_it_causes(make: Any)
 ])
 @pytest.mark.parametrize('make', [long, whole])
 def test_a_command_is_answered_if_it_is_for_us(
-        make: Any, to: mav.Address, command: int, result: mav.MavResult | None) -> None:
+        make: Any, to: mav.Address, command: int, result: int | None) -> None:
     rig = Rig()
 
     sent = rig.give(make(command, to=to))
 
     assert sent[:1] == ([] if result is None else [ack(result, command)])
-    assert bool(rig.turner.executed) == (result is mav.MavResult.ACCEPTED)
+    assert bool(rig.turner.executed) == (result == mavlink.MAV_RESULT_ACCEPTED)
 
 
 # The second command that comes after long(), and whether it is executed.
@@ -124,22 +126,23 @@ SECOND = {
 @pytest.mark.parametrize('case', SECOND)
 def test_a_repeated_command_is_acknowledged_again_but_not_executed_again(case: str) -> None:
     command, source, pause, executed = SECOND[case]
-    rig = Rig(mav.MavResult.DENIED)
+    rig = Rig(mavlink.MAV_RESULT_DENIED)
     rig.give(long())
 
     [answer, *_] = rig.give(command, source=source, now=1.0 + pause)
 
     assert len(rig.turner.executed) == 1 + executed
-    assert answer.result == (mav.MavResult.ACCEPTED if executed else mav.MavResult.DENIED)
+    assert answer.result == (mavlink.MAV_RESULT_ACCEPTED if executed
+                             else mavlink.MAV_RESULT_DENIED)
 
 
 def test_a_command_that_was_rejected_temporarily_is_executed_when_it_is_repeated() -> None:
-    rig = Rig(mav.MavResult.TEMPORARILY_REJECTED)
+    rig = Rig(mavlink.MAV_RESULT_TEMPORARILY_REJECTED)
     rig.give(long())
 
     [answer, _] = rig.give(long(confirmation=1))
 
-    assert answer == ack(mav.MavResult.ACCEPTED)
+    assert answer == ack(mavlink.MAV_RESULT_ACCEPTED)
 
 
 def test_only_so_many_results_are_remembered() -> None:

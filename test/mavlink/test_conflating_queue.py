@@ -21,6 +21,7 @@ from typing import Any
 
 from illuminator_ros.mavlink.component import Endpoint
 from illuminator_ros.mavlink.conflating_queue import ConflatingQueue
+from illuminator_ros.mavlink.dialect import decode
 from illuminator_ros.mavlink.frame import Decoder
 from illuminator_ros.mavlink.messages import Address, heartbeat, Message
 from illuminator_ros.payload.messages import Attitude, GlobalPositionInt, SystemTime
@@ -113,7 +114,7 @@ def run(
     link.run(seconds)
     classes = {cls.id: cls for group in GROUPS for cls in group}
     return link, [
-        (at, classes[frame.message_id].decode(frame.payload))
+        (at, decode(classes[frame.message_id], frame.payload))
         for at, data in sent for frame in Decoder().feed(data) if frame.message_id in classes
     ], sum(len(data) for _, data in sent)
 

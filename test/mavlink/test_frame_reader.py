@@ -19,9 +19,10 @@ from __future__ import annotations
 from collections.abc import Sequence
 import math
 
+from illuminator_ros.mavlink.dialect import CRC_EXTRA
 from illuminator_ros.mavlink.frame import ForeignFrames, Frame
 from illuminator_ros.mavlink.frame_reader import FrameReader, MAX_DECODERS, STALL
-from illuminator_ros.mavlink.messages import Address, LAYOUTS
+from illuminator_ros.mavlink.messages import Address
 from illuminator_ros.mavlink.signing import Signing, SigningMode
 import pytest
 from support.frames import frame_of, heartbeat_frame, LIGHT, raw_v1
@@ -34,7 +35,7 @@ FALSE_STARTS = [b'\xfe\xfa\x00\x01\x01\x6e', b'\xfd\xfa\x00\x00\x00\x01\x01\x6e\
 
 @pytest.fixture
 def receiver() -> FrameReader:
-    return FrameReader(Signing(), LAYOUTS)
+    return FrameReader(Signing(), CRC_EXTRA)
 
 
 def sources(frames: Sequence[Frame | ForeignFrames]) -> list[Address]:
@@ -72,7 +73,7 @@ def test_frame_that_began_behind_a_false_start_is_still_awaited(receiver: FrameR
 def test_signed_frames_pass_and_are_counted_where_signing_is_off() -> None:
     frame = Signing(SigningMode.SIGN, bytes(32)).sign(frame_of(signed=True), UNIX)
     signing = Signing()
-    frames = FrameReader(signing, LAYOUTS).take('a', FRAME + frame, 0.0, UNIX)
+    frames = FrameReader(signing, CRC_EXTRA).take('a', FRAME + frame, 0.0, UNIX)
     assert (sources(frames), signing.counters.unchecked) == ([LIGHT] * 2, 1)
 
 
@@ -103,7 +104,7 @@ def test_garbage_of_many_peers_is_bounded_and_costs_a_good_peer_nothing(
 
 
 def test_unsigned_frames_do_not_pass_where_signing_is_required() -> None:
-    receiver = FrameReader(Signing(SigningMode.REQUIRE, bytes(32)), LAYOUTS)
+    receiver = FrameReader(Signing(SigningMode.REQUIRE, bytes(32)), CRC_EXTRA)
     assert receiver.take('a', FRAME + FALSE_STARTS[0] + FRAME, 0.0, UNIX) == []
     assert receiver.give_up(STALL, UNIX) == []
 

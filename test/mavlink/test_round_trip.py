@@ -25,7 +25,8 @@ from illuminator_ros.mavlink.command_sender import (
     MIN_TIMEOUT,
     RttEstimator,
 )
-from illuminator_ros.mavlink.messages import Address, MavResult
+from illuminator_ros.mavlink.dialect import mavlink
+from illuminator_ros.mavlink.messages import Address
 import pytest
 from support.command_rig import ACCEPTED, IN_PROGRESS, LIGHT, REJECTED, Rig
 
@@ -148,7 +149,7 @@ def test_wait_after_a_rejected_try_is_not_longer() -> None:
     ([(0.01, ACCEPTED)], [0.01]), ([(0.6, ACCEPTED)], []),
     ([(0.01, IN_PROGRESS), (0.05, ACCEPTED)], [0.01]),
     ([(0.01, REJECTED), (0.05, ACCEPTED)], [0.01]),
-    ([(0.01, MavResult.COMMAND_INT_ONLY), (0.01, ACCEPTED)], [0.01])])
+    ([(0.01, mavlink.MAV_RESULT_COMMAND_INT_ONLY), (0.01, ACCEPTED)], [0.01])])
 def test_only_the_first_answer_to_the_only_try_is_measured(
         answers: list[tuple[float, int]], samples: list[float]) -> None:
     rig = Rig()

@@ -48,13 +48,14 @@ def stamp_signed(signing: Signing, unix_time: float) -> int:
 
 # Agreed with pymavlink and the specification
 
-@pytest.mark.parametrize('message', EVERY_MESSAGE, ids=lambda message: message.name)
+@pytest.mark.parametrize('message', EVERY_MESSAGE, ids=lambda message: message.msgname)
 def test_signatures_are_accepted_by_pymavlink_and_those_of_pymavlink_by_us(
         message: Message) -> None:
     signing, peer = checker(link_id=9), Peer(key=KEY, link_id=4, timestamp=STAMP)
     for sequence in range(3):
         (read,) = peer.decode(signing.sign(frame_of(message, sequence, signed=True), NOW))
-        assert (read.get_type(), read.get_signed(), read.get_link_id()) == (message.name, True, 9)
+        assert (read.get_type(), read.get_signed(), read.get_link_id()) == (message.msgname, True,
+                                                                            9)
         assert signing.accepts(only(peer.encode(twin(message), sequence)), NOW)
     assert signing.counters == SigningCounters(good=3)
 

@@ -20,17 +20,19 @@ import math
 
 from hypothesis import example, given
 from hypothesis import strategies as st
+from illuminator_ros.mavlink.dialect import mavlink
 from illuminator_ros.payload import mount_attitude as mount
 from illuminator_ros.payload.messages import GimbalDeviceAttitudeStatus
-from illuminator_ros.payload.mount_attitude import MountAttitude, MountFlags, YawFrame
+from illuminator_ros.payload.mount_attitude import MountAttitude, YawFrame
 from illuminator_ros.payload.rotation import Quaternion
 import pytest
 from pytest import approx
 
 Rotation = pytest.importorskip('scipy.spatial.transform').Rotation
 
-EARTH, VEHICLE = MountFlags.YAW_IN_EARTH_FRAME, MountFlags.YAW_IN_VEHICLE_FRAME
-LOCK = MountFlags.YAW_LOCK
+EARTH, VEHICLE = (mavlink.GIMBAL_DEVICE_FLAGS_YAW_IN_EARTH_FRAME,
+                  mavlink.GIMBAL_DEVICE_FLAGS_YAW_IN_VEHICLE_FRAME)
+LOCK = mavlink.GIMBAL_DEVICE_FLAGS_YAW_LOCK
 NAN = math.nan
 # The change of axes between ENU and NED, and between FLU and FRD.
 ENU_NED = Rotation.from_matrix([[0, 1, 0], [1, 0, 0], [0, 0, -1]]).as_matrix()
@@ -62,7 +64,8 @@ def status(
 @pytest.mark.parametrize(('flags', 'frame'), [
     (0, YawFrame.VEHICLE), (LOCK, YawFrame.EARTH), (EARTH, YawFrame.EARTH),
     (VEHICLE, YawFrame.VEHICLE), (LOCK | EARTH, YawFrame.EARTH),
-    (LOCK | VEHICLE, YawFrame.VEHICLE), (MountFlags.PITCH_LOCK, YawFrame.VEHICLE)])
+    (LOCK | VEHICLE, YawFrame.VEHICLE),
+    (mavlink.GIMBAL_DEVICE_FLAGS_PITCH_LOCK, YawFrame.VEHICLE)])
 def test_gm_2_yaw_frame_is_independent_of_the_lock_if_the_flags_name_it(
         flags: int, frame: YawFrame) -> None:
     assert mount.yaw_frame(flags) is frame

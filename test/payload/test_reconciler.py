@@ -23,14 +23,15 @@ from typing import Any
 
 from hypothesis import given, strategies
 from illuminator_ros.mavlink.command_sender import CommandSender
-from illuminator_ros.mavlink.messages import Address, CommandAck, MavResult
+from illuminator_ros.mavlink.dialect import mavlink
+from illuminator_ros.mavlink.messages import Address, CommandAck
 from illuminator_ros.payload.attempt import Result, StatusReport, Target
 from illuminator_ros.payload.reconciler import decide, Desired, Reconciler
 import pytest
 
 US, DEVICE = Address(1, 194), Address(1, 7)
 SET_LEVEL, STATUS_ID = 31000, 40000
-ACCEPTED, DENIED = MavResult.ACCEPTED, MavResult.DENIED
+ACCEPTED, DENIED = mavlink.MAV_RESULT_ACCEPTED, mavlink.MAV_RESULT_DENIED
 
 
 @dataclass(frozen=True)
@@ -241,7 +242,8 @@ def test_the_first_rule_in_force_decides_and_a_later_one_is_named() -> None:
 STEPS = strategies.lists(strategies.one_of(
     strategies.tuples(strategies.just('want'), strategies.integers(0, 2)),
     strategies.tuples(strategies.just('acknowledge'), strategies.sampled_from(
-        [ACCEPTED, ACCEPTED, DENIED, MavResult.TEMPORARILY_REJECTED, MavResult.IN_PROGRESS])),
+        [ACCEPTED, ACCEPTED, DENIED, mavlink.MAV_RESULT_TEMPORARILY_REJECTED,
+         mavlink.MAV_RESULT_IN_PROGRESS])),
     strategies.tuples(strategies.just('report'), strategies.integers(0, 2)),
     strategies.tuples(strategies.just('run'), strategies.sampled_from([0.001, 0.3, 2.0, 7.0]))),
     max_size=40)

@@ -27,9 +27,10 @@ from functools import partial
 import math
 
 from illuminator_ros.mavlink import messages as mav
-from illuminator_ros.mavlink.command_receiver import AnyCommand
 from illuminator_ros.mavlink.command_sender import CommandSender, Done
 from illuminator_ros.mavlink.component import Payload
+from illuminator_ros.mavlink.dialect import mavlink
+from illuminator_ros.mavlink.messages import AnyCommand
 from illuminator_ros.payload import request, simulated
 from illuminator_ros.payload.discovery import Discovery
 from illuminator_ros.payload.faults import Behaviour
@@ -39,25 +40,9 @@ from illuminator_ros.payload.payload_type import PayloadType
 WINCH = PayloadType('winch', ros='payloads.winch_ros:WINCH',
                     simulated='payloads.winch:SIMULATED', checks='payloads.winch_checks:CHECKS')
 
-MAV_TYPE_WINCH, DO_WINCH = 42, 42600
-WINCH_RELATIVE_LENGTH_CONTROL = 1
+WinchStatus = mavlink.MAVLink_winch_status_message
 # s without a message after which a winch is lost.
 TIMEOUT = 3.0
-
-
-@mav.define(9005, 'WINCH_STATUS')
-@dataclass(slots=True)
-class WinchStatus(mav.Message):
-    """See above."""
-
-    time_usec: mav.UInt64
-    line_length: mav.Float
-    speed: mav.Float
-    tension: mav.Float
-    voltage: mav.Float
-    current: mav.Float
-    temperature: mav.Int16
-    status: mav.UInt32
 
 
 @dataclass(frozen=True)
@@ -79,12 +64,12 @@ class Release:
     length: float
     line_length: float
     note: str = ''
-    command: int = DO_WINCH
+    command: int = mavlink.MAV_CMD_DO_WINCH
 
     @property
     def params(self) -> tuple[float, ...]:
         """See :class:`Change`."""
-        return 1, WINCH_RELATIVE_LENGTH_CONTROL, self.length
+        return 1, mavlink.WINCH_RELATIVE_LENGTH_CONTROL, self.length
 
     @property
     def goal(self) -> str:
@@ -183,7 +168,7 @@ class WinchClient(Payload):
             if winch := self._discovery.hear(source, now, proved=True):
                 winch.take_status(message, now)
                 self.events.emit(WinchReport(source, message.line_length))
-        elif (isinstance(message, mav.Heartbeat) and message.type == MAV_TYPE_WINCH
+        elif (isinstance(message, mav.Heartbeat) and message.type == mavlink.MAV_TYPE_WINCH
                 and (winch := self._discovery.hear(source, now, proved=False))):
             winch.heard(now)
 
@@ -191,11 +176,11 @@ class WinchClient(Payload):
 class SimulatedWinch(simulated.SimulatedDevice):
     """A winch that releases and winds in at once."""
 
-    changes = frozenset({DO_WINCH})
+    changes = frozenset({mavlink.MAV_CMD_DO_WINCH})
     sends = (WinchStatus,)
 
     def __init__(self) -> None:
-        super().__init__(Behaviour(heartbeat_type=MAV_TYPE_WINCH))
+        super().__init__(Behaviour(heartbeat_type=mavlink.MAV_TYPE_WINCH))
         self.line_length = 0.0
 
     def streams(self) -> Mapping[int, float]:
@@ -211,12 +196,13 @@ class SimulatedWinch(simulated.SimulatedDevice):
         self, source: mav.Address, command: AnyCommand, now: float,
     ) -> simulated.Reply:
         """See :meth:`SimulatedDevice.execute`."""
-        if command.command != DO_WINCH:
+        if command.command != mavlink.MAV_CMD_DO_WINCH:
             return None
         length = self.line_length + command.param3
-        if command.param2 != WINCH_RELATIVE_LENGTH_CONTROL or not length >= 0:
-            return simulated.CommandReply(mav.MavResult.DENIED)
-        return simulated.CommandReply(mav.MavResult.ACCEPTED, partial(self.set_length, length))
+        if command.param2 != mavlink.WINCH_RELATIVE_LENGTH_CONTROL or not length >= 0:
+            return simulated.CommandReply(mavlink.MAV_RESULT_DENIED)
+        return simulated.CommandReply(mavlink.MAV_RESULT_ACCEPTED,
+                                      partial(self.set_length, length))
 
     def set_length(self, length: float) -> None:
         """Release or wind in until this length of line is released, m."""

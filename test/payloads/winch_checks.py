@@ -16,12 +16,13 @@
 
 from __future__ import annotations
 
+from illuminator_ros.mavlink.dialect import mavlink
 from illuminator_ros.mavlink.messages import Heartbeat
 from illuminator_ros.payload.checks import component_requirements as component
 from illuminator_ros.payload.checks import requirement as base
 from illuminator_ros.payload.checks.requirement import MESSAGES
 from illuminator_ros.payload.checks.session import Session
-from payloads.winch import DO_WINCH, MAV_TYPE_WINCH, WINCH_RELATIVE_LENGTH_CONTROL, WinchStatus
+from payloads.winch import WinchStatus
 
 
 class WinchTester:
@@ -45,7 +46,8 @@ class WinchTester:
     async def restore(self) -> list[str]:
         """See :class:`Tester`."""
         change = float(self.saved) - await self.length()
-        await self.session.command(DO_WINCH, 1, WINCH_RELATIVE_LENGTH_CONTROL, change)
+        await self.session.command(mavlink.MAV_CMD_DO_WINCH, 1,
+                                   mavlink.WINCH_RELATIVE_LENGTH_CONTROL, change)
         return [] if await self.length() == float(self.saved) else ['line_length']
 
 
@@ -54,7 +56,8 @@ class WinchTester:
 async def release(tester: WinchTester) -> None:
     """Release 2 m, and compare the status."""
     before = await tester.length()
-    one = await tester.session.command(DO_WINCH, 1, WINCH_RELATIVE_LENGTH_CONTROL, 2.0)
+    one = await tester.session.command(mavlink.MAV_CMD_DO_WINCH, 1,
+                                       mavlink.WINCH_RELATIVE_LENGTH_CONTROL, 2.0)
     after = await tester.length()
     if after != before + 2.0:
         raise one.failure(f'{before} m, then {after} m')
@@ -65,5 +68,5 @@ REQUIREMENTS: tuple[base.Requirement[WinchTester], ...] = (
     *component.interval_requirements(WinchStatus), release, *component.ACKNOWLEDGEMENTS)
 CHECKS = base.PayloadChecks(
     'winch', 'winch', (WinchStatus,),
-    lambda message: isinstance(message, Heartbeat) and message.type == MAV_TYPE_WINCH,
+    lambda message: isinstance(message, Heartbeat) and message.type == mavlink.MAV_TYPE_WINCH,
     'HEARTBEAT with MAV_TYPE_WINCH', WinchTester, REQUIREMENTS)

@@ -16,12 +16,13 @@
 
 from __future__ import annotations
 
-from dataclasses import fields, replace
+from dataclasses import replace
 import math
 from typing import Any
 
 from hypothesis import given
 from hypothesis import strategies as st
+from illuminator_ros.mavlink.dialect import decode, encode
 from illuminator_ros.payload.messages import Attitude, GlobalPositionInt
 from illuminator_ros.payload.rotation import flip, Quaternion, Vector
 from illuminator_ros.rededge import conversions
@@ -122,7 +123,7 @@ def test_rounded_angles_do_not_add_up_where_roll_and_yaw_turn_about_one_axis_re_
 @given(rotations)
 def test_attitude_is_that_of_the_frd_body_in_ned_in_radians_re_20(body: Quaternion) -> None:
     sent = conversions.attitude(body, (0.1, 0.2, -0.3), 7)
-    read = Attitude.decode(sent.encode())
+    read = decode(Attitude, encode(sent))
 
     assert error(Rotation.from_euler('ZYX', [read.yaw, read.pitch, read.roll]),
                  ENU_TO_NED * oracle(body) * FLU_TO_FRD) < 0.002
@@ -194,7 +195,7 @@ def test_whatever_comes_either_fits_its_fields_or_is_refused(
         sent = conversions.gps_raw_int(position, utc, velocity, satellites, 0.0)
     except ValueError:
         return
-    assert len(sent.encode()) == 30
+    assert len(encode(sent)) == 30
 
 
 def test_standard_deviations_are_the_roots_of_the_variances() -> None:
@@ -207,12 +208,12 @@ def test_standard_deviations_are_the_roots_of_the_variances() -> None:
 
 
 def test_satellites_are_counted_and_no_single_one_is_invented_re_28() -> None:
-    assert conversions.gps_status(9).encode() == bytes([9]) + bytes(100)
+    assert encode(conversions.gps_status(9)) == bytes([9]) + bytes(100)
 
 
 def feedback(**changes: Any) -> CameraFeedback:
     return CameraFeedback(**{
-        **{field.name: 0 for field in fields(CameraFeedback)}, 'lat': 473977421,
+        **dict.fromkeys(CameraFeedback.fieldnames, 0), 'lat': 473977421,
         'lng': 85455939, 'alt_msl': 487.25, **changes})
 
 

@@ -20,15 +20,14 @@ from collections.abc import Callable
 import math
 from typing import Any
 
+from illuminator_ros.mavlink.dialect import mavlink
 from illuminator_ros.mavlink.messages import Address, CommandLong, Heartbeat, heartbeat, Message
 from illuminator_ros.payload.messages import Attitude, GeoPoint, GlobalPositionInt, SystemTime
 from illuminator_ros.payload.rotation import Vector
 from illuminator_ros.payload.simulated import Description, SimulatedComponents
 from illuminator_ros.rededge.messages import (
     CameraFeedback,
-    CameraFeedbackFlags,
     CameraStatus,
-    CameraStatusType,
     DigicamControl,
     GpsRawInt,
     MountStatus,
@@ -131,13 +130,13 @@ def test_capture_is_followed_by_camera_status_and_later_by_camera_feedback() -> 
     utc = int((HOST_UTC + 1.0) * 1e6)
 
     assert camera.tell(control(1)) == [(Address(7, 100), CameraStatus(
-        utc, 7, 0, 1, CameraStatusType.TRIGGER, 0.0, 0.0, 0.0, 0.0))]
+        utc, 7, 0, 1, mavlink.CAMERA_STATUS_TYPE_TRIGGER, 0.0, 0.0, 0.0, 0.0))]
     assert camera.wait(0.1) == []
     [(source, feedback)] = camera.wait(0.2)
     assert isinstance(feedback, CameraFeedback)
     assert source == Address(7, 100)
     assert (feedback.time_usec, feedback.target_system, feedback.img_idx, feedback.flags) == (
-        utc, 7, 1, CameraFeedbackFlags.CLOSEDLOOP)
+        utc, 7, 1, mavlink.CAMERA_FEEDBACK_CLOSEDLOOP)
     assert (feedback.lat, feedback.lng, feedback.alt_msl) == (481234567, -91234567, 500.25)
 
 

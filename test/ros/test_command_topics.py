@@ -16,10 +16,11 @@
 
 import math
 
+from illuminator_ros.mavlink.dialect import mavlink
 import pytest
 from rclpy.qos import QoSProfile, ReliabilityPolicy
 from std_msgs.msg import Bool, Float32
-from support.light import CONFIGURE, eventually, MavResult, ON_OFF, params, ServedLight
+from support.light import CONFIGURE, eventually, ON_OFF, params, ServedLight
 from support.ros import Parameters, Ros, running_bridge
 
 ENABLE, BRIGHTNESS = '/illuminator/cmd/enable', '/illuminator/cmd/brightness'
@@ -49,7 +50,7 @@ def test_refusal_is_logged_and_parameters_keep_their_values(
     with running_bridge(own_ros.domain, port) as bridge, ServedLight(port) as light:
         parameters = Parameters(own_ros)
         parameters.wait(mode='internal_control')
-        light.fake.results[command] = MavResult.DENIED
+        light.fake.results[command] = mavlink.MAV_RESULT_DENIED
         before = parameters.get('brightness')
 
         own_ros.publish(type_, f'/illuminator/cmd/{topic}', value)

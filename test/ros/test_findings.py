@@ -30,7 +30,8 @@ from illuminator_ros.illuminator.ros.diagnostics import (
     LightsHeard,
     reports,
 )
-from illuminator_ros.mavlink.messages import Address, heartbeat, MavType
+from illuminator_ros.mavlink.dialect import mavlink
+from illuminator_ros.mavlink.messages import Address, heartbeat
 from illuminator_ros.mavlink.signing import Signing, SigningMode
 from illuminator_ros.ros.diagnostics import link_diagnostics
 import pytest
@@ -125,7 +126,7 @@ def test_silence_of_a_light_is_a_warning_and_its_loss_an_error() -> None:
     reported.status()
     for _ in range(11):
         reported.link.run(1.0)
-        reported.receive(frame_of(heartbeat(MavType.ILLUMINATOR), 0, LIGHT))
+        reported.receive(frame_of(heartbeat(mavlink.MAV_TYPE_ILLUMINATOR), 0, LIGHT))
     assert found(reported.statuses()['lamp']) == (WARN, 'no status for 11.00 s')
     reported.link.run(5.0)
     level, text = found(reported.statuses()['lamp'])
@@ -147,14 +148,14 @@ def test_lost_frames_are_a_warning_unless_the_light_has_restarted() -> None:
 def test_another_sender_with_our_address_is_an_error() -> None:
     reported = Reported()
     reported.status()
-    reported.receive(frame_of(heartbeat(MavType.ONBOARD_CONTROLLER), 100, BRIDGE))
+    reported.receive(frame_of(heartbeat(mavlink.MAV_TYPE_ONBOARD_CONTROLLER), 100, BRIDGE))
     assert found(reported.statuses()['link']) == (
         ERROR, 'another sender uses our address 1/194')
 
 
 def test_another_sender_with_our_address_is_the_reason_for_a_missing_light() -> None:
     reported = Reported()
-    reported.receive(frame_of(heartbeat(MavType.ONBOARD_CONTROLLER), 100, BRIDGE))
+    reported.receive(frame_of(heartbeat(mavlink.MAV_TYPE_ONBOARD_CONTROLLER), 100, BRIDGE))
 
     assert reported.statuses()['link'].message.endswith(
         'another sender uses our address 1/194: set component_id to a free one here or there')

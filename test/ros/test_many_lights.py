@@ -17,11 +17,12 @@
 from collections.abc import Iterator
 import contextlib
 
+from illuminator_ros.mavlink.dialect import mavlink
 import pytest
 from rclpy.node import NodeNameNonExistentError
 from std_msgs.msg import Bool, Float32
 from std_srvs.srv import SetBool, Trigger
-from support.light import Address, eventually, MavResult, ON_OFF, ServedLight
+from support.light import Address, eventually, ON_OFF, ServedLight
 from support.ports import free_port
 from support.processes import Program
 from support.ros import Parameters, Ros, running_bridge
@@ -130,7 +131,7 @@ def test_services_parameters_and_topics_of_other_lights_go_on_while_one_is_silen
             ros.subscribe(Bool, f'{node}/enabled').wait_value(True)
 
     assert not waiting.answered
-    lights[silent].acknowledge(ON_OFF, MavResult.FAILED, source=NODES[silent])
+    lights[silent].acknowledge(ON_OFF, mavlink.MAV_RESULT_FAILED, source=NODES[silent])
     assert 'MAV_RESULT_FAILED' in waiting.result().message
 
 
@@ -184,7 +185,7 @@ def test_one_request_switches_all_lights_and_names_each(ros: Ros, lights: Group)
 def test_topic_switches_all_lights_and_a_failure_is_logged(
     ros: Ros, group: tuple[Program, Group], lights: Group,
 ) -> None:
-    lights['/belly'].fake.results[ON_OFF] = MavResult.DENIED
+    lights['/belly'].fake.results[ON_OFF] = mavlink.MAV_RESULT_DENIED
 
     ros.publish(Bool, '/illuminator/cmd/enable_all', True)
 

@@ -17,10 +17,11 @@
 import math
 from typing import Any
 
+from illuminator_ros.mavlink.dialect import mavlink
 import pytest
 from rcl_interfaces.msg import Parameter, ParameterType, ParameterValue
 from rcl_interfaces.srv import SetParameters, SetParametersAtomically
-from support.light import CONFIGURE, MavResult, params, ServedLight
+from support.light import CONFIGURE, params, ServedLight
 from support.processes import Program
 from support.ros import Parameters, Ros, running_bridge
 from support.slow import CLOCK, pass_time_until
@@ -127,7 +128,7 @@ def test_refusal_by_the_light_is_reported_by_name_and_changes_nothing(
     light: ServedLight, parameters: Parameters,
 ) -> None:
     events = parameters.events()
-    light.fake.results[CONFIGURE] = MavResult.DENIED
+    light.fake.results[CONFIGURE] = mavlink.MAV_RESULT_DENIED
 
     listed = parameters.set(brightness=30.0, strobe_duty_cycle=1.0)
     # A parameter of the node itself is set first, and restored.
@@ -149,12 +150,12 @@ def test_refusal_by_the_light_is_reported_by_name_and_changes_nothing(
 
 @pytest.mark.parametrize(('result', 'applies', 'reason'), [
     (None, True, 'superseded by brightness 31 %'),
-    (MavResult.TEMPORARILY_REJECTED, True, 'MAV_RESULT_TEMPORARILY_REJECTED'),
-    (MavResult.ACCEPTED, False, 'brightness 30 % not confirmed: MAV_RESULT_ACCEPTED, but '
-                                'ILLUMINATOR_STATUS shows brightness 80 %')])
+    (mavlink.MAV_RESULT_TEMPORARILY_REJECTED, True, 'MAV_RESULT_TEMPORARILY_REJECTED'),
+    (mavlink.MAV_RESULT_ACCEPTED, False, 'brightness 30 % not confirmed: MAV_RESULT_ACCEPTED, but '
+     'ILLUMINATOR_STATUS shows brightness 80 %')])
 @pytest.mark.parametrize('atomically', [False, True])
 def test_set_that_the_light_does_not_answer_or_apply_is_refused_within_0_9_s(
-    ros: Ros, light: ServedLight, parameters: Parameters, result: MavResult | None,
+    ros: Ros, light: ServedLight, parameters: Parameters, result: int | None,
     applies: bool, reason: str, atomically: bool,
 ) -> None:
     light.fake.results[CONFIGURE] = result

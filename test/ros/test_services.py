@@ -22,6 +22,7 @@ import re
 import socket
 import threading
 
+from illuminator_ros.mavlink.dialect import entry_names, mavlink
 from illuminator_ros.ros import answer_spacing
 from illuminator_ros.ros import executor as executor_module
 from illuminator_ros.ros.executor import DeferredService, ENDED, NodeExecutor, Respond
@@ -35,7 +36,7 @@ from rclpy.qos import QoSProfile
 from rclpy.service import Service
 from std_msgs.msg import Float32, Float64
 from std_srvs.srv import Trigger
-from support.light import eventually, MavCmd, MavResult, ON_OFF, ServedLight
+from support.light import eventually, ON_OFF, ServedLight
 from support.processes import Program
 from support.recording import Call
 from support.ros import Parameters, Ros, running_bridge
@@ -53,14 +54,14 @@ def off(light: ServedLight) -> ServedLight:
 
 
 @pytest.mark.parametrize(('result', 'answer'), [
-    (MavResult.ACCEPTED, 'on, confirmed by ILLUMINATOR_STATUS: MAV_RESULT_ACCEPTED'),
-    (MavResult.DENIED, 'refused: MAV_RESULT_DENIED')])
+    (mavlink.MAV_RESULT_ACCEPTED, 'on, confirmed by ILLUMINATOR_STATUS: MAV_RESULT_ACCEPTED'),
+    (mavlink.MAV_RESULT_DENIED, 'refused: MAV_RESULT_DENIED')])
 def test_enable_is_answered_with_the_result_of_one_command(
-    ros: Ros, off: ServedLight, result: MavResult, answer: str,
+    ros: Ros, off: ServedLight, result: int, answer: str,
 ) -> None:
     off.fake.results[ON_OFF] = result
     response = ros.enable()
-    assert response.success is (result is MavResult.ACCEPTED)
+    assert response.success is (result == mavlink.MAV_RESULT_ACCEPTED)
     assert re.fullmatch(rf'{answer} \(1 try, \d+ ms\)', response.message)
     assert [command.param1 for command in off.commands(ON_OFF)] == [1.0]
 
@@ -78,7 +79,7 @@ def test_refresh_requests_both_messages_which_are_published_or_logged(
     assert answer.success
     assert re.fullmatch(r'ILLUMINATOR_STATUS: received, COMPONENT_INFORMATION_BASIC: received '
                         r'\(\d+ ms\)', answer.message)
-    assert {command.param1 for command in off.commands(MavCmd.REQUEST_MESSAGE)} == {
+    assert {command.param1 for command in off.commands(mavlink.MAV_CMD_REQUEST_MESSAGE)} == {
         STATUS, INFORMATION}
     brightness.wait_value(12.0)
     bridge.wait_for('light 1/243 is other maker, serial number T-2')
@@ -98,7 +99,7 @@ def test_other_services_and_topics_go_on_while_an_enable_waits(
     ros.subscribe(Float64, '/illuminator/uptime').wait(count=3)
 
     assert not waiting.answered
-    off.acknowledge(ON_OFF, MavResult.FAILED)
+    off.acknowledge(ON_OFF, mavlink.MAV_RESULT_FAILED)
     waiting.result()
 
 
@@ -125,7 +126,8 @@ def test_requests_fail_at_once_and_say_why_while_no_light_was_ever_heard(
 def test_light_that_is_heard_and_answers_nothing_is_the_reason(own_ros: Ros, port: int) -> None:
     # The line to the light is broken, and the light sends no status unasked.
     with (running_bridge(own_ros.domain, port),
-          ServedLight(port, stream=0.0, results=dict.fromkeys(MavCmd))):
+          ServedLight(port, stream=0.0, results=dict.fromkeys(
+              entry_names('MAV_CMD')))):
         eventually(lambda: 'none heard yet' not in own_ros.enable().message)
 
         assert no_light_messages(own_ros) == {

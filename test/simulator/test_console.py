@@ -16,9 +16,9 @@
 
 from illuminator_ros.cli.simulator.console import COMMANDS, execute
 from illuminator_ros.illuminator.messages import IlluminatorStatus
-from illuminator_ros.illuminator.model import ErrorFlags
 from illuminator_ros.illuminator.simulated import COMMANDS as LIGHT_COMMANDS
 from illuminator_ros.illuminator.simulated_properties import FAULTS, IlluminatorProperties
+from illuminator_ros.mavlink.dialect import mavlink
 from illuminator_ros.mavlink.messages import Address
 from illuminator_ros.payload.faults import Behaviour
 from illuminator_ros.payload.simulated import SimulatedComponents
@@ -112,7 +112,8 @@ def test_each_fault_can_be_typed_shown_and_ended(console: Console, name: str) ->
 def test_ambient_and_own_temperature_can_be_set(console: Console) -> None:
     console.enter('ambient 90')
     assert console.status(2000.0).temp_c == pytest.approx(90.0, abs=0.1)
-    assert console.status(2000.0).error_status == ErrorFlags.THERMAL_THROTTLING
+    assert console.status(
+        2000.0).error_status == mavlink.ILLUMINATOR_ERROR_FLAGS_THERMAL_THROTTLING
     console.enter('temperature 100', 2000.0)
     assert console.status(2000.1).error_status == 3
 

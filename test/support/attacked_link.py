@@ -23,7 +23,8 @@ from typing import Any, cast
 
 from illuminator_ros.illuminator.light import Settings
 from illuminator_ros.illuminator.simulated_properties import FAULTS, IlluminatorProperties
-from illuminator_ros.mavlink.messages import Address, CommandLong, MavResult
+from illuminator_ros.mavlink.dialect import mavlink
+from illuminator_ros.mavlink.messages import Address, CommandLong
 from illuminator_ros.mavlink.signing import Signing, SigningMode
 from illuminator_ros.payload.attempt import Result
 from illuminator_ros.payload.simulated import SimulatedComponent, SimulatedComponents
@@ -245,7 +246,7 @@ class AttackedLights(AttackedLink):
         for on in (1, 0):
             self._acks.clear()
             self._command(405, on)
-            assert [ack.result for ack in self._acks] == [MavResult.ACCEPTED]
+            assert [ack.result for ack in self._acks] == [mavlink.MAV_RESULT_ACCEPTED]
             assert self.lights[0].device.enabled is bool(on)
 
 

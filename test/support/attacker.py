@@ -16,14 +16,15 @@
 
 from __future__ import annotations
 
-import dataclasses
 import math
 import random
+import re
 import struct
-from typing import Any, get_args, get_type_hints
+from typing import Any
 
 from illuminator_ros.illuminator.messages import IlluminatorStatus
 from illuminator_ros.mavlink import messages as mav
+from illuminator_ros.mavlink.dialect import CRC_EXTRA, encode, mavlink
 from illuminator_ros.mavlink.signing import MAX_TICKS, signature, ticks
 from support.frames import raw_v1, raw_v2
 
@@ -34,20 +35,10 @@ FLOATS = (0.0, -0.0, 1.0, 50.0, 100.0, 100.00001, -1.0, -1e-30, 1e-45, 3.4e38, -
           math.nan, -math.nan, math.inf, -math.inf, 440.0, 396.0, 1e6, 0.05, 3600.5)
 # Values of fields that decide about the processing of a message.
 TELLING = {'command': (405, 406, 511, 512, 80, 0, 65535), 'result': (*range(11), 255),
-           'type': (mav.MavType.ILLUMINATOR, mav.MavType.ILLUMINATOR, 0, 18, 255)}
+           'type': (mavlink.MAV_TYPE_ILLUMINATOR, mavlink.MAV_TYPE_ILLUMINATOR, 0, 18, 255)}
 # Lengths of payloads: too short, right, extended, the longest.
 LENGTHS = (0, 1, 2, 3, 9, 10, 30, 33, 34, 35, 36, 38, 160, 161, 200, 254, 255)
 Datagrams = list[tuple[bytes, Any]]
-
-
-def field_codes(cls: type[mav.Message]) -> list[tuple[str, str]]:
-    """Return the fields of a message, each with its code in :mod:`struct`."""
-    hints = get_type_hints(cls, include_extras=True)
-    return [(field.name, get_args(hints[field.name])[1])
-            for field in dataclasses.fields(cls)]  # type: ignore[arg-type]
-
-
-FIELDS = {cls.name: field_codes(cls) for cls in MESSAGES}
 
 
 class Attacker:
@@ -119,12 +110,12 @@ class Attacker:
 
     def _frame(self, now: float) -> bytes:
         if self._draw.random() < 0.05:
-            return raw_v2(self._draw.choice(list(mav.LAYOUTS)),
+            return raw_v2(self._draw.choice(list(CRC_EXTRA)),
                           self._draw.randbytes(self._draw.choice(LENGTHS)), source=self._source())
         return self._framed(self._draw.choice(MESSAGES), self._source(), now)
 
     def _framed(self, cls: type[mav.Message], source: mav.Address, now: float) -> bytes:
-        draw, payload = self._draw, self._message(cls).encode()
+        draw, payload = self._draw, encode(self._message(cls))
         if draw.random() < 0.1:
             payload = (payload + draw.randbytes(255))[:draw.choice(LENGTHS)]
         elif draw.random() < 0.8:
@@ -152,9 +143,14 @@ class Attacker:
     def _message(self, cls: type[mav.Message]) -> mav.Message:
         target = self._draw.choice([(0, 0), *self._sources, self._any_source()])
         telling = {**TELLING, 'target_system': target[:1], 'target_component': target[1:]}
-        return cls(*(
-            self._draw.choice(telling[name]) if name in telling else self._value(code)
-            for name, code in FIELDS[cls.name]))
+        # None of the messages has an array of numbers.
+        codes = dict(zip(cls.ordered_fieldnames, re.findall(
+            r'\d+s|[A-Za-z]', cls.unpacker.format), strict=True))
+        make: Any = cls
+        message: mav.Message = make(*(
+            self._draw.choice(telling[name]) if name in telling else self._value(codes[name])
+            for name in cls.fieldnames))
+        return message
 
     def _value(self, code: str) -> Any:
         draw, size = self._draw, struct.calcsize(f'<{code}')

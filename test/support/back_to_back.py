@@ -26,6 +26,7 @@ from illuminator_ros.illuminator.simulated import SimulatedIlluminator
 from illuminator_ros.illuminator.simulated_properties import IlluminatorProperties
 from illuminator_ros.mavlink import messages as mav
 from illuminator_ros.mavlink.component import Endpoint
+from illuminator_ros.mavlink.dialect import decode
 from illuminator_ros.mavlink.frame import Decoder
 from illuminator_ros.mavlink.statistics import Traffic
 from illuminator_ros.payload.attempt import Result
@@ -69,7 +70,7 @@ class _End:
         for frame in self.decoder.feed(data):
             cls = self.classes.get(frame.message_id)
             if cls is not None:
-                message = cls.decode(frame.payload, self._traffic.count(frame))
+                message = decode(cls, frame.payload, self._traffic.count(frame))
                 self.received.append((now, frame.source, message))
                 self.endpoint.receive(frame.source, message, now)
                 self.flush(now)
@@ -265,11 +266,11 @@ class Pair:
 
     # Sent messages
 
-    def commands(self, *kinds: mav.MavCmd, since: float = 0.0) -> list[Any]:
+    def commands(self, *kinds: int, since: float = 0.0) -> list[Any]:
         """Return the commands that the controller has sent, tries included, all or some kinds."""
         return [message for at, message in self.commands_at(*kinds) if at >= since]
 
-    def commands_at(self, *kinds: mav.MavCmd) -> Iterator[tuple[float, Any]]:
+    def commands_at(self, *kinds: int) -> Iterator[tuple[float, Any]]:
         """Return the same with the times of sending."""
         return ((at, message) for at, message in self.near.sent
                 if isinstance(message, mav.CommandLong | mav.CommandInt)

@@ -23,7 +23,8 @@ import math
 from typing import Any
 
 from illuminator_ros.mavlink import command_sender
-from illuminator_ros.mavlink.messages import Address, CommandAck, CommandInt, MavResult
+from illuminator_ros.mavlink.dialect import mavlink
+from illuminator_ros.mavlink.messages import Address, CommandAck, CommandInt
 
 OURS = Address(1, 194)
 LIGHT = Address(1, 243)
@@ -173,8 +174,8 @@ class Rig:
         return self.sender.next_deadline() == math.inf
 
 
-ACCEPTED = MavResult.ACCEPTED
-REJECTED = MavResult.TEMPORARILY_REJECTED
-DENIED = MavResult.DENIED
-FAILED = MavResult.FAILED
-IN_PROGRESS = MavResult.IN_PROGRESS
+ACCEPTED = mavlink.MAV_RESULT_ACCEPTED
+REJECTED = mavlink.MAV_RESULT_TEMPORARILY_REJECTED
+DENIED = mavlink.MAV_RESULT_DENIED
+FAILED = mavlink.MAV_RESULT_FAILED
+IN_PROGRESS = mavlink.MAV_RESULT_IN_PROGRESS

@@ -24,7 +24,8 @@ from illuminator_ros.illuminator.messages import STATUS_ID
 from illuminator_ros.illuminator.model import Configuration
 from illuminator_ros.illuminator.simulated import SimulatedIlluminator
 from illuminator_ros.illuminator.simulated_properties import FAULTS, IlluminatorProperties
-from illuminator_ros.mavlink.messages import Address, CommandLong, MavCmd
+from illuminator_ros.mavlink.dialect import mavlink
+from illuminator_ros.mavlink.messages import Address, CommandLong
 from illuminator_ros.payload.simulated import Effect, SimulatedComponents
 from support.checks_run import ChecksRun
 from support.simulated_lights import describe
@@ -69,7 +70,7 @@ class Run(ChecksRun):
     def set_interval(self, seconds: float) -> None:
         """Set the interval of the light's status, as another sender; -1 stops the stream."""
         self.light.receive(Address(255, 1), CommandLong(
-            *self.light.address, MavCmd.SET_MESSAGE_INTERVAL, 0, STATUS_ID,
+            *self.light.address, mavlink.MAV_CMD_SET_MESSAGE_INTERVAL, 0, STATUS_ID,
             seconds if seconds < 0 else 1e6 * seconds, 0, 0, 0, 0, 0), self.link.now)
 
     def fault(self, *names: str) -> None:

@@ -23,6 +23,7 @@ from typing import Any
 from illuminator_ros.illuminator.messages import IlluminatorStatus, STATUS_ID
 from illuminator_ros.mavlink import messages as mav
 from illuminator_ros.mavlink.component import Endpoint, HeartbeatTimer
+from illuminator_ros.mavlink.dialect import mavlink
 from illuminator_ros.payload.identity import Identity
 
 LIGHT = mav.Address(1, 243)
@@ -59,7 +60,8 @@ class FakeLight(Endpoint):
     messages = (mav.CommandLong, mav.CommandInt)
 
     def __init__(
-        self, source: mav.Address = LIGHT, *, heartbeat_type: int | None = mav.MavType.ILLUMINATOR,
+        self, source: mav.Address = LIGHT, *, heartbeat_type: int
+        | None = mavlink.MAV_TYPE_ILLUMINATOR,
         stream: float = 1.0, results: Mapping[int, Any] | None = None, **fields: Any,
     ) -> None:
         super().__init__()
@@ -106,19 +108,19 @@ class FakeLight(Endpoint):
             return
         target = source if self.targeted else (0, 0)
         self.send(mav.CommandAck(message.command, result, 0, 0, *target))
-        if result == mav.MavResult.ACCEPTED:
+        if result == mavlink.MAV_RESULT_ACCEPTED:
             self._carry_out(message, now)
 
     def _result(self, command: int) -> int | None:
-        result = self.results.get(command, mav.MavResult.ACCEPTED)
+        result = self.results.get(command, mavlink.MAV_RESULT_ACCEPTED)
         if isinstance(result, list):
             result = result.pop(0) if len(result) > 1 else result[0]
         return None if result is None else int(result)
 
     def _carry_out(self, message: Any, now: float) -> None:
-        if message.command == mav.MavCmd.REQUEST_MESSAGE and message.param1 in self.answers:
+        if message.command == mavlink.MAV_CMD_REQUEST_MESSAGE and message.param1 in self.answers:
             self.send(self.status(now) if message.param1 == STATUS_ID else self.information())
-        elif message.command == mav.MavCmd.SET_MESSAGE_INTERVAL:
+        elif message.command == mavlink.MAV_CMD_SET_MESSAGE_INTERVAL:
             self.stream = message.param2 / 1e6
             self._status_due = now + self.stream
         elif self.applies and self.apply_after:
@@ -127,16 +129,16 @@ class FakeLight(Endpoint):
             self._apply(message, now)
 
     def _apply(self, message: Any, now: float) -> None:
-        if message.command == mav.MavCmd.ILLUMINATOR_ON_OFF:
+        if message.command == mavlink.MAV_CMD_ILLUMINATOR_ON_OFF:
             self.fields['enable'] = int(message.param1)
             if message.param1:
                 self.shone.append(self.fields['brightness'])
-        elif message.command == mav.MavCmd.DO_ILLUMINATOR_CONFIGURE:
+        elif message.command == mavlink.MAV_CMD_DO_ILLUMINATOR_CONFIGURE:
             self.fields |= {
                 'mode': int(message.param1), 'brightness': message.param2,
                 'strobe_period': message.param3, 'strobe_duty_cycle': message.param4}
         if self.brightness_is_switch:
-            if message.command == mav.MavCmd.ILLUMINATOR_ON_OFF:
+            if message.command == mavlink.MAV_CMD_ILLUMINATOR_ON_OFF:
                 self.fields['brightness'] = 50.0 if message.param1 else 0.0
             self.fields['enable'] = int(self.fields['brightness'] > 0)
         if self.pushes:

@@ -20,6 +20,7 @@ from collections import Counter
 
 from fastcrc.crc16 import mcrf4xx
 from illuminator_ros.mavlink import messages as mav
+from illuminator_ros.mavlink.dialect import base_size, CRC_EXTRA, encode, mavlink
 from illuminator_ros.mavlink.frame import Decoder, encode_frame, Frame
 from illuminator_ros.mavlink.signing import Signing
 from support.messages import decode_payload, HANDLED, STATUS
@@ -32,14 +33,15 @@ FILLER = bytes(300)
 def frame_of(message: mav.Message = STATUS, sequence: int = 0, source: mav.Address = LIGHT, *,
              signed: bool = False, version: int = 2) -> bytes:
     """Return a frame of this package, without the signature that a signed one still needs."""
-    payload = message.encode()
+    payload = encode(message)
     return encode_frame(
-        message.id, payload if version == 2 else payload[:message.base_size], sequence=sequence,
+        message.get_msgId(), payload if version == 2 else payload[:base_size(type(message))],
+        sequence=sequence,
         source=source, crc_extra=message.crc_extra, signed=signed, version=version)
 
 
 def heartbeat_frame(source: mav.Address = LIGHT, sequence: int = 0,
-                    mav_type: int = mav.MavType.ILLUMINATOR) -> bytes:
+                    mav_type: int = mavlink.MAV_TYPE_ILLUMINATOR) -> bytes:
     """Return the heartbeat of a light, or of another component."""
     return frame_of(mav.heartbeat(mav_type), sequence, source)
 
@@ -86,7 +88,7 @@ def raw_v1(message_id: int, payload: bytes, *, crc_extra: int | None = None, seq
 
 
 def _raw(stx: int, message_id: int, body: bytes, crc_extra: int | None) -> bytes:
-    seed = mav.LAYOUTS[message_id].crc_extra if crc_extra is None else crc_extra
+    seed = CRC_EXTRA[message_id] if crc_extra is None else crc_extra
     return bytes((stx,)) + body + mcrf4xx(body + bytes((seed,))).to_bytes(2, 'little')
 
 

@@ -17,7 +17,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
-from dataclasses import replace
 import itertools
 from typing import Any, TypeVar
 
@@ -25,43 +24,43 @@ from illuminator_ros.gimbal.manager import GimbalManager, ManagerEvent, ManagerS
 from illuminator_ros.gimbal.manager_control import ControlSettings
 from illuminator_ros.gimbal.manager_state import ManagerState
 from illuminator_ros.gimbal.messages import (
-    Capabilities,
-    GimbalCommand,
     GimbalDeviceInformation,
     GimbalDeviceSetAttitude,
     GimbalManagerSetPitchyaw,
-    MAV_TYPE_GIMBAL,
 )
 from illuminator_ros.mavlink import messages as mav
 from illuminator_ros.mavlink.command_sender import CommandSender
 from illuminator_ros.mavlink.component import Component
+from illuminator_ros.mavlink.dialect import mavlink, replaced
 from illuminator_ros.payload.messages import (
     Attitude,
     GimbalDeviceAttitudeStatus,
     GlobalPositionInt,
 )
-from illuminator_ros.payload.mount_attitude import MountFlags
 from illuminator_ros.payload.rotation import Quaternion
 
 OURS, DEVICE, AUTOPILOT = mav.Address(1, 194), mav.Address(1, 154), mav.Address(1, 1)
 PILOT, GUEST = mav.Address(255, 190), mav.Address(255, 191)
 NAN = float('nan')
-FULL = (Capabilities.HAS_RETRACT | Capabilities.HAS_NEUTRAL | Capabilities.HAS_ROLL_AXIS
-        | Capabilities.HAS_PITCH_AXIS | Capabilities.HAS_YAW_AXIS | Capabilities.HAS_YAW_LOCK
-        | Capabilities.SUPPORTS_YAW_IN_EARTH_FRAME)
+FULL = (mavlink.GIMBAL_DEVICE_CAP_FLAGS_HAS_RETRACT | mavlink.GIMBAL_DEVICE_CAP_FLAGS_HAS_NEUTRAL
+        | mavlink.GIMBAL_DEVICE_CAP_FLAGS_HAS_ROLL_AXIS
+        | mavlink.GIMBAL_DEVICE_CAP_FLAGS_HAS_PITCH_AXIS
+        | mavlink.GIMBAL_DEVICE_CAP_FLAGS_HAS_YAW_AXIS
+        | mavlink.GIMBAL_DEVICE_CAP_FLAGS_HAS_YAW_LOCK
+        | mavlink.GIMBAL_DEVICE_CAP_FLAGS_SUPPORTS_YAW_IN_EARTH_FRAME)
 T = TypeVar('T')
 
 
-def information(capabilities: Capabilities = FULL, **ranges: Any) -> GimbalDeviceInformation:
+def information(capabilities: int = FULL, **ranges: Any) -> GimbalDeviceInformation:
     """Return the information of a device that can turn by half a rad, unless given otherwise."""
-    return replace(GimbalDeviceInformation(
+    return replaced(GimbalDeviceInformation(
         0, b'maker', b'model', b'', 1, 1, 7, int(capabilities), 0, -0.5, 0.5, -0.5, 0.5, -0.5,
         0.5), **ranges)
 
 
 def attitude_status(
     q: tuple[float, float, float, float] = (1.0, 0.0, 0.0, 0.0), *,
-    flags: MountFlags = MountFlags.YAW_IN_VEHICLE_FRAME, heading: float = NAN,
+    flags: int = mavlink.GIMBAL_DEVICE_FLAGS_YAW_IN_VEHICLE_FRAME, heading: float = NAN,
 ) -> GimbalDeviceAttitudeStatus:
     """Return an attitude of the device."""
     return GimbalDeviceAttitudeStatus(0, 0, 0, int(flags), q, 0.0, 0.0, 0.0, 0, heading, NAN, 0)
@@ -117,7 +116,8 @@ class ManagerRig:
             if self.now >= self._device_due:
                 self._device_due = self.now + 0.5
                 if self.device_is_there:
-                    self.component.receive(DEVICE, mav.heartbeat(MAV_TYPE_GIMBAL), self.now)
+                    self.component.receive(DEVICE, mav.heartbeat(mavlink.MAV_TYPE_GIMBAL),
+                                           self.now)
                     self.report()
                 each()
             self.component.poll(self.now)
@@ -126,9 +126,10 @@ class ManagerRig:
 
     def report(self, q: tuple[float, float, float, float] = (1.0, 0.0, 0.0, 0.0)) -> None:
         """Let the device report its attitude, and whether it accepts a yaw from north."""
-        north = self.device_information.cap_flags & Capabilities.SUPPORTS_YAW_IN_EARTH_FRAME
-        flags = MountFlags.YAW_IN_VEHICLE_FRAME | (
-            MountFlags.ACCEPTS_YAW_IN_EARTH_FRAME if north else MountFlags(0))
+        north = (self.device_information.cap_flags
+                 & mavlink.GIMBAL_DEVICE_CAP_FLAGS_SUPPORTS_YAW_IN_EARTH_FRAME)
+        flags = mavlink.GIMBAL_DEVICE_FLAGS_YAW_IN_VEHICLE_FRAME | (
+            mavlink.GIMBAL_DEVICE_FLAGS_ACCEPTS_YAW_IN_EARTH_FRAME if north else 0)
         self.component.receive(
             DEVICE, attitude_status(q, flags=flags, heading=self.heading), self.now)
 
@@ -170,19 +171,19 @@ class ManagerRig:
         """Return a function that sends a heartbeat of each player."""
         def send() -> None:
             for player in players:
-                self.component.receive(player, mav.heartbeat(mav.MavType.GCS), self.now)
+                self.component.receive(player, mav.heartbeat(mavlink.MAV_TYPE_GCS), self.now)
 
         return send
 
     def result(
         self, source: mav.Address, command: mav.CommandLong | mav.CommandInt,
-    ) -> mav.MavResult:
+    ) -> int:
         """Return the result of a command."""
         answer = of(mav.CommandAck, self.give(source, command))
         assert len(answer) == 1
-        return mav.MavResult(answer[0].result)
+        return int(answer[0].result)
 
-    def take(self, player: mav.Address) -> mav.MavResult:
+    def take(self, player: mav.Address) -> int:
         """Return the result of taking primary control."""
         return self.result(player, configure(*player))
 
@@ -218,15 +219,15 @@ def configure(
     device_id: int = 0, to: mav.Address = OURS, confirmation: int = 0,
 ) -> mav.CommandLong:
     """Return MAV_CMD_DO_GIMBAL_MANAGER_CONFIGURE."""
-    return long(GimbalCommand.DO_GIMBAL_MANAGER_CONFIGURE, system, component, system2, component2,
-                0, 0, device_id, to=to, confirmation=confirmation)
+    return long(mavlink.MAV_CMD_DO_GIMBAL_MANAGER_CONFIGURE, system, component, system2,
+                component2, 0, 0, device_id, to=to, confirmation=confirmation)
 
 
 def pitch_yaw_command(pitch: float, yaw: float, pitch_rate: float = NAN, yaw_rate: float = NAN,
                       flags: int = 0, device_id: int = 0) -> mav.CommandLong:
     """Return MAV_CMD_DO_GIMBAL_MANAGER_PITCHYAW, deg and deg/s."""
-    return long(GimbalCommand.DO_GIMBAL_MANAGER_PITCHYAW, pitch, yaw, pitch_rate, yaw_rate, flags,
-                0, device_id)
+    return long(mavlink.MAV_CMD_DO_GIMBAL_MANAGER_PITCHYAW, pitch, yaw, pitch_rate, yaw_rate,
+                flags, 0, device_id)
 
 
 def pitch_yaw(pitch: float = NAN, yaw: float = NAN, pitch_rate: float = NAN,
@@ -238,14 +239,14 @@ def pitch_yaw(pitch: float = NAN, yaw: float = NAN, pitch_rate: float = NAN,
 
 def request(message: type[mav.Message], to: mav.Address = OURS) -> mav.CommandLong:
     """Return a request for a message."""
-    return long(mav.MavCmd.REQUEST_MESSAGE, message.id, to=to)
+    return long(mavlink.MAV_CMD_REQUEST_MESSAGE, message.id, to=to)
 
 
 def region(latitude: float, longitude: float, altitude: float, *, frame: int = 0,
            device_id: int = 0) -> mav.CommandInt:
     """Return MAV_CMD_DO_SET_ROI_LOCATION, deg and m."""
     return mav.CommandInt(
-        *OURS, frame, GimbalCommand.DO_SET_ROI_LOCATION, 0, 0, device_id, 0.0, 0.0, 0.0,
+        *OURS, frame, mavlink.MAV_CMD_DO_SET_ROI_LOCATION, 0, 0, device_id, 0.0, 0.0, 0.0,
         round(latitude * 1e7), round(longitude * 1e7), altitude)
 
 

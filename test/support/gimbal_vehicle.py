@@ -24,13 +24,14 @@ from illuminator_ros.gimbal.manager_control import ControlSettings
 from illuminator_ros.gimbal.simulated_device import GimbalProperties, SimulatedGimbal
 from illuminator_ros.mavlink.command_sender import CommandSender
 from illuminator_ros.mavlink.component import Component, Endpoint, HeartbeatTimer
+from illuminator_ros.mavlink.dialect import mavlink
 from illuminator_ros.mavlink.messages import Address, CommandAck, Message
 from illuminator_ros.payload.messages import Attitude, GlobalPositionInt
 from illuminator_ros.payload.simulated import Description, SimulatedComponents
 from support.gimbal_manager import AUTOPILOT, DEVICE, OURS
 
 HERE = 47.0, 8.0, 500.0
-MAV_TYPE_QUADROTOR = 2
+mavlink.MAV_TYPE_QUADROTOR = 2
 
 
 class Autopilot(Endpoint):
@@ -41,7 +42,7 @@ class Autopilot(Endpoint):
 
     def __init__(self) -> None:
         super().__init__()
-        self._heartbeat = HeartbeatTimer(AUTOPILOT, MAV_TYPE_QUADROTOR, self.outgoing)
+        self._heartbeat = HeartbeatTimer(AUTOPILOT, mavlink.MAV_TYPE_QUADROTOR, self.outgoing)
         self._due = 0.0
 
     def link_opened(self, now: float) -> None:

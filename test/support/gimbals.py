@@ -28,15 +28,15 @@ from illuminator_ros.gimbal.gimbal import Gimbal, GimbalSettings
 from illuminator_ros.mavlink import messages as mav
 from illuminator_ros.mavlink.command_sender import CommandSender
 from illuminator_ros.mavlink.component import Component, Endpoint
+from illuminator_ros.mavlink.dialect import entry_names, mavlink
 from illuminator_ros.mavlink.link import Link
 from illuminator_ros.payload.attempt import Result
 from illuminator_ros.payload.messages import GimbalDeviceAttitudeStatus
-from illuminator_ros.payload.mount_attitude import MountFlags
 from support.live_link import EndpointLink
 
 OURS, AUTOPILOT, DEVICE, OTHER = (mav.Address(1, component) for component in (194, 1, 154, 195))
 NAN = math.nan
-ALL = gm.Capabilities(sum(gm.Capabilities))
+ALL = sum(entry_names('GIMBAL_DEVICE_CAP_FLAGS'))
 LEVEL = (1.0, 0.0, 0.0, 0.0)
 
 E = TypeVar('E', bound=GimbalEvent)
@@ -61,7 +61,7 @@ class FakeManager:
     address: mav.Address = AUTOPILOT
     device_id: int = 154
     capabilities: int = ALL
-    autopilot: int = mav.MAV_AUTOPILOT_ARDUPILOTMEGA + 9
+    autopilot: int = mavlink.MAV_AUTOPILOT_ARDUPILOTMEGA + 9
     results: dict[int, int] = field(default_factory=dict)
     announces: bool = True
     reports: bool = True
@@ -73,7 +73,8 @@ class FakeManager:
     device_reports: bool = True
     primary: mav.Address = mav.Address(0, 0)
     secondary: mav.Address = mav.Address(0, 0)
-    flags: int = MountFlags.ROLL_LOCK | MountFlags.PITCH_LOCK | MountFlags.YAW_IN_VEHICLE_FRAME
+    flags: int = (mavlink.GIMBAL_DEVICE_FLAGS_ROLL_LOCK | mavlink.GIMBAL_DEVICE_FLAGS_PITCH_LOCK
+                  | mavlink.GIMBAL_DEVICE_FLAGS_YAW_IN_VEHICLE_FRAME)
     q: tuple[float, float, float, float] = LEVEL
     rates: tuple[float, float, float] = (NAN, NAN, NAN)
     delta_yaw: float = NAN
@@ -110,7 +111,7 @@ class FakeManager:
             sent.append((self.address, self.status()))
         if self.device_alive:
             if tenth % 10 == 5 and self.device != self.address:
-                sent.append((self.device, mav.heartbeat(gm.MAV_TYPE_GIMBAL)))
+                sent.append((self.device, mav.heartbeat(mavlink.MAV_TYPE_GIMBAL)))
             if self.device_reports and tenth % 2 == 1:
                 sent.append((self.device, self.attitude()))
         return sent
@@ -130,15 +131,15 @@ class FakeManager:
             return []
         device_id = message.param1 if message.command in (195, 197) else getattr(
             message, 'param7', 0)
-        if message.command in set(gm.GimbalCommand) and device_id not in (0, self.device_id):
+        if message.command in gm.DEVICE_ID_PARAM and device_id not in (0, self.device_id):
             return []
         self.commands.append(message)
         if not self.answers:
             return []
-        result = self.results.get(message.command, mav.MavResult.ACCEPTED)
+        result = self.results.get(message.command, mavlink.MAV_RESULT_ACCEPTED)
         sent: list[tuple[mav.Address, mav.Message]] = [
             (target, mav.CommandAck(message.command, result, 0, 0, *source))]
-        if result == mav.MavResult.ACCEPTED:
+        if result == mavlink.MAV_RESULT_ACCEPTED:
             sent += self._execute(message, target)
         return sent
 
@@ -147,19 +148,19 @@ class FakeManager:
     ) -> list[tuple[mav.Address, mav.Message]]:
         command, p1, p2, p3, p4 = (message.command, message.param1, message.param2,
                                    message.param3, message.param4)
-        if command == mav.MavCmd.REQUEST_MESSAGE:
+        if command == mavlink.MAV_CMD_REQUEST_MESSAGE:
             made: dict[tuple[int, mav.Address], mav.Message | None] = {
                 (280, self.address): self.information() if self.announces else None,
                 (281, self.address): self.status() if self.reports else None,
                 (283, self.device): device_information()}
             found = made.get((int(p1), target))
             return [(target, found)] if found is not None else []
-        if self.applies and command == gm.GimbalCommand.DO_GIMBAL_MANAGER_CONFIGURE:
+        if self.applies and command == mavlink.MAV_CMD_DO_GIMBAL_MANAGER_CONFIGURE:
             old = (*self.primary, *self.secondary)
             new = [was if value == -1 else 0 if value == -3 else int(value)
                    for was, value in zip(old, (p1, p2, p3, p4), strict=True)]
             self.primary, self.secondary = mav.Address(*new[:2]), mav.Address(*new[2:])
-        if self.applies and command == gm.GimbalCommand.DO_GIMBAL_MANAGER_PITCHYAW:
+        if self.applies and command == mavlink.MAV_CMD_DO_GIMBAL_MANAGER_PITCHYAW:
             assert isinstance(message, mav.CommandLong)
             self.flags = int(message.param5)
         return []

@@ -20,14 +20,13 @@ from collections.abc import Callable
 from typing import Any, TypeVar
 
 from illuminator_ros.illuminator.messages import STATUS_ID
+from illuminator_ros.mavlink.dialect import mavlink
 from illuminator_ros.mavlink.link import Link
 from illuminator_ros.mavlink.messages import (
     Address,
     CommandAck,
     CommandInt,
     CommandLong,
-    MavCmd,
-    MavResult,
 )
 from support.fake_light import FakeLight
 from support.live_link import EndpointLink
@@ -38,7 +37,7 @@ from support.waiting import eventually, Log
 LIGHT = Address(1, 243)
 # s of the slow clock between statuses: ten in a real second.
 STREAM = 0.1 * SPEED
-ON_OFF, CONFIGURE = MavCmd.ILLUMINATOR_ON_OFF, MavCmd.DO_ILLUMINATOR_CONFIGURE
+ON_OFF, CONFIGURE = mavlink.MAV_CMD_ILLUMINATOR_ON_OFF, mavlink.MAV_CMD_DO_ILLUMINATOR_CONFIGURE
 T = TypeVar('T')
 
 
@@ -167,5 +166,4 @@ def params(message: Any) -> tuple[float, float, float, float]:
     return message.param1, message.param2, message.param3, message.param4
 
 
-__all__ = ['CONFIGURE', 'eventually', 'free_port', 'MavCmd', 'MavResult', 'ON_OFF', 'params',
-           'ServedLight', 'Address']
+__all__ = ['Address', 'CONFIGURE', 'eventually', 'free_port', 'ON_OFF', 'params', 'ServedLight']

@@ -24,7 +24,7 @@ from illuminator_ros.illuminator.simulated_properties import (
     IlluminatorBehaviour,
     IlluminatorProperties,
 )
-from illuminator_ros.mavlink.messages import Address, CommandInt, CommandLong, MavResult
+from illuminator_ros.mavlink.messages import Address, CommandInt, CommandLong
 from illuminator_ros.payload.simulated import SimulatedComponent
 from support.simulated_lights import describe
 
@@ -80,9 +80,9 @@ class LightBench:
         self._collect()
         return [message for _, message in self.sent[before:]]
 
-    def result(self, command: int, *params: float, **options: Any) -> MavResult:
+    def result(self, command: int, *params: float, **options: Any) -> int:
         """Send a command and return the MAV_RESULT that answers it."""
-        return MavResult(self.command(command, *params, **options)[0].result)
+        return int(self.command(command, *params, **options)[0].result)
 
     def of(self, kind: type) -> list[tuple[float, Any]]:
         """Return the messages of one class that were sent, with their times."""

@@ -30,13 +30,14 @@ from illuminator_ros.illuminator.simulated_properties import (
     IlluminatorProperties,
 )
 from illuminator_ros.illuminator.thermal import ThermalProperties
-from illuminator_ros.mavlink.messages import Address, CommandAck, MavCmd, MavResult
+from illuminator_ros.mavlink.dialect import mavlink
+from illuminator_ros.mavlink.messages import Address, CommandAck
 from illuminator_ros.payload.simulated import Effect, SimulatedComponent
 from support.back_to_back import Pair
 from support.faulty_wire import Faults
 from support.records import Answer
 
-ON_OFF, CONFIGURE = MavCmd.ILLUMINATOR_ON_OFF, MavCmd.DO_ILLUMINATOR_CONFIGURE
+ON_OFF, CONFIGURE = mavlink.MAV_CMD_ILLUMINATOR_ON_OFF, mavlink.MAV_CMD_DO_ILLUMINATOR_CONFIGURE
 COMMANDS = 400
 # s; more than the longest delay of a line, plus the period of statuses.
 QUIET = 6.0
@@ -96,7 +97,7 @@ class Request:
     """A request to a light, and the values that it requests."""
 
     light: Light
-    kind: MavCmd
+    kind: int
     values: Fields
     answer: Answer
 
@@ -126,7 +127,7 @@ class User:
     """
 
     def __init__(
-        self, pair: Pair, light: Light, kind: MavCmd, draw: random.Random, impatience: float,
+        self, pair: Pair, light: Light, kind: int, draw: random.Random, impatience: float,
     ) -> None:
         self.pair, self.light, self.kind, self.draw = pair, light, kind, draw
         self.due = pair.now + draw.uniform(0, 1)
@@ -219,12 +220,12 @@ class Run:
             answer.asked_at if outcome == CONFIRMED else sent_at - UPTIME_ERROR, answer.ended_at)
         acks = [at for at, source, ack in self.pair.near.received
                 if isinstance(ack, CommandAck) and ack.command == request.kind
-                and ack.result == MavResult.ACCEPTED and source == request.light.address
+                and ack.result == mavlink.MAV_RESULT_ACCEPTED and source == request.light.address
                 and sent_at < at <= answer.ended_at]
         match outcome:
             case 'confirmed':
                 # A refusal that may have answered an earlier command does not count.
-                if not acks and MavResult.ACCEPTED.name in request.message:
+                if not acks and 'MAV_RESULT_ACCEPTED' in request.message:
                     return 'not accepted'
                 return '' if any(matches) else 'never done'
             case 'not acknowledged':

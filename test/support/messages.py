@@ -20,6 +20,7 @@ No field has its default, and each number is exact in float32.
 
 from illuminator_ros.illuminator.messages import IlluminatorStatus
 from illuminator_ros.mavlink import messages as mav
+from illuminator_ros.mavlink.dialect import decode
 
 STATUS = IlluminatorStatus(
     uptime_ms=123456, enable=1, mode_bitmask=3, error_status=5, mode=2, brightness=62.5,
@@ -43,4 +44,4 @@ HANDLED: dict[int, type[mav.Message]] = {message.id: type(message) for message i
 
 def decode_payload(message_id: int, payload: bytes) -> mav.Message:
     """Return the message of a payload; its class is the one of :data:`HANDLED`."""
-    return HANDLED[message_id].decode(payload)
+    return decode(HANDLED[message_id], payload)

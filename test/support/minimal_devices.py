@@ -28,13 +28,12 @@ from illuminator_ros.gimbal import messages as gimbal
 from illuminator_ros.illuminator.messages import IlluminatorStatus
 from illuminator_ros.mavlink import messages as mav
 from illuminator_ros.mavlink.component import Endpoint
-from illuminator_ros.mavlink.messages import Address, MavResult
+from illuminator_ros.mavlink.dialect import mavlink
+from illuminator_ros.mavlink.messages import Address
 from illuminator_ros.payload.messages import Attitude, GlobalPositionInt, SystemTime
 from illuminator_ros.payload.messages import GimbalDeviceAttitudeStatus as AttitudeStatus
 from illuminator_ros.rededge import messages as rededge
 
-MAV_TYPE_QUADROTOR, MAV_TYPE_GIMBAL, MAV_TYPE_CAMERA, MAV_TYPE_ILLUMINATOR = 2, 26, 30, 44
-MAV_AUTOPILOT_INVALID, MAV_AUTOPILOT_PX4 = 8, 12
 NAN = math.nan
 # GIMBAL_DEVICE_FLAGS
 ROLL_LOCK, PITCH_LOCK, YAW_LOCK, IN_VEHICLE_FRAME, IN_EARTH_FRAME = 4, 8, 16, 32, 64
@@ -107,9 +106,10 @@ class MinimalDevice(Endpoint):
             self.take(source, message)
 
     def _answer(self, source: Address, command: mav.CommandLong) -> None:
-        if command.command == mav.MavCmd.REQUEST_MESSAGE:
+        if command.command == mavlink.MAV_CMD_REQUEST_MESSAGE:
             is_known = command.param1 in {cls.id for cls in self.requestable}
-            self.acknowledge(command, MavResult.ACCEPTED if is_known else MavResult.DENIED)
+            self.acknowledge(command, mavlink.MAV_RESULT_ACCEPTED if is_known
+                             else mavlink.MAV_RESULT_DENIED)
             if is_known:
                 self.send(self.message(int(command.param1)))
         else:
@@ -127,7 +127,7 @@ class MinimalDevice(Endpoint):
 
     def execute(self, source: Address, command: mav.CommandLong) -> None:
         """Execute and acknowledge a command."""
-        self.acknowledge(command, MavResult.UNSUPPORTED)
+        self.acknowledge(command, mavlink.MAV_RESULT_UNSUPPORTED)
 
     def take(self, source: Address, message: Any) -> None:
         """Take another message."""
@@ -153,7 +153,8 @@ class MinimalLight(MinimalDevice):
         self, *, step: float = 1.0, fade: float = 0.0, progress: float = 0.0, busy: int = 0,
         strobes: bool = False,
     ) -> None:
-        super().__init__(Address(1, 243), MAV_TYPE_ILLUMINATOR, MAV_AUTOPILOT_INVALID)
+        super().__init__(Address(1, 243), mavlink.MAV_TYPE_ILLUMINATOR,
+                         mavlink.MAV_AUTOPILOT_INVALID)
         self.step, self.fade, self.progress, self.busy = step, fade, progress, busy
         self.limits = (0.1, 5.0) if strobes else (0.0, 0.0)
         self.on = 0
@@ -169,9 +170,9 @@ class MinimalLight(MinimalDevice):
     def execute(self, source: Address, command: mav.CommandLong) -> None:
         p1, p2, p3, p4 = command.param1, command.param2, command.param3, command.param4
         change: Callable[[], object]
-        if command.command == mav.MavCmd.ILLUMINATOR_ON_OFF:
+        if command.command == mavlink.MAV_CMD_ILLUMINATOR_ON_OFF:
             valid, change = p1 in (0, 1), lambda: setattr(self, 'on', int(p1))
-        elif command.command == mav.MavCmd.DO_ILLUMINATOR_CONFIGURE:
+        elif command.command == mavlink.MAV_CMD_DO_ILLUMINATOR_CONFIGURE:
             low, high = self.limits
             valid = (p1 == 1 and 0 <= p2 <= 100 and 0 <= p4 <= 100
                      and (p3 == 0 or low <= p3 <= high and high > 0))
@@ -181,13 +182,15 @@ class MinimalLight(MinimalDevice):
             return
         if self.busy and valid:
             self.busy -= 1
-            self.acknowledge(command, MavResult.TEMPORARILY_REJECTED)
+            self.acknowledge(command, mavlink.MAV_RESULT_TEMPORARILY_REJECTED)
         elif self.progress and valid:
-            self.acknowledge(command, MavResult.IN_PROGRESS, 255)
-            self.after(self.progress, lambda: self.acknowledge(command, MavResult.ACCEPTED))
+            self.acknowledge(command, mavlink.MAV_RESULT_IN_PROGRESS, 255)
+            self.after(self.progress,
+                       lambda: self.acknowledge(command, mavlink.MAV_RESULT_ACCEPTED))
             self.after(self.progress, change)
         else:
-            self.acknowledge(command, MavResult.ACCEPTED if valid else MavResult.DENIED)
+            self.acknowledge(command, mavlink.MAV_RESULT_ACCEPTED if valid
+                             else mavlink.MAV_RESULT_DENIED)
             if valid:
                 change()
 
@@ -207,7 +210,7 @@ def quaternion(pitch: float, yaw: float) -> tuple[float, float, float, float]:
     return d * c, -t * s, d * s, t * c
 
 
-def angles(q: tuple[float, float, float, float]) -> tuple[float, float]:
+def angles(q: Sequence[float]) -> tuple[float, float]:
     """Return pitch and yaw of a unit quaternion."""
     w, x, y, z = q
     return (math.asin(max(-1.0, min(1.0, 2 * (w * y - z * x)))),
@@ -273,10 +276,10 @@ class MinimalGimbal(MinimalDevice):
     ranges: ClassVar[tuple[tuple[float, float], tuple[float, float]]] = (PITCH, YAW)
     capabilities: ClassVar[int] = 32 | 128 | 256 | 512
     frame: ClassVar[int] = IN_VEHICLE_FRAME
-    mav_type: ClassVar[int] = MAV_TYPE_GIMBAL
+    mav_type: ClassVar[int] = mavlink.MAV_TYPE_GIMBAL
 
     def __init__(self) -> None:
-        super().__init__(Address(1, 154), self.mav_type, MAV_AUTOPILOT_INVALID)
+        super().__init__(Address(1, 154), self.mav_type, mavlink.MAV_AUTOPILOT_INVALID)
         self.axes = MinimalAxes(self.ranges)
         self.flags = ROLL_LOCK | PITCH_LOCK
         self.manager: Address | None = None
@@ -311,7 +314,7 @@ class MinimalGimbal(MinimalDevice):
         pitch, yaw = self.axes.now
         return quaternion(pitch, yaw)
 
-    def commanded(self, q: tuple[float, float, float, float]) -> tuple[float, float]:
+    def commanded(self, q: Sequence[float]) -> tuple[float, float]:
         """Return the angles of a commanded quaternion."""
         return (NAN, NAN) if any(map(math.isnan, q)) else angles(q)
 
@@ -346,7 +349,7 @@ class MinimalManager(MinimalDevice):
     device_id: ClassVar[int] = 1
 
     def __init__(self) -> None:
-        super().__init__(Address(1, 1), MAV_TYPE_QUADROTOR, MAV_AUTOPILOT_PX4)
+        super().__init__(Address(1, 1), mavlink.MAV_TYPE_QUADROTOR, mavlink.MAV_AUTOPILOT_PX4)
         self.axes = MinimalAxes((PITCH, YAW))
         # Primary system and component id, and those of secondary control.
         self.control = [0, 0, 0, 0]
@@ -393,15 +396,16 @@ class MinimalManager(MinimalDevice):
         if command.command not in (1000, 1001):
             super().execute(source, command)
         elif command.param7 not in (0, self.device_id):
-            self.acknowledge(command, MavResult.DENIED)
+            self.acknowledge(command, mavlink.MAV_RESULT_DENIED)
         elif command.command == 1000:
             if self.controls(source):
                 pitch, yaw, *rates = map(math.radians, values)
                 self.axes.turn((pitch, yaw), (rates[0], rates[1]))
             self.acknowledge(
-                command, MavResult.ACCEPTED if self.controls(source) else MavResult.DENIED)
+                command, mavlink.MAV_RESULT_ACCEPTED if self.controls(source)
+                else mavlink.MAV_RESULT_DENIED)
         elif any(value < -3 or value > 255 for value in values):
-            self.acknowledge(command, MavResult.DENIED)
+            self.acknowledge(command, mavlink.MAV_RESULT_DENIED)
         else:
             for at in (0, 2):
                 if values[at] == -3:
@@ -411,7 +415,7 @@ class MinimalManager(MinimalDevice):
                         int(value) for value in values[at:at + 2]]
                 if given != [-1, -1]:
                     self.control[at:at + 2] = given
-            self.acknowledge(command, MavResult.ACCEPTED)
+            self.acknowledge(command, mavlink.MAV_RESULT_ACCEPTED)
 
 
 class MinimalCamera(MinimalDevice):
@@ -424,7 +428,7 @@ class MinimalCamera(MinimalDevice):
     messages: Sequence[type[mav.Message]] = (rededge.Ping, rededge.DigicamControl)
 
     def __init__(self) -> None:
-        super().__init__(Address(1, 100), MAV_TYPE_CAMERA, MAV_AUTOPILOT_INVALID)
+        super().__init__(Address(1, 100), mavlink.MAV_TYPE_CAMERA, mavlink.MAV_AUTOPILOT_INVALID)
 
     def receive(self, source: Address, message: Any, now: float) -> None:
         self.now = now

@@ -23,7 +23,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 import contextlib
-import dataclasses
 from functools import cache
 import importlib.util
 import io
@@ -31,6 +30,7 @@ from pathlib import Path
 import tempfile
 from typing import Any
 
+from illuminator_ros.mavlink.dialect import raw
 from illuminator_ros.mavlink.messages import Address
 from pymavlink.dialects.v20 import ardupilotmega
 from pymavlink.generator import mavgen
@@ -38,13 +38,17 @@ from pymavlink.generator import mavgen
 # Message id, name and fields, in the order of common.xml; a bar before the extension fields.
 Definitions = Mapping[int, tuple[str, str]]
 DEFINITIONS: Definitions = {
-    396: ('COMPONENT_INFORMATION_BASIC', 'uint32_t time_boot_ms, uint64_t capabilities, '
-          'uint32_t time_manufacture_s, char[32] vendor_name, char[32] model_name, '
+    396: ('COMPONENT_INFORMATION_BASIC', 'uint32_t time_boot_ms units=ms, '
+          'uint64_t capabilities enum=MAV_PROTOCOL_CAPABILITY display=bitmask, '
+          'uint32_t time_manufacture_s units=s, char[32] vendor_name, char[32] model_name, '
           'char[24] software_version, char[24] hardware_version, char[32] serial_number'),
-    440: ('ILLUMINATOR_STATUS', 'uint32_t uptime_ms, uint8_t enable, uint8_t mode_bitmask, '
-          'uint32_t error_status, uint8_t mode, float brightness, float strobe_period, '
-          'float strobe_duty_cycle, float temp_c, float min_strobe_period, '
-          'float max_strobe_period, |, uint8_t zoom_level, uint8_t color_mode, '
+    440: ('ILLUMINATOR_STATUS', 'uint32_t uptime_ms units=ms, uint8_t enable, '
+          'uint8_t mode_bitmask enum=ILLUMINATOR_MODE, '
+          'uint32_t error_status enum=ILLUMINATOR_ERROR_FLAGS display=bitmask, '
+          'uint8_t mode enum=ILLUMINATOR_MODE, float brightness units=%, '
+          'float strobe_period units=s, float strobe_duty_cycle units=%, float temp_c, '
+          'float min_strobe_period units=s, float max_strobe_period units=s, |, '
+          'uint8_t zoom_level, uint8_t color_mode, '
           'uint8_t gimbal_device_id'),
 }
 LIGHT = Address(1, 243)
@@ -81,8 +85,11 @@ def _load(path: Path) -> Any:
 
 def _xml(definitions: Definitions) -> str:
     def field(definition: str) -> str:
-        return '<extensions/>' if definition == '|' else (
-            '<field type="{}" name="{}">-</field>'.format(*definition.split()))
+        if definition == '|':
+            return '<extensions/>'
+        type_, name, *attributes = definition.split()
+        return f'<field type="{type_}" name="{name}" ' + ' '.join(
+            '{}="{}"'.format(*one.split('=')) for one in attributes) + '>-</field>'
 
     messages = ''.join(
         f'<message id="{id_}" name="{name}"><description>-</description>'
@@ -123,10 +130,9 @@ class Peer:
 
 def twin(message: Any) -> Any:
     """Return a message of this package as one of the :func:`reference` dialect."""
-    return reference().mavlink_map[message.id](**dataclasses.asdict(message))
+    return reference().mavlink_map[message.id](**fields_of(message))
 
 
 def fields_of(message: Any) -> dict[str, Any]:
-    """Return the fields of a message of the :func:`reference` dialect, as in :class:`Message`."""
-    return {name: getattr(message, f'_{name}_raw', getattr(message, name))
-            for name in message.fieldnames}
+    """Return the fields of a message of this package or of the :func:`reference` dialect."""
+    return {name: raw(message, name) for name in message.fieldnames}

@@ -21,7 +21,8 @@ from typing import Any
 from illuminator_ros.illuminator.light import Light, Settings
 from illuminator_ros.illuminator.simulated_properties import IlluminatorProperties
 from illuminator_ros.mavlink.component import Endpoint
-from illuminator_ros.mavlink.messages import Address, CommandAck, heartbeat, MavType
+from illuminator_ros.mavlink.dialect import mavlink
+from illuminator_ros.mavlink.messages import Address, CommandAck, heartbeat
 from illuminator_ros.payload.attempt import Result
 from illuminator_ros.payload.simulated import SimulatedComponent
 from support.client import Client
@@ -49,7 +50,7 @@ class TwoDevices:
         self._codecs = [Codec(), Codec()]
         for codec, number in zip(self._codecs, numbers, strict=True):
             for _ in range(number):
-                codec.frame(LIGHT, heartbeat(MavType.ILLUMINATOR))
+                codec.frame(LIGHT, heartbeat(mavlink.MAV_TYPE_ILLUMINATOR))
         self._near = Codec()
 
     def _take(self, data: bytes, peer: object) -> None:

@@ -20,6 +20,7 @@ from collections.abc import Callable
 from typing import Any
 
 from illuminator_ros.mavlink.component import Endpoint
+from illuminator_ros.mavlink.dialect import decode
 from illuminator_ros.mavlink.frame import Decoder
 from support.frames import Codec
 
@@ -85,4 +86,4 @@ class VirtualLink:
                         if receiver.inspect is not None:
                             receiver.inspect(frame, cls)
                         receiver.receive(
-                            frame.source, cls.decode(frame.payload), self.now)
+                            frame.source, decode(cls, frame.payload), self.now)

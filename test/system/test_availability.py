@@ -24,11 +24,12 @@ import signal
 import subprocess
 import sys
 
+from illuminator_ros.mavlink.dialect import mavlink
 from illuminator_ros.mavlink.link import Link
 import pytest
 from std_srvs.srv import SetBool
 from support.fork_server import prepare_child
-from support.light import MavResult, ON_OFF, ServedLight
+from support.light import ON_OFF, ServedLight
 from support.processes import ended, environment, python
 from support.recording import Call
 from support.ros import bridge_arguments, Parameters, Ros, running_bridge, STREAM
@@ -94,7 +95,7 @@ def test_all_of_fifty_calls_at_once_are_answered(own_ros: Ros, port: int) -> Non
         eventually(lambda: any(call.answered for call in calls))
         assert 'requests are waiting' in next(
             call.result().message for call in calls if call.answered)
-        light.fake.results[ON_OFF] = MavResult.FAILED
+        light.fake.results[ON_OFF] = mavlink.MAV_RESULT_FAILED
         pass_time_until(lambda: all(call.answered for call in calls), step=0.1)
         assert all(call.result().message for call in calls)
 

@@ -19,13 +19,14 @@ import signal
 import sys
 
 from diagnostic_msgs.msg import DiagnosticArray
+from illuminator_ros.mavlink.dialect import mavlink
 import pytest
 from rcl_interfaces.srv import GetParameters
 from rclpy.qos import QoSProfile, ReliabilityPolicy
 from std_msgs.msg import Bool, Float32
 from std_srvs.srv import SetBool, Trigger
 from support import ros
-from support.light import Address, eventually, free_port, MavCmd, ServedLight
+from support.light import Address, eventually, free_port, ServedLight
 from support.processes import ended, Program, python, start_interpreter
 from support.recording import Call
 from support.slow import CLOCK, pass_time_until, time_passes
@@ -64,7 +65,7 @@ def test_refreshes_beyond_the_limit_are_refused_at_once(
         Trigger, '/illuminator/refresh', qos_profile=QoSProfile(depth=500))
     eventually(client.service_is_ready)
     own_ros.catch_up()
-    served[1].fake.results[MavCmd.REQUEST_MESSAGE] = None
+    served[1].fake.results[mavlink.MAV_CMD_REQUEST_MESSAGE] = None
 
     calls = [Call(client.call_async(Trigger.Request())) for _ in range(100)]
 

@@ -20,6 +20,7 @@ import signal
 import threading
 from unittest import mock
 
+from illuminator_ros.mavlink.dialect import mavlink
 from illuminator_ros.mavlink.link import Link
 from illuminator_ros.ros.bridge import Bridge
 from illuminator_ros.ros.executor import NodeExecutor
@@ -28,7 +29,7 @@ from rcl_interfaces.srv import GetParameters
 import rclpy
 from std_msgs.msg import Bool
 from support.embedded import embedded_bridge
-from support.light import Address, CONFIGURE, MavResult, ON_OFF, ServedLight
+from support.light import Address, CONFIGURE, ON_OFF, ServedLight
 from support.processes import Program
 from support.ros import Parameters, Ros, start_bridge, start_slow_bridge
 from support.waiting import eventually
@@ -102,7 +103,7 @@ def test_light_is_left_on_with_a_warning_without_the_parameter(own_ros: Ros, por
 
 
 @pytest.mark.parametrize(('start', 'result', 'line'), [
-    (start_slow_bridge, MavResult.DENIED, 'refused: MAV_RESULT_DENIED (1 try, '),
+    (start_slow_bridge, mavlink.MAV_RESULT_DENIED, 'refused: MAV_RESULT_DENIED (1 try, '),
     (start_bridge, None, 'no confirmation in time'),
 ])
 def test_light_that_is_not_confirmed_off_is_an_error_that_does_not_delay_the_end(

@@ -16,7 +16,7 @@
 
 from __future__ import annotations
 
-from illuminator_ros.mavlink.messages import MavType
+from illuminator_ros.mavlink.dialect import mavlink
 from support.frames import heartbeat_frame
 from support.live_link import BRIDGE, Bridge, Run
 from support.open_channel import bound_socket
@@ -32,7 +32,8 @@ def test_own_frames_that_return_are_no_address_conflict_but_those_of_another_sen
             router.sendto(data, sender)
         router.recv(2048)
         assert not bridge.ask(bridge.endpoint.address_conflict)
-        router.sendto(heartbeat_frame(BRIDGE, data[4] + 100 & 0xFF, MavType.ONBOARD_CONTROLLER),
+        router.sendto(heartbeat_frame(BRIDGE, data[4] + 100 & 0xFF,
+                                      mavlink.MAV_TYPE_ONBOARD_CONTROLLER),
                       sender)
         eventually(lambda: bridge.ask(bridge.endpoint.address_conflict), 'an address conflict')
 

@@ -26,6 +26,7 @@ from typing import Any
 
 from illuminator_ros.mavlink import connector as connector_module
 from illuminator_ros.mavlink import fault_log, line
+from illuminator_ros.mavlink.dialect import decode
 from illuminator_ros.mavlink.frame import Decoder
 from illuminator_ros.mavlink.link import Link
 from illuminator_ros.mavlink.link_state import LinkEvent
@@ -85,7 +86,8 @@ def test_frames_are_logged_in_a_line_each_at_debug_level_only(
         link.endpoint.wait_heard()
         link.stop()
         lines = [record.getMessage() for record in caplog.records]
-        for said in ('received from 1/243: HEARTBEAT type=44 ', 'sent from 1/194: HEARTBEAT '):
+        for said in ('received from 1/243: HEARTBEAT type=MAV_TYPE_ILLUMINATOR ',
+                     'sent from 1/194: HEARTBEAT '):
             assert any(line.startswith(said) for line in lines) == (level == logging.DEBUG)
 
 
@@ -153,7 +155,7 @@ def test_message_with_a_value_that_does_not_fit_costs_no_other_message(
     sent: list[int] = []
     while 2 not in sent:
         frames = (frame for _, data in other.receive() for frame in decoder.feed(data))
-        sent += [CommandLong.decode(frame.payload).confirmation
+        sent += [decode(CommandLong, frame.payload).confirmation
                  for frame in frames if frame.message_id == CommandLong.id]
     assert sent == [0, 2]
     assert 'internal error in the link' in caplog.text

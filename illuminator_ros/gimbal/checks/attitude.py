@@ -35,8 +35,8 @@ from .tester import (
     TOLERANCE,
 )
 from ..axes import AT_LIMIT, LEVEL
-from ..messages import Capabilities, ErrorFlags
-from ...mavlink.messages import MavCmd, Message
+from ...mavlink.dialect import flag_names, mavlink, short_names
+from ...mavlink.messages import Message
 from ...payload.checks.component_requirements import (
     check_command_int,
     none_of,
@@ -52,7 +52,7 @@ from ...payload.checks.requirement import (
 )
 from ...payload.checks.session import Failed, Skipped, Transaction
 from ...payload.messages import GimbalDeviceAttitudeStatus as AttitudeStatus
-from ...payload.mount_attitude import AXES, MountFlags, yaw_frame
+from ...payload.mount_attitude import AXES, yaw_frame
 from ...payload.rotation import Quaternion
 
 STATUS = 'GIMBAL_DEVICE_ATTITUDE_STATUS'
@@ -67,8 +67,10 @@ FAR_FROM_LIMIT = 45.0
 # slip rings.
 MAX_TURNS = 10
 # Flags that are set in normal operation.
-NO_FAILURES = sum(AT_LIMIT) | ErrorFlags.CALIBRATION_RUNNING | ErrorFlags.NO_MANAGER
-FRAMES = MountFlags.YAW_IN_EARTH_FRAME | MountFlags.YAW_IN_VEHICLE_FRAME
+NO_FAILURES = (sum(AT_LIMIT) | mavlink.GIMBAL_DEVICE_ERROR_FLAGS_CALIBRATION_RUNNING
+               | mavlink.GIMBAL_DEVICE_ERROR_FLAGS_NO_MANAGER)
+FRAMES = (mavlink.GIMBAL_DEVICE_FLAGS_YAW_IN_EARTH_FRAME
+          | mavlink.GIMBAL_DEVICE_FLAGS_YAW_IN_VEHICLE_FRAME)
 
 T = TypeVar('T', bound=GimbalTester)
 # Sends a setpoint; returns the transaction if the setpoint is a command.
@@ -145,7 +147,7 @@ def turns(
 
 def information(cls: type[Information]) -> tuple[Requirement[GimbalTester], ...]:
     """Return the requirements on an INFORMATION message."""
-    @requirement('information-static', f'sends the same {cls.name} at all times', PROPOSAL,
+    @requirement('information-static', f'sends the same {cls.msgname} at all times', PROPOSAL,
                  'Messaging (GM-10)')
     async def static(tester: GimbalTester) -> None:
         first, second = [await tester.session.required(cls) for _ in range(2)]
@@ -154,7 +156,7 @@ def information(cls: type[Information]) -> tuple[Requirement[GimbalTester], ...]
             raise Failed('two requests returned different limits or capabilities')
 
     @requirement('limits', 'reports a range of each axis whose ends are in order, and in rad',
-                 MESSAGES, cls.name)
+                 MESSAGES, cls.msgname)
     async def limits(tester: GimbalTester) -> str:
         found = await tester.limits()
         ranges = dict(zip(AXES, (found.roll, found.pitch, found.yaw), strict=True))
@@ -169,8 +171,8 @@ def information(cls: type[Information]) -> tuple[Requirement[GimbalTester], ...]
                  PROPOSAL, 'Gimbals (GM-1)')
     async def pitch_axis(tester: GimbalTester) -> None:
         found = await tester.limits()
-        if not found.capabilities & Capabilities.HAS_PITCH_AXIS:
-            text = f'{cls.name} has the capabilities 0x{found.capabilities:x}'
+        if not found.capabilities & mavlink.GIMBAL_DEVICE_CAP_FLAGS_HAS_PITCH_AXIS:
+            text = f'{cls.msgname} has the capabilities 0x{found.capabilities:x}'
             raise Failed(text) if found.pitch.low < found.pitch.high else Skipped(text)
 
     return static, limits, pitch_axis
@@ -193,11 +195,11 @@ def command_int(cls: type[Message]) -> Requirement[GimbalTester]:
     async def check(tester: GimbalTester) -> str:
         session = tester.session
         before = session.received(cls).total
-        one = await session.command(MavCmd.REQUEST_MESSAGE, cls.id, as_int=True)
+        one = await session.command(mavlink.MAV_CMD_REQUEST_MESSAGE, cls.id, as_int=True)
         check_command_int(one)
         if one.accepted and not await session.runner.until(
                 lambda: session.received(cls).total > before, REQUEST_TIMEOUT):
-            raise Failed(f'COMMAND_INT {one.text}: {one.answer}, but no {cls.name}', one.lines)
+            raise Failed(f'COMMAND_INT {one.text}: {one.answer}, but no {cls.msgname}', one.lines)
         return one.answer
     return check
 
@@ -290,8 +292,9 @@ async def failures_at_rest(tester: GimbalTester) -> None:
     """Read the flags, except those of normal operation."""
     seen = {one.failure_flags & ~NO_FAILURES
             for _, one in tester.session.idle(AttitudeStatus)}
-    if flags := [str(flag.name) for flag in ErrorFlags if any(one & flag for one in seen)]:
-        raise Failed(', '.join(flags))
+    if names := [name for flag, name in short_names('GIMBAL_DEVICE_ERROR_FLAGS').items()
+                 if any(one & flag for one in seen)]:
+        raise Failed(', '.join(names))
     if not seen:
         raise Skipped('none was received')
 
@@ -316,7 +319,7 @@ async def _end_of_pitch(tester: GimbalTester) -> tuple[int, float, float]:
     :return: 1 for the upper end, or -1 for the lower one; the end; a pitch beyond it, or else the
         steepest one.
     """
-    await tester.requires(Capabilities.HAS_PITCH_AXIS)
+    await tester.requires(mavlink.GIMBAL_DEVICE_CAP_FLAGS_HAS_PITCH_AXIS)
     low, high = (await tester.limits()).pitch
     if not (math.isfinite(low) and math.isfinite(high)):
         raise Skipped('it does not report the range of its pitch')
@@ -338,7 +341,8 @@ async def within_range(tester: GimbalTester) -> str:
     beyond = sign * (reached.pitch - limit)
     if beyond > TOLERANCE:
         raise Failed(f'{text}; its limit is {limit:.1f} deg')
-    if reached.failures & ErrorFlags.AT_PITCH_LIMIT and beyond < -FAR_FROM_LIMIT:
+    if (reached.failures & mavlink.GIMBAL_DEVICE_ERROR_FLAGS_AT_PITCH_LIMIT
+            and beyond < -FAR_FROM_LIMIT):
         raise Failed(f'{text}, and reports AT_PITCH_LIMIT; its limit is {limit:.1f} deg')
     if sign * (commanded - limit) <= 0:
         raise Skipped(f'{text}: {UNREACHABLE}')
@@ -354,23 +358,26 @@ async def limit_flags(tester: GimbalTester) -> None:
         raise Skipped(UNREACHABLE)
     start = await tester.begin()
     await tester.point(replace(start, roll=0.0, pitch=commanded))
-    pose = await tester.until(lambda pose: bool(
-        pose.failures & ErrorFlags.AT_PITCH_LIMIT) and abs(pose.pitch - limit) <= TOLERANCE)
+    pose = await tester.until(
+        lambda pose: bool(pose.failures & mavlink.GIMBAL_DEVICE_ERROR_FLAGS_AT_PITCH_LIMIT)
+        and abs(pose.pitch - limit) <= TOLERANCE)
     if abs(pose.pitch - limit) > TOLERANCE:
         raise Skipped(f'its pitch is {pose.pitch:.1f} deg, and its limit {limit:.1f} deg')
-    if not pose.failures & ErrorFlags.AT_PITCH_LIMIT:
+    if not pose.failures & mavlink.GIMBAL_DEVICE_ERROR_FLAGS_AT_PITCH_LIMIT:
         raise Failed(f'commanded {commanded:.1f} deg, stopped at {pose.pitch:.1f} deg, no '
                      'AT_PITCH_LIMIT')
 
 
-def _position(flag: MountFlags, capability: Capabilities) -> Requirement[GimbalTester]:
-    name = str(flag.name).lower()
+def _position(flag: int, capability: int) -> Requirement[GimbalTester]:
+    [name] = flag_names('GIMBAL_DEVICE_FLAGS', flag)
 
-    @moves(name, f'reports {flag.name} when it is commanded to', MESSAGES, 'GIMBAL_DEVICE_FLAGS')
+    @moves(name, f'reports {name.upper()} when it is commanded to', MESSAGES,
+           'GIMBAL_DEVICE_FLAGS')
     async def check(tester: GimbalTester) -> str:
         await tester.requires(capability)
         await tester.begin()
-        await tester.point(None, flags=flag | LEVEL | MountFlags.YAW_IN_VEHICLE_FRAME)
+        await tester.point(None, flags=flag | LEVEL
+                           | mavlink.GIMBAL_DEVICE_FLAGS_YAW_IN_VEHICLE_FRAME)
         pose = await tester.until(lambda pose: bool(pose.flags & flag), 2.0)
         if not pose.flags & flag:
             raise Failed(f'flags 0x{pose.flags:x}')
@@ -379,8 +386,10 @@ def _position(flag: MountFlags, capability: Capabilities) -> Requirement[GimbalT
     return check
 
 
-POSITIONS = (_position(MountFlags.NEUTRAL, Capabilities.HAS_NEUTRAL),
-             _position(MountFlags.RETRACT, Capabilities.HAS_RETRACT))
+POSITIONS = (_position(mavlink.GIMBAL_DEVICE_FLAGS_NEUTRAL,
+                       mavlink.GIMBAL_DEVICE_CAP_FLAGS_HAS_NEUTRAL),
+             _position(mavlink.GIMBAL_DEVICE_FLAGS_RETRACT,
+                       mavlink.GIMBAL_DEVICE_CAP_FLAGS_HAS_RETRACT))
 MOTION: tuple[AnyRequirement, ...] = (
     ignores('hold', 'keeps its attitude when attitude and rates are unset', MESSAGES,
             'GIMBAL_DEVICE_SET_ATTITUDE', 'a setpoint of NaN',

@@ -42,13 +42,12 @@ from .tester import (
 )
 from .. import messages as gimbal
 from ..axes import LEVEL
-from ..messages import Capabilities, GimbalCommand
+from ...mavlink.dialect import mavlink
 from ...mavlink.messages import (
     Address,
     CommandLong,
     Heartbeat,
     heartbeat,
-    MavType,
     Message,
     target_of,
 )
@@ -64,14 +63,14 @@ from ...payload.checks.requirement import (
 )
 from ...payload.checks.session import Failed, Session, Skipped
 from ...payload.messages import GimbalDeviceAttitudeStatus as AttitudeStatus
-from ...payload.mount_attitude import MountFlags, UNSET_VECTOR
+from ...payload.mount_attitude import UNSET_VECTOR
 from ...payload.rotation import Quaternion
 
 # s
 ANNOUNCE_INTERVAL = 0.4
 # MAV_COMP_ID_ONBOARD_COMPUTER
 MANAGER_ID = 191
-VEHICLE_FRAME = MountFlags.YAW_IN_VEHICLE_FRAME
+VEHICLE_FRAME = mavlink.GIMBAL_DEVICE_FLAGS_YAW_IN_VEHICLE_FRAME
 # ESTIMATOR_STATUS_FLAGS: only the attitude of the vehicle is valid.
 ESTIMATOR_ATTITUDE = 1
 
@@ -99,7 +98,7 @@ class DeviceTester(GimbalTester):
 
     def announce(self, manager: Address) -> None:
         """Announce a manager of the device."""
-        self.session.send(heartbeat(MavType.ONBOARD_CONTROLLER), manager)
+        self.session.send(heartbeat(mavlink.MAV_TYPE_ONBOARD_CONTROLLER), manager)
         self.session.send(gimbal.GimbalManagerStatus(
             0, int(LEVEL), self.session.device.component, *manager, 0, 0), manager)
         if self.heading is not None:
@@ -163,7 +162,7 @@ async def north_needs_heading(tester: DeviceTester) -> None:
                if math.isnan(one.delta_yaw)]
     if not unknown:
         raise Skipped('its statuses have the heading')
-    if any(one.flags & MountFlags.ACCEPTS_YAW_IN_EARTH_FRAME for one in unknown):
+    if any(one.flags & mavlink.GIMBAL_DEVICE_FLAGS_ACCEPTS_YAW_IN_EARTH_FRAME for one in unknown):
         raise Failed('it reports ACCEPTS_YAW_IN_EARTH_FRAME, and delta_yaw is NaN')
 
 
@@ -193,7 +192,7 @@ async def _send_to_manager(tester: DeviceTester, pose: Pose) -> None:
             gimbal.GimbalManagerSetAttitude(*ids, quaternion_of(pose), *UNSET_VECTOR),
             gimbal.GimbalManagerSetPitchyaw(*ids, pitch, yaw, NAN, NAN),
             gimbal.GimbalManagerSetManualControl(*ids, -0.5, 0.5, NAN, NAN),
-            CommandLong(*device, GimbalCommand.DO_GIMBAL_MANAGER_PITCHYAW, 0, pose.pitch,
+            CommandLong(*device, mavlink.MAV_CMD_DO_GIMBAL_MANAGER_PITCHYAW, 0, pose.pitch,
                         pose.yaw, NAN, NAN, float(LEVEL), 0.0, float(device.component))):
         tester.session.send(message, tester.manager)
 
@@ -215,8 +214,8 @@ async def _heading(tester: DeviceTester, heading: float) -> AsyncIterator[None]:
 
     :raises Skipped: if the device lacks a yaw axis, or does not use the heading.
     """
-    await tester.requires(Capabilities.SUPPORTS_YAW_IN_EARTH_FRAME)
-    await tester.requires(Capabilities.HAS_YAW_AXIS)
+    await tester.requires(mavlink.GIMBAL_DEVICE_CAP_FLAGS_SUPPORTS_YAW_IN_EARTH_FRAME)
+    await tester.requires(mavlink.GIMBAL_DEVICE_CAP_FLAGS_HAS_YAW_AXIS)
     if any(not math.isnan(one.delta_yaw) for _, one in tester.session.idle(AttitudeStatus)):
         raise Skipped('another component sends it a heading')
     await tester.begin()
@@ -224,7 +223,7 @@ async def _heading(tester: DeviceTester, heading: float) -> AsyncIterator[None]:
     try:
         await tester.pause(2 * ANNOUNCE_INTERVAL)
         pose = await tester.pose()
-        if not pose.flags & MountFlags.ACCEPTS_YAW_IN_EARTH_FRAME:
+        if not pose.flags & mavlink.GIMBAL_DEVICE_FLAGS_ACCEPTS_YAW_IN_EARTH_FRAME:
             raise Skipped('it does not report ACCEPTS_YAW_IN_EARTH_FRAME')
         if abs(math.remainder(pose.heading - heading, 360.0)) > TOLERANCE:
             raise Skipped(f'it was sent a heading of {heading:g} deg, and reports '
@@ -244,7 +243,7 @@ async def earth_frame(tester: DeviceTester) -> str:
         target = await tester.target(-STEP, STEP)
         commanded = 40.0 + target.yaw
         await tester.point(replace(target, yaw=commanded),
-                           flags=LEVEL | MountFlags.YAW_IN_EARTH_FRAME)
+                           flags=LEVEL | mavlink.GIMBAL_DEVICE_FLAGS_YAW_IN_EARTH_FRAME)
         pose = await tester.settle(target)
         (yaw,) = earth_yaw([pose])
         # A device need not know the heading.
@@ -258,13 +257,15 @@ async def earth_frame(tester: DeviceTester) -> str:
        'GIMBAL_DEVICE_FLAGS')
 async def yaw_lock(tester: DeviceTester) -> str:
     """Lock the yaw straight ahead, then send the heading of a vehicle that turns."""
-    await tester.requires(Capabilities.HAS_YAW_LOCK)
+    await tester.requires(mavlink.GIMBAL_DEVICE_CAP_FLAGS_HAS_YAW_LOCK)
     async with _heading(tester, 40.0):
         start, target = await tester.target(-STEP, 0.0), await tester.target(-STEP, -STEP)
-        await tester.point(start, flags=LEVEL | MountFlags.YAW_LOCK | VEHICLE_FRAME)
+        await tester.point(start, flags=LEVEL | mavlink.GIMBAL_DEVICE_FLAGS_YAW_LOCK
+                           | VEHICLE_FRAME)
         await tester.pause(0.5)
-        pose = await tester.until(lambda pose: bool(pose.flags & MountFlags.YAW_LOCK), 1.5)
-        if not pose.flags & MountFlags.YAW_LOCK:
+        pose = await tester.until(lambda pose: bool(pose.flags
+                                                    & mavlink.GIMBAL_DEVICE_FLAGS_YAW_LOCK), 1.5)
+        if not pose.flags & mavlink.GIMBAL_DEVICE_FLAGS_YAW_LOCK:
             raise Failed(f'flags 0x{pose.flags:x} without YAW_LOCK')
         tester.heading = 40.0 + STEP
         pose = await tester.settle(target)
@@ -278,7 +279,7 @@ async def yaw_lock(tester: DeviceTester) -> str:
 INFORMATION = gimbal.GimbalDeviceInformation
 REQUIREMENTS: tuple[Requirement[DeviceTester], ...] = (
     component.heartbeat,
-    component.heartbeat_type(gimbal.MAV_TYPE_GIMBAL, 'GIMBAL', 'a gimbal'),
+    component.heartbeat_type(mavlink.MAV_TYPE_GIMBAL, 'GIMBAL', 'a gimbal'),
     component.heartbeat_autopilot, component.address,
     component.status_stream(AttitudeStatus, GIMBAL, 'Gimbal Device Broadcast/Status Messages'),
     component.sent_on_request(
@@ -313,7 +314,7 @@ def is_device(message: Message) -> bool:
     # Gimbal managers send these messages with a gimbal_device_id.
     return (isinstance(message, gimbal.GimbalDeviceInformation | AttitudeStatus)
             and message.gimbal_device_id == 0
-            or isinstance(message, Heartbeat) and message.type == gimbal.MAV_TYPE_GIMBAL)
+            or isinstance(message, Heartbeat) and message.type == mavlink.MAV_TYPE_GIMBAL)
 
 
 CHECKS: PayloadChecks[DeviceTester] = PayloadChecks(

@@ -46,11 +46,10 @@ from .tester import (
 )
 from .. import messages as gimbal
 from ..axes import LEVEL
-from ..messages import Capabilities, GimbalCommand, NO_COMPONENT
+from ..messages import NO_COMPONENT
+from ...mavlink.dialect import mavlink
 from ...mavlink.messages import (
     Address,
-    MAV_COMP_ID_AUTOPILOT1,
-    MavResult,
     Message,
     time_boot_ms,
 )
@@ -66,12 +65,12 @@ from ...payload.checks.requirement import (
 from ...payload.checks.session import fail_if, Failed, Session, Skipped, Transaction
 from ...payload.messages import Attitude, GlobalPositionInt
 from ...payload.messages import GimbalDeviceAttitudeStatus as AttitudeStatus
-from ...payload.mount_attitude import MountFlags, UNSET_VECTOR
+from ...payload.mount_attitude import UNSET_VECTOR
 
 INFORMATION, MANAGER_STATUS = gimbal.GimbalManagerInformation, gimbal.GimbalManagerStatus
-PITCHYAW, CONFIGURE = (GimbalCommand.DO_GIMBAL_MANAGER_PITCHYAW,
-                       GimbalCommand.DO_GIMBAL_MANAGER_CONFIGURE)
-VEHICLE_FRAME = MountFlags.YAW_IN_VEHICLE_FRAME
+PITCHYAW, CONFIGURE = (mavlink.MAV_CMD_DO_GIMBAL_MANAGER_PITCHYAW,
+                       mavlink.MAV_CMD_DO_GIMBAL_MANAGER_CONFIGURE)
+VEHICLE_FRAME = mavlink.GIMBAL_DEVICE_FLAGS_YAW_IN_VEHICLE_FRAME
 # Sections of the specifications.
 PITCHYAW_COMMAND = 'MAV_CMD_DO_GIMBAL_MANAGER_PITCHYAW'
 CONFIGURE_COMMAND = 'MAV_CMD_DO_GIMBAL_MANAGER_CONFIGURE'
@@ -355,9 +354,9 @@ async def _send_messages(tester: ManagerTester, pose: Pose) -> None:
 
 async def _clear_roi(tester: ManagerTester, pose: Pose) -> Transaction:
     """Clear the region from the second player; success would turn the gimbal to neutral."""
-    await tester.requires(Capabilities.CAN_POINT_LOCATION_GLOBAL)
+    await tester.requires(mavlink.GIMBAL_DEVICE_CAP_FLAGS_CAN_POINT_LOCATION_GLOBAL)
     return await tester.session.command(
-        GimbalCommand.DO_SET_ROI_NONE, tester.device_id, source=tester.other)
+        mavlink.MAV_CMD_DO_SET_ROI_NONE, tester.device_id, source=tester.other)
 
 
 async def _point_other_device(tester: ManagerTester, pose: Pose) -> Transaction:
@@ -370,14 +369,15 @@ async def _point_other_device(tester: ManagerTester, pose: Pose) -> Transaction:
 @moves('earth-frame', 'takes yaw relative to north (GM-2)', MESSAGES, 'GIMBAL_MANAGER_FLAGS')
 async def earth_frame(tester: ManagerTester) -> str:
     """Command a yaw relative to north without locking it."""
-    await tester.requires(Capabilities.SUPPORTS_YAW_IN_EARTH_FRAME)
+    await tester.requires(mavlink.GIMBAL_DEVICE_CAP_FLAGS_SUPPORTS_YAW_IN_EARTH_FRAME)
     start = await tester.begin()
     if not abs(start.heading) > 2 * TOLERANCE:
         raise Skipped('it does not report delta_yaw' if math.isnan(start.heading) else
                       'the vehicle heads north, where both frames are the same')
     target = await tester.target(-STEP, STEP)
     (yaw,) = earth_yaw([Pose(0.0, target.pitch, target.yaw, heading=start.heading)])
-    await tester.point(Pose(0.0, target.pitch, yaw), flags=LEVEL | MountFlags.YAW_IN_EARTH_FRAME)
+    await tester.point(Pose(0.0, target.pitch, yaw), flags=LEVEL
+                       | mavlink.GIMBAL_DEVICE_FLAGS_YAW_IN_EARTH_FRAME)
     pose = await tester.settle(target)
     if not pose.near(target):
         raise Failed(f'commanded {yaw:.1f} deg from north at a heading of '
@@ -389,12 +389,12 @@ async def earth_frame(tester: ManagerTester) -> str:
        'GIMBAL_MANAGER_STATUS')
 async def flags_shown(tester: ManagerTester) -> None:
     """Command NEUTRAL, and read the status."""
-    await tester.requires(Capabilities.HAS_NEUTRAL)
+    await tester.requires(mavlink.GIMBAL_DEVICE_CAP_FLAGS_HAS_NEUTRAL)
     await tester.begin()
-    await tester.point(None, flags=MountFlags.NEUTRAL | LEVEL)
+    await tester.point(None, flags=mavlink.GIMBAL_DEVICE_FLAGS_NEUTRAL | LEVEL)
     await tester.pause(0.5)
     status = await tester.newest(MANAGER_STATUS, 'its flags')
-    if not status.flags & MountFlags.NEUTRAL:
+    if not status.flags & mavlink.GIMBAL_DEVICE_FLAGS_NEUTRAL:
         raise Failed(f'flags 0x{status.flags:x}')
 
 
@@ -416,20 +416,21 @@ async def other_target(tester: ManagerTester) -> None:
 @moves('roi', 'points at a place, and stops on command (GM-8)', GIMBAL, 'Gimbal Manager Messages')
 async def roi(tester: ManagerTester) -> str:
     """Set a place north of the vehicle; play the autopilot if none is heard."""
-    await tester.requires(Capabilities.CAN_POINT_LOCATION_GLOBAL)
+    await tester.requires(mavlink.GIMBAL_DEVICE_CAP_FLAGS_CAN_POINT_LOCATION_GLOBAL)
     await tester.begin()
     session = tester.session
-    autopilot = Address(session.device.system, MAV_COMP_ID_AUTOPILOT1)
+    autopilot = Address(session.device.system, mavlink.MAV_COMP_ID_AUTOPILOT1)
     tester.vehicle = None if autopilot in session.heard else autopilot
     try:
         await tester.pause(0.5)
         one = await session.command(
-            GimbalCommand.DO_SET_ROI_LOCATION, tester.device_id, 0.0, 0.0, 0.0, *PLACE,
+            mavlink.MAV_CMD_DO_SET_ROI_LOCATION, tester.device_id, 0.0, 0.0, 0.0, *PLACE,
             as_int=True)
-        if one.result in (None, MavResult.UNSUPPORTED, MavResult.COMMAND_LONG_ONLY):
+        if one.result in (None, mavlink.MAV_RESULT_UNSUPPORTED,
+                          mavlink.MAV_RESULT_COMMAND_LONG_ONLY):
             latitude, longitude, altitude = PLACE
             one = await session.command(
-                GimbalCommand.DO_SET_ROI_LOCATION, tester.device_id, 0.0, 0.0, 0.0,
+                mavlink.MAV_CMD_DO_SET_ROI_LOCATION, tester.device_id, 0.0, 0.0, 0.0,
                 latitude / 1e7, longitude / 1e7, altitude)
         if not one.accepted and tester.vehicle is None:
             raise Skipped(f'{one.answer}: the position of the vehicle may be unknown')
@@ -437,7 +438,7 @@ async def roi(tester: ManagerTester) -> str:
         if tester.vehicle is not None:
             await tester.reach(await tester.target(NORTH.pitch, NORTH.yaw))
         pose = await tester.pose()
-        one = await session.command(GimbalCommand.DO_SET_ROI_NONE, tester.device_id)
+        one = await session.command(mavlink.MAV_CMD_DO_SET_ROI_NONE, tester.device_id)
         one.expect(accepted=True)
         return str(pose)
     finally:
@@ -448,7 +449,7 @@ REQUIREMENTS: tuple[Requirement[ManagerTester], ...] = (
     component.heartbeat, component.address,
     component.status_stream(MANAGER_STATUS, GIMBAL, 'Gimbal Manager Status'),
     component.sent_on_request(
-        'status-request', MANAGER_STATUS, MESSAGES, MANAGER_STATUS.name, optional=True),
+        'status-request', MANAGER_STATUS, MESSAGES, MANAGER_STATUS.msgname, optional=True),
     attitude.failures_at_rest,
     component.sent_on_request('information', INFORMATION, GIMBAL, 'Discovery of Gimbal Manager'),
     *attitude.information(INFORMATION), same_device, attitude_stream,

@@ -24,14 +24,13 @@ from typing import NamedTuple, TypeVar
 
 from .. import messages as gimbal
 from ..axes import LEVEL, Range, read_ranges
-from ..messages import Capabilities
+from ...mavlink.dialect import mavlink, short_names
 from ...mavlink.messages import Address, Message
 from ...payload.checks.component_requirements import restore_interval
 from ...payload.checks.requirement import Conditions, Specification
 from ...payload.checks.session import Failed, Session, Skipped
 from ...payload.messages import GimbalDeviceAttitudeStatus as AttitudeStatus
 from ...payload.mount_attitude import (
-    MountFlags,
     names_frame,
     UNSET_VECTOR,
     yaw_frame,
@@ -125,9 +124,10 @@ def describe(message: Message) -> str:
             text = str(Pose.from_message(message))
         except ValueError as error:
             text = str(error)
-        return f'{message.name} {text}, flags {message.flags}, failures {message.failure_flags}'
+        return (f'{message.get_type()} {text}, flags {message.flags}, '
+                f'failures {message.failure_flags}')
     if isinstance(message, gimbal.GimbalManagerStatus):
-        return f'{message.name} {control_text(control_of(message))}, flags {message.flags}'
+        return f'{message.get_type()} {control_text(control_of(message))}, flags {message.flags}'
     if isinstance(message, gimbal.GimbalDeviceSetAttitude | gimbal.GimbalManagerSetAttitude):
         angles = 'no attitude'
         if all(map(math.isfinite, message.q)):
@@ -135,7 +135,7 @@ def describe(message: Message) -> str:
             angles = f'pitch {pitch:.1f}, yaw {yaw:.1f} deg'
         rates = ' '.join(f'{math.degrees(rate):g}' for rate in (
             message.angular_velocity_y, message.angular_velocity_z))
-        return f'{message.name} {angles}, rates {rates} deg/s, flags {message.flags}'
+        return f'{message.get_type()} {angles}, rates {rates} deg/s, flags {message.flags}'
     return ''
 
 
@@ -205,10 +205,10 @@ class GimbalTester(ABC):
             self._limits = Limits.from_message(await self.session.required(self.information))
         return self._limits
 
-    async def requires(self, capability: Capabilities) -> None:
+    async def requires(self, capability: int) -> None:
         """Raise Skipped if the gimbal does not have a capability."""
         if not (await self.limits()).capabilities & capability:
-            raise Skipped(f'it does not have {capability.name}')
+            raise Skipped(f'it does not have {short_names("GIMBAL_DEVICE_CAP_FLAGS")[capability]}')
 
     # Moving
 
@@ -218,7 +218,8 @@ class GimbalTester(ABC):
 
     @abstractmethod
     async def point(
-        self, pose: Pose | None, *, flags: int = LEVEL | MountFlags.YAW_IN_VEHICLE_FRAME,
+        self, pose: Pose | None, *, flags: int = LEVEL
+        | mavlink.GIMBAL_DEVICE_FLAGS_YAW_IN_VEHICLE_FRAME,
         rates: tuple[float, float, float] = UNSET_VECTOR,
     ) -> None:
         """Send a setpoint: an attitude if there is one, and rates, deg/s."""
@@ -274,9 +275,9 @@ class GimbalTester(ABC):
         return Pose(
             0.0,
             clipped(pitch, *limits.pitch)
-            if limits.capabilities & Capabilities.HAS_PITCH_AXIS else now.pitch,
+            if limits.capabilities & mavlink.GIMBAL_DEVICE_CAP_FLAGS_HAS_PITCH_AXIS else now.pitch,
             clipped(yaw, *limits.yaw)
-            if limits.capabilities & Capabilities.HAS_YAW_AXIS else now.yaw)
+            if limits.capabilities & mavlink.GIMBAL_DEVICE_CAP_FLAGS_HAS_YAW_AXIS else now.yaw)
 
     async def begin(self) -> Pose:
         """
@@ -286,7 +287,7 @@ class GimbalTester(ABC):
         """
         await self.prepare()
         start, now = await self.target(-STEP, 0.0), await self.pose()
-        if now.flags & MountFlags.RC_EXCLUSIVE:
+        if now.flags & mavlink.GIMBAL_DEVICE_FLAGS_RC_EXCLUSIVE:
             raise Skipped('it reports RC_EXCLUSIVE, so it ignores setpoints')
         if not start.near(now):
             await self.point(start)
@@ -302,7 +303,7 @@ class GimbalTester(ABC):
             _, (low, high), _, capabilities = await self.limits()
         except Skipped:
             return -1
-        if not capabilities & Capabilities.HAS_PITCH_AXIS:
+        if not capabilities & mavlink.GIMBAL_DEVICE_CAP_FLAGS_HAS_PITCH_AXIS:
             raise Skipped('it does not have HAS_PITCH_AXIS')
         # An unknown end is NaN.
         if not pose.pitch - angle < low:
@@ -346,7 +347,8 @@ class GimbalTester(ABC):
         differing = []
         try:
             now = await self.pose()
-            same_mode = not (now.flags ^ before.flags) & ~MountFlags.ACCEPTS_YAW_IN_EARTH_FRAME
+            same_mode = not (
+                now.flags ^ before.flags) & ~mavlink.GIMBAL_DEVICE_FLAGS_ACCEPTS_YAW_IN_EARTH_FRAME
             if self.conditions.consent and not (now.near(before, 1.0) and same_mode):
                 await self.prepare()
                 await self._turn_back(before)
@@ -358,8 +360,10 @@ class GimbalTester(ABC):
         return differing
 
     async def _turn_back(self, before: Pose) -> None:
-        frames = MountFlags.YAW_IN_EARTH_FRAME | MountFlags.ACCEPTS_YAW_IN_EARTH_FRAME
-        await self.point(before, flags=before.flags & ~frames | MountFlags.YAW_IN_VEHICLE_FRAME)
+        frames = (mavlink.GIMBAL_DEVICE_FLAGS_YAW_IN_EARTH_FRAME
+                  | mavlink.GIMBAL_DEVICE_FLAGS_ACCEPTS_YAW_IN_EARTH_FRAME)
+        await self.point(before, flags=before.flags & ~frames
+                         | mavlink.GIMBAL_DEVICE_FLAGS_YAW_IN_VEHICLE_FRAME)
         await self.until(lambda pose: pose.near(before, 1.0))
         # Wait until the gimbal stands still.
         await self.pause(0.5)

@@ -22,17 +22,21 @@ import math
 from ..axes import other_signs
 from ..commands import Control
 from ..events import GimbalKey, GimbalSnapshot
-from ..messages import ErrorFlags, flag_names
 from ...mavlink.command_sender import format_seconds
-from ...payload.mount_attitude import AXES, MountFlags
+from ...mavlink.dialect import entry_names, flag_names, mavlink
+from ...payload.mount_attitude import AXES
 from ...ros import diagnostics
 from ...ros.command_sources import holder_values
 
 # s; a longer silence is reported: statuses and attitudes come about five times a second.
 SILENCE = 2.0
 # Error flags that do not indicate a defect of the gimbal.
-_CONDITIONS = (ErrorFlags.AT_ROLL_LIMIT | ErrorFlags.AT_PITCH_LIMIT | ErrorFlags.AT_YAW_LIMIT
-               | ErrorFlags.CALIBRATION_RUNNING | ErrorFlags.NO_MANAGER)
+_ERRORS = 'GIMBAL_DEVICE_ERROR_FLAGS'
+_CONDITIONS = (mavlink.GIMBAL_DEVICE_ERROR_FLAGS_AT_ROLL_LIMIT
+               | mavlink.GIMBAL_DEVICE_ERROR_FLAGS_AT_PITCH_LIMIT
+               | mavlink.GIMBAL_DEVICE_ERROR_FLAGS_AT_YAW_LIMIT
+               | mavlink.GIMBAL_DEVICE_ERROR_FLAGS_CALIBRATION_RUNNING
+               | mavlink.GIMBAL_DEVICE_ERROR_FLAGS_NO_MANAGER)
 
 
 def why_no_gimbal(
@@ -90,8 +94,8 @@ def device_findings(
     if gimbal.unreachable:
         return [(diagnostics.ERROR, gimbal.unreachable)]
     findings: list[diagnostics.Finding] = [
-        (diagnostics.WARN if flag in _CONDITIONS else diagnostics.ERROR, name)
-        for flag in _single(gimbal.errors) for name in flag_names(flag)]
+        (diagnostics.WARN if flag & _CONDITIONS else diagnostics.ERROR, name)
+        for flag, name in _single(gimbal.errors)]
     if others := gimbal.managers[1:]:
         findings.append((
             diagnostics.WARN, f'managers {", ".join(map(str, others))} announce the gimbal too: '
@@ -110,10 +114,10 @@ def device_findings(
     return findings
 
 
-def _single(errors: ErrorFlags) -> list[ErrorFlags]:
-    known = [flag for flag in ErrorFlags if flag & errors]
-    unknown = ErrorFlags(int(errors) & ~sum(ErrorFlags))
-    return [*known, unknown] if unknown else known
+def _single(errors: int) -> list[tuple[int, str]]:
+    flags = [flag for flag in entry_names(_ERRORS) if flag & errors]
+    unknown = errors & ~sum(flags)
+    return [(flag, name) for flag in (*flags, unknown) for name in flag_names(_ERRORS, flag)]
 
 
 def controller(control: Control | None) -> str:
@@ -131,9 +135,10 @@ def _values(gimbal: GimbalSnapshot, now: float) -> dict[str, diagnostics.Value]:
         'controller': controller(gimbal.control),
         'control_enforced': None if gimbal.enforces_control else False,
         'setpoints_sent': gimbal.setpoints_sent,
-        'failure_flags': int(gimbal.errors),
-        'flags': ', '.join(flag_names(gimbal.flags)),
-        'accepts_yaw_in_earth_frame': bool(gimbal.flags & MountFlags.ACCEPTS_YAW_IN_EARTH_FRAME),
+        'failure_flags': gimbal.errors,
+        'flags': ', '.join(flag_names('GIMBAL_DEVICE_FLAGS', gimbal.flags)),
+        'accepts_yaw_in_earth_frame': bool(
+            gimbal.flags & mavlink.GIMBAL_DEVICE_FLAGS_ACCEPTS_YAW_IN_EARTH_FRAME),
     }
     values |= holder_values(gimbal.holder, gimbal.held_since, now)
     if math.isfinite(gimbal.attitude_at):
@@ -147,7 +152,8 @@ def _values(gimbal: GimbalSnapshot, now: float) -> dict[str, diagnostics.Value]:
             AXES, gimbal.attitude.rotation.euler(), strict=True)}
         values['vehicle_heading_rad'] = gimbal.attitude.heading
     if gimbal.capabilities is not None:
-        values['capabilities'] = ', '.join(flag_names(gimbal.capabilities))
+        values['capabilities'] = ', '.join(flag_names('GIMBAL_DEVICE_CAP_FLAGS',
+                                                      gimbal.capabilities))
     if gimbal.ranges is not None:
         # With the signs of ROS: pitch down and yaw left are positive.
         ranges = [other_signs(*one) for one in zip(AXES, gimbal.ranges, strict=True)]

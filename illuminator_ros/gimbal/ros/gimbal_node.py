@@ -33,11 +33,10 @@ from .. import events
 from ..client import GimbalClient
 from ..commands import Control
 from ..gimbal import Gimbal
-from ..messages import ErrorFlags, flag_names
+from ...mavlink.dialect import flag_names, mavlink
 from ...payload import request
 from ...payload.command_sources import DEFAULT, describe
 from ...payload.messages import GeoPoint
-from ...payload.mount_attitude import MountFlags
 from ...ros import node as ros_node
 from ...ros.command_sources import prefixes, release_services
 from ...ros.conversions import quaternion_message
@@ -87,7 +86,7 @@ class GimbalNode:
         self._clock = node.get_clock()
         self._started = host.link.clock()
         self._yaw_lock: bool | None = None
-        self._errors = ErrorFlags(0)
+        self._errors = 0
         self._separation: float = host.values['geoid_separation']
         sources = client.settings.sources
         source_topic = [ros_node.Publication('source', String)] if sources else []
@@ -193,14 +192,14 @@ class GimbalNode:
             publish('angles', lambda: conversions.vector_message(header, rotation.euler()))
             if rates is not None:
                 publish('angular_velocity', lambda: conversions.vector_message(header, rates))
-        lock = bool(event.flags & MountFlags.YAW_LOCK)
+        lock = bool(event.flags & mavlink.GIMBAL_DEVICE_FLAGS_YAW_LOCK)
         if lock is not self._yaw_lock:
             self._yaw_lock = lock
             self._interface.publish('yaw_lock', lock)
         if event.errors != self._errors:
             log = self._log.warning if event.errors & ~self._errors else self._log.info
             self._errors = event.errors
-            names = ', '.join(flag_names(event.errors)) or 'none'
+            names = ', '.join(flag_names('GIMBAL_DEVICE_ERROR_FLAGS', event.errors)) or 'none'
             log(f'gimbal {event.key}: failure flags: {names}', 'flags')
             self._host.check_diagnostics()
 

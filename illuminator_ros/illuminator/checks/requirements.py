@@ -33,8 +33,9 @@ from .tester import (
     status_text,
 )
 from ..messages import IlluminatorStatus
-from ..model import ErrorFlags, flag_names, float32, KNOWN_FLAGS, Mode, Status, StrobeRange
+from ..model import flag_names, float32, KNOWN_FLAGS, Mode, Status, StrobeRange
 from ...mavlink import messages
+from ...mavlink.dialect import mavlink
 from ...payload.checks import component_requirements as component
 from ...payload.checks.requirement import (
     COMMAND,
@@ -83,7 +84,7 @@ async def command_int(tester: LightTester) -> str:
     change = await tester.switch(True, as_int=True)
     one = change.transaction
     component.check_command_int(one)
-    if not one.accepted and one.result != messages.MavResult.COMMAND_LONG_ONLY:
+    if not one.accepted and one.result != mavlink.MAV_RESULT_COMMAND_LONG_ONLY:
         raise Failed(f'COMMAND_INT {one.text}: {one.answer}', one.lines)
     fail_if([change.contradiction])
     return one.answer
@@ -148,7 +149,7 @@ async def _unmet_mode(tester: LightTester, one: Change, mode: Mode) -> Failed | 
 
     :raises Skipped: if the light rejects a mode that it does not list.
     """
-    if one.transaction.result == messages.MavResult.DENIED:
+    if one.transaction.result == mavlink.MAV_RESULT_DENIED:
         status = await tester.status()
         bitmask = status.mode_bitmask if status else 0
         # Lights differ in the meaning of a bit: the value of the enum, or 1 << value.
@@ -294,7 +295,8 @@ STROBE = (
 
 # K; the smallest rise of temperature that explains a flag.
 STEP = 0.5
-THERMAL = (ErrorFlags.THERMAL_THROTTLING, ErrorFlags.OVER_TEMPERATURE_SHUTDOWN)
+THERMAL = (mavlink.ILLUMINATOR_ERROR_FLAGS_THERMAL_THROTTLING,
+           mavlink.ILLUMINATOR_ERROR_FLAGS_OVER_TEMPERATURE_SHUTDOWN)
 
 reports = partial(requirement, specification=MESSAGES, section='ILLUMINATOR_STATUS')
 
@@ -400,7 +402,7 @@ async def thermal(tester: LightTester) -> str:
     start = await tester.status()
     if start is None or start.temperature is None:
         raise Skipped('it reports no temperature')
-    if start.error_flags & ErrorFlags.THERMISTOR_FAILURE:
+    if start.error_flags & mavlink.ILLUMINATOR_ERROR_FLAGS_THERMISTOR_FAILURE:
         raise Skipped('its temperature sensor has failed')
     await tester.configure(brightness=100.0)
     on = (await tester.switch(True)).transaction
@@ -454,7 +456,7 @@ def _judge(seen: list[Status], seconds: float) -> str:
 
 REQUIREMENTS: tuple[Requirement[LightTester], ...] = (
     component.heartbeat, component.heartbeat_type(
-        messages.MavType.ILLUMINATOR, 'ILLUMINATOR', 'an illuminator'),
+        mavlink.MAV_TYPE_ILLUMINATOR, 'ILLUMINATOR', 'an illuminator'),
     component.heartbeat_autopilot, component.address,
     component.status_stream(
         IlluminatorStatus, ILLUMINATOR, 'Message/Command/Enum Summary', optional=True),
@@ -481,20 +483,20 @@ def is_light(message: messages.Message) -> bool:
     """Return whether a message identifies its sender as a light."""
     return (isinstance(message, IlluminatorStatus)
             or isinstance(message, messages.Heartbeat)
-            and message.type == messages.MavType.ILLUMINATOR)
+            and message.type == mavlink.MAV_TYPE_ILLUMINATOR)
 
 
 def describe(message: messages.Message) -> str:
     """Return the text of an ILLUMINATOR_STATUS in one line, '' for another message."""
-    return f'{message.name} {status_text(Status.from_message(message))}' if isinstance(
+    return f'{message.get_type()} {status_text(Status.from_message(message))}' if isinstance(
         message, IlluminatorStatus) else ''
 
 
 CHECKS: PayloadChecks[LightTester] = PayloadChecks(
     payload='illuminator', device='light', is_device=is_light,
     messages=(IlluminatorStatus, messages.ComponentInformationBasic),
-    evidence='HEARTBEAT with MAV_TYPE_ILLUMINATOR or ILLUMINATOR_STATUS', describe=describe,
-    tester=LightTester, requirements=REQUIREMENTS,
+    evidence='HEARTBEAT with MAV_TYPE_ILLUMINATOR or ILLUMINATOR_STATUS',
+    describe=describe, tester=LightTester, requirements=REQUIREMENTS,
     risk='strobe, or shine at 100 %',
     question='Some checks make light {device} strobe, and shine at 100 % for {heat:g} s. '
              'Strobing can trigger\nseizures; do not look into the light. All other checks run '

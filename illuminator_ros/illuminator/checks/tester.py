@@ -30,7 +30,7 @@ from ..model import (
     Status,
     unexpected_differences,
 )
-from ...mavlink.messages import MavCmd, MavResult
+from ...mavlink.dialect import mavlink
 from ...payload.checks.component_requirements import restore_interval
 from ...payload.checks.requirement import Conditions, NOT_AGREED, Specification
 from ...payload.checks.session import Failed, Session, Skipped, Transaction
@@ -41,7 +41,7 @@ ILLUMINATOR = Specification(
 # %; the brightness of checks without consent, and the most at which the light may then be on.
 LOW = 10.0
 DIM = 20.0
-ON_OFF, CONFIGURE = MavCmd.ILLUMINATOR_ON_OFF, MavCmd.DO_ILLUMINATOR_CONFIGURE
+ON_OFF, CONFIGURE = mavlink.MAV_CMD_ILLUMINATOR_ON_OFF, mavlink.MAV_CMD_DO_ILLUMINATOR_CONFIGURE
 # s to wait for a status of the stream if the light sends none on request.
 STREAM_TIMEOUT = 2.5
 # s from an acknowledgement to the status that shows the change: a light may fade.
@@ -177,7 +177,7 @@ class LightTester:
         if before and after and not (one.accepted or restarted or same(before, after)):
             self.rejected_but_applied.append(
                 one.failure(f'{one.answer}, and then {status_text(after)}'))
-        if one.result == MavResult.DENIED:
+        if one.result == mavlink.MAV_RESULT_DENIED:
             return None
         if one.accepted:
             await self.baseline()

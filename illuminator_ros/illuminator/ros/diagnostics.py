@@ -20,8 +20,9 @@ from dataclasses import asdict, dataclass
 import math
 
 from ..events import LightSnapshot
-from ..model import ErrorFlags, flag_names, KNOWN_FLAGS
+from ..model import flag_names, KNOWN_FLAGS
 from ...mavlink.command_sender import format_seconds
+from ...mavlink.dialect import mavlink
 from ...mavlink.messages import Address
 from ...ros import diagnostics
 from ...ros.command_sources import holder_values
@@ -32,11 +33,13 @@ STATUS_SILENCE = 10.0
 FLAG_PAUSE = 5.0
 
 # The consequence of each flag for the user of the light.
-FLAG_LEVELS: dict[ErrorFlags, tuple[bytes, str]] = {
-    ErrorFlags.THERMAL_THROTTLING: (diagnostics.WARN, 'dimmed because it is hot'),
-    ErrorFlags.OVER_TEMPERATURE_SHUTDOWN: (
+FLAG_LEVELS: dict[int, tuple[bytes, str]] = {
+    mavlink.ILLUMINATOR_ERROR_FLAGS_THERMAL_THROTTLING: (diagnostics.WARN,
+                                                         'dimmed because it is hot'),
+    mavlink.ILLUMINATOR_ERROR_FLAGS_OVER_TEMPERATURE_SHUTDOWN: (
         diagnostics.ERROR, 'switched off because it is too hot'),
-    ErrorFlags.THERMISTOR_FAILURE: (diagnostics.WARN, 'temperature sensor failed'),
+    mavlink.ILLUMINATOR_ERROR_FLAGS_THERMISTOR_FAILURE: (diagnostics.WARN,
+                                                         'temperature sensor failed'),
 }
 
 

@@ -17,7 +17,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
-from dataclasses import asdict
 from functools import partial
 from itertools import pairwise
 import math
@@ -36,7 +35,8 @@ from .requirement import (
 )
 from .session import fail_if, Failed, REJECTIONS, Session, Skipped, Transaction
 from ...mavlink import messages
-from ...mavlink.messages import Address, Heartbeat, MavCmd, MavResult, Message
+from ...mavlink.dialect import mavlink, raw
+from ...mavlink.messages import Address, Heartbeat, Message
 
 # s
 HEARTBEAT_TIMEOUT = 5.0
@@ -53,7 +53,7 @@ UNKNOWN_MESSAGE = 90
 # The most failures that are quoted.
 MAX_QUOTED = 3
 # Results with which a device leaves out an optional command or message.
-UNAVAILABLE = (MavResult.UNSUPPORTED, MavResult.DENIED)
+UNAVAILABLE = (mavlink.MAV_RESULT_UNSUPPORTED, mavlink.MAV_RESULT_DENIED)
 
 
 def periods(received: Iterable[tuple[float, object]]) -> list[float]:
@@ -90,11 +90,11 @@ def heartbeat_type(mav_type: int, name: str, device: str) -> Requirement[Tester]
     return check
 
 
-@requirement('heartbeat-autopilot', 'sets autopilot to MAV_AUTOPILOT_INVALID (8)', HEARTBEAT,
-             'Component Identity')
+@requirement('heartbeat-autopilot', 'sets autopilot to MAV_AUTOPILOT_INVALID (8)',
+             HEARTBEAT, 'Component Identity')
 async def heartbeat_autopilot(tester: Tester) -> None:
     """Read the latest HEARTBEAT."""
-    if (value := _latest_heartbeat(tester).autopilot) != messages.MAV_AUTOPILOT_INVALID:
+    if (value := _latest_heartbeat(tester).autopilot) != mavlink.MAV_AUTOPILOT_INVALID:
         raise Failed(f'MAV_AUTOPILOT {value}: clients will take it for a flight controller')
 
 
@@ -115,7 +115,7 @@ async def address(tester: Tester) -> str:
 async def unknown_command(tester: Tester) -> None:
     """Send a command that does not exist."""
     one = await tester.session.command(UNKNOWN_COMMAND)
-    if one.result != MavResult.UNSUPPORTED:
+    if one.result != mavlink.MAV_RESULT_UNSUPPORTED:
         raise one.failure()
 
 
@@ -123,7 +123,7 @@ async def unknown_command(tester: Tester) -> None:
              MESSAGES, 'MAV_CMD_REQUEST_MESSAGE')
 async def unknown_message(tester: Tester) -> str:
     """Request a message that a real device does not send."""
-    one = await tester.session.command(MavCmd.REQUEST_MESSAGE, UNKNOWN_MESSAGE)
+    one = await tester.session.command(mavlink.MAV_CMD_REQUEST_MESSAGE, UNKNOWN_MESSAGE)
     if one.result is None or one.accepted:
         raise one.failure()
     return one.answer
@@ -136,7 +136,7 @@ def broadcast(status: type[Message]) -> Requirement[Tester]:
     async def check(tester: Tester) -> None:
         session, failures = tester.session, []
         for target in (Address(session.device.system, 0), Address(0, 0)):
-            one = await session.command(MavCmd.REQUEST_MESSAGE, status.id, target=target)
+            one = await session.command(mavlink.MAV_CMD_REQUEST_MESSAGE, status.id, target=target)
             if one.result is None:
                 failures.append(one.failure(f'to {target}: {one.answer}'))
         fail_if(failures)
@@ -145,7 +145,7 @@ def broadcast(status: type[Message]) -> Requirement[Tester]:
 
 def check_command_int(one: Transaction) -> None:
     """Raise Skipped if a device does not take COMMAND_INT, which is optional."""
-    if not one.acks or one.result == MavResult.UNSUPPORTED:
+    if not one.acks or one.result == mavlink.MAV_RESULT_UNSUPPORTED:
         raise Skipped(f'COMMAND_INT: {one.answer}; it may take COMMAND_LONG only')
 
 
@@ -160,11 +160,11 @@ def sent_on_request(
 
     :param optional: whether a device may reject the request.
     """
-    @requirement(name, f'sends {cls.name} on request', specification, section)
+    @requirement(name, f'sends {cls.msgname} on request', specification, section)
     async def check(tester: Tester) -> str:
         session = tester.session
         before = session.received(cls).total
-        one = await session.command(MavCmd.REQUEST_MESSAGE, cls.id)
+        one = await session.command(mavlink.MAV_CMD_REQUEST_MESSAGE, cls.id)
         if optional and one.result in UNAVAILABLE:
             raise Skipped(one.answer)
         if not one.accepted:
@@ -172,7 +172,7 @@ def sent_on_request(
         if not await session.runner.until(
                 lambda: session.received(cls).total > before,
                 REQUEST_TIMEOUT) and await session.request(cls) is None:
-            raise Failed(f'MAV_RESULT_ACCEPTED, but no {cls.name}')
+            raise Failed(f'MAV_RESULT_ACCEPTED, but no {cls.msgname}')
         return measurement(session)
     return check
 
@@ -185,23 +185,25 @@ def _identity_strings(
 
     :param deviation: returns the error in a field, '' if there is none; takes its name and value.
     """
-    @requirement(name, title, MESSAGES, messages.ComponentInformationBasic.name)
+    @requirement(name, title, MESSAGES, messages.ComponentInformationBasic.msgname)
     async def check(tester: Tester) -> None:
         session, cls = tester.session, messages.ComponentInformationBasic
         if not session.received(cls) and await session.request(cls) is None:
             raise Skipped('no COMPONENT_INFORMATION_BASIC was received')
-        if wrong := [text for one, value in asdict(session.received(cls)[-1][1]).items()
-                     if isinstance(value, bytes) and (text := deviation(one, value))]:
+        message = session.received(cls)[-1][1]
+        if wrong := [text for one in cls.fieldnames
+                     if isinstance(value := raw(message, one), bytes)
+                     and (text := deviation(one, value))]:
             raise Failed(', '.join(wrong))
     return check
 
 
 def _unprintable(name: str, value: bytes) -> str:
-    raw = value.partition(b'\0')[0]
+    text = value.partition(b'\0')[0]
     # The length limit may have cut the last character.
-    shown = raw.decode('utf-8', errors='ignore')
-    cut = len(raw) - len(shown.encode())
-    return '' if shown.isprintable() and cut <= 3 else f'{name} {raw!r}'
+    shown = text.decode('utf-8', errors='ignore')
+    cut = len(text) - len(shown.encode())
+    return '' if shown.isprintable() and cut <= 3 else f'{name} {text!r}'
 
 
 IDENTITY_STRINGS = (
@@ -223,7 +225,7 @@ def status_stream(
 
     :param optional: whether a device may send it on request only.
     """
-    @requirement('status-stream', f'sends {status.name} at a regular rate', specification,
+    @requirement('status-stream', f'sends {status.msgname} at a regular rate', specification,
                  section)
     async def check(tester: Tester) -> str:
         times = periods(tester.session.idle(status))
@@ -246,12 +248,13 @@ def interval_requirements(status: type[Message]) -> tuple[Requirement[Tester], .
                           section='MAV_CMD_SET_MESSAGE_INTERVAL', changes=True)
 
     async def set_interval(tester: Tester, interval: float) -> None:
-        one = await tester.session.command(MavCmd.SET_MESSAGE_INTERVAL, status.id, interval)
+        one = await tester.session.command(mavlink.MAV_CMD_SET_MESSAGE_INTERVAL, status.id,
+                                           interval)
         if one.result in UNAVAILABLE:
             raise Skipped(one.answer)
         one.expect(accepted=True)
 
-    @on_interval('interval', f'sends {status.name} at the requested interval')
+    @on_interval('interval', f'sends {status.msgname} at the requested interval')
     async def requested(tester: Tester) -> str:
         usual = periods(tester.session.idle(status))
         # The requested interval must differ from the default.
@@ -291,7 +294,7 @@ def interval_requirements(status: type[Message]) -> tuple[Requirement[Tester], .
 
 async def restore_interval(session: Session, status: type[Message]) -> None:
     """Restore the interval that the status had before the first command."""
-    set_interval = partial(session.command, MavCmd.SET_MESSAGE_INTERVAL, status.id)
+    set_interval = partial(session.command, mavlink.MAV_CMD_SET_MESSAGE_INTERVAL, status.id)
     before = periods(session.idle(status))
     if not before:
         await set_interval(-1)
@@ -379,7 +382,7 @@ def _to_others(one: Transaction, own: Address) -> str:
 
 
 def _unfinished(one: Transaction, own: Address) -> str:
-    reports = [ack for ack in one.acks if ack.result == MavResult.IN_PROGRESS]
+    reports = [ack for ack in one.acks if ack.result == mavlink.MAV_RESULT_IN_PROGRESS]
     if not reports:
         return ''
     if not one.finals:

@@ -30,13 +30,12 @@ from typing import cast, NamedTuple, TypeVar
 from ..identity import Identity
 from ...mavlink import messages
 from ...mavlink.component import Endpoint, HeartbeatTimer
+from ...mavlink.dialect import base_size, mavlink
 from ...mavlink.frame import Frame
 from ...mavlink.messages import (
     Address,
     command_name,
     CommandAck,
-    MavCmd,
-    MavResult,
     Message,
     result_name,
 )
@@ -256,7 +255,7 @@ class Transaction:
     @property
     def finals(self) -> list[Ack]:
         """Return the acknowledgements that do not report progress."""
-        return [ack for ack in self.acks if ack.result != MavResult.IN_PROGRESS]
+        return [ack for ack in self.acks if ack.result != mavlink.MAV_RESULT_IN_PROGRESS]
 
     @property
     def result(self) -> int | None:
@@ -266,7 +265,7 @@ class Transaction:
     @property
     def accepted(self) -> bool:
         """Whether the command was accepted."""
-        return self.result == MavResult.ACCEPTED
+        return self.result == mavlink.MAV_RESULT_ACCEPTED
 
     @property
     def answer(self) -> str:
@@ -286,15 +285,16 @@ class Transaction:
 def _protocol_text(message: Message) -> str:
     if isinstance(message, CommandAck):
         target = messages.target_of(message)
-        progress = message.result == MavResult.IN_PROGRESS
+        progress = message.result == mavlink.MAV_RESULT_IN_PROGRESS
         return (f'COMMAND_ACK {command_name(message.command)}: {result_name(message.result)}'
                 + (f', progress {message.progress}' if progress else '')
                 + (f' to {target}' if any(target) else ''))
     if isinstance(message, messages.Heartbeat):
         return f'HEARTBEAT type {message.type}, autopilot {message.autopilot}'
     if isinstance(message, messages.ComponentInformationBasic):
-        return f'{message.name} {", ".join(map(repr, astuple(Identity.from_message(message))))}'
-    return message.name
+        identity = astuple(Identity.from_message(message))
+        return f'{message.get_type()} {", ".join(map(repr, identity))}'
+    return message.get_type()
 
 
 class Session(Endpoint):
@@ -354,7 +354,7 @@ class Session(Endpoint):
         self._began: float | None = None
         self._last_heard = -math.inf
         self._latest: dict[int, Transaction] = {}
-        self._heartbeat = HeartbeatTimer(address, messages.MavType.GCS, self.outgoing)
+        self._heartbeat = HeartbeatTimer(address, mavlink.MAV_TYPE_GCS, self.outgoing)
 
     # The endpoint
 
@@ -370,8 +370,8 @@ class Session(Endpoint):
         """See :class:`Endpoint`."""
         if self._same_device(frame.source, self.found):
             self.versions[frame.version] += 1
-            if frame.version == 1 and len(frame.payload) != cls.base_size:
-                self.odd_lengths[cls.name] = len(frame.payload)
+            if frame.version == 1 and len(frame.payload) != base_size(cls):
+                self.odd_lengths[cls.msgname] = len(frame.payload)
 
     def receive(self, source: Address, message: Message, now: float) -> None:
         """See :meth:`Endpoint.receive`."""
@@ -393,7 +393,7 @@ class Session(Endpoint):
             self._part = self._part_of(message) or self._part
         elif self.found is not None and source == (self.found.system, self._part) and (
                 type(message) in self._payload_messages):
-            self._note('<', f'from {source}: {self._describe(message) or message.name}')
+            self._note('<', f'from {source}: {self._describe(message) or message.get_type()}')
             self._record(message)
         self.runner.advance(now)
 
@@ -486,7 +486,7 @@ class Session(Endpoint):
 
     def send(self, message: Message, source: Address | None = None) -> None:
         """Send a message from an address, by default the session's."""
-        self._give(message, self._describe(message) or message.name, source)
+        self._give(message, self._describe(message) or message.get_type(), source)
 
     def _give(self, message: Message, text: str, source: Address | None) -> None:
         self.outgoing.append((source or self.address, message))
@@ -513,7 +513,8 @@ class Session(Endpoint):
         end = self.now + timeout
         while self.found is None and self.now < end:
             if self._discovery is not None:
-                self._send(Transaction(MavCmd.REQUEST_MESSAGE, (self._discovery.id,), False),
+                self._send(Transaction(mavlink.MAV_CMD_REQUEST_MESSAGE, (self._discovery.id,),
+                                       False),
                            Address(0, 0))
             await self.runner.until(lambda: self.found, min(DISCOVERY_INTERVAL, end - self.now))
         if self.found is not None:
@@ -556,7 +557,7 @@ class Session(Endpoint):
                 if await self._answered(one, timeout):
                     break
                 self.check_presence()
-            if one.result != MavResult.TEMPORARILY_REJECTED:
+            if one.result != mavlink.MAV_RESULT_TEMPORARILY_REJECTED:
                 break
             one.rejections = rejections
             await self.runner.sleep(REJECTION_PAUSE)
@@ -574,14 +575,14 @@ class Session(Endpoint):
         """Request a message and return it; raise Skipped if it does not come."""
         message = await self.request(cls)
         if message is None:
-            raise Skipped(f'no {cls.name} was received')
+            raise Skipped(f'no {cls.msgname} was received')
         return message
 
     async def request(self, cls: type[M]) -> M | None:
         """Request a message until it comes; return it, None if it does not come."""
         for _ in range(ATTEMPTS):
             before = self.received(cls).total
-            one = await self.command(MavCmd.REQUEST_MESSAGE, cls.id)
+            one = await self.command(mavlink.MAV_CMD_REQUEST_MESSAGE, cls.id)
             if not one.accepted and one.result is not None:
                 return None
             if self.received(cls).total > before or await self.receive_more(cls, MESSAGE_TIMEOUT):
@@ -604,7 +605,7 @@ class Session(Endpoint):
         ) if as_int else messages.CommandLong(
             *target, one.command, min(confirmation, 255), *values)
         one.sent.append(self.now)
-        self._give(message, f'{message.name} to {target}: {one.text}'
+        self._give(message, f'{message.get_type()} to {target}: {one.text}'
                    + (f', confirmation {confirmation}' if confirmation else ''), source)
         one.lines.append(self.log[-1])
 

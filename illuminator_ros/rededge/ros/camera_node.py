@@ -41,8 +41,9 @@ from ..input_states import (
     PositionSource,
     Stamp,
 )
-from ..messages import CameraFeedback, MAV_COMP_ID_CAMERA, Shot
+from ..messages import CameraFeedback, Shot
 from ...mavlink.command_sender import CommandSender
+from ...mavlink.dialect import mavlink
 from ...payload.rotation import Vector
 from ...ros.conversions import GEOID_SEPARATION, quaternion_message
 from ...ros.device_nodes import ABSENCE_DELAY
@@ -223,8 +224,8 @@ def _angles(values: Values) -> Vector:
 
 
 def _make_client(commands: CommandSender, values: Values) -> RedEdgeClient:
-    if commands.address.component == MAV_COMP_ID_CAMERA:
-        raise ParameterError(f'component_id: {MAV_COMP_ID_CAMERA} is the id of the camera')
+    if commands.address.component == mavlink.MAV_COMP_ID_CAMERA:
+        raise ParameterError(f'component_id: {mavlink.MAV_COMP_ID_CAMERA} is the id of the camera')
     return RedEdgeClient(commands, Settings(
         FeederSettings(
             PositionSource(values['position_source']), values['geoid_separation'],

@@ -23,8 +23,8 @@ from ..camera import CameraSnapshot
 from ..client import ClientSnapshot
 from ..feeder import FeederSnapshot
 from ..input_states import Input, InputSnapshot, InputState
-from ..messages import MAV_COMP_ID_CAMERA
 from ...mavlink.command_sender import format_seconds
+from ...mavlink.dialect import mavlink
 from ...ros.diagnostics import (
     ERROR,
     Finding,
@@ -37,7 +37,7 @@ from ...ros.diagnostics import (
 )
 
 # The camera adopts the system id of the host, so only the component id identifies it.
-HARDWARE_ID = f'mavlink:{MAV_COMP_ID_CAMERA}'
+HARDWARE_ID = f'mavlink:{mavlink.MAV_COMP_ID_CAMERA}'
 
 
 def reports(
@@ -66,8 +66,9 @@ def camera_findings(camera: CameraSnapshot) -> list[Finding]:
         return [(ERROR, camera.loss) if camera.loss else (WARN, 'not heard yet')]
     findings: list[Finding] = []
     if camera.conflict:
-        findings.append((ERROR, f'several components have id {MAV_COMP_ID_CAMERA}: give each '
-                                'camera a link of its own'))
+        findings.append((
+            ERROR, f'several components have id {mavlink.MAV_COMP_ID_CAMERA}: give each '
+            'camera a link of its own'))
     if camera.is_unresponsive:
         findings.append((WARN, f'{camera.unanswered_pings} PINGs without a reply: the camera does '
                                'not receive our messages; check the line to it'))
