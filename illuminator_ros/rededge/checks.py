@@ -33,6 +33,7 @@ from . import messages as rededge
 from ..mavlink.dialect import mavlink
 from ..mavlink.messages import Address, Heartbeat, Message, target_of
 from ..payload.checks import component_requirements as component
+from ..payload.checks.outcomes import Failed, Skipped
 from ..payload.checks.requirement import (
     Conditions,
     PayloadChecks,
@@ -41,7 +42,7 @@ from ..payload.checks.requirement import (
     Specification,
     Tester,
 )
-from ..payload.checks.session import Failed, Session, Skipped
+from ..payload.checks.session import Session
 from ..payload.messages import Attitude, GlobalPositionInt, SystemTime
 
 SERIAL_API = Specification(
@@ -487,7 +488,7 @@ async def capture_index(tester: CameraTester) -> str:
           whole_run=True)
 async def mavlink_1(tester: CameraTester) -> str:
     """Count the frames."""
-    versions = tester.session.versions
+    versions = tester.session.record.versions
     if versions[2]:
         raise Failed(f'{versions[2]} of {versions.total()} frames are of MAVLink 2')
     return f'{versions[1]} frames'
@@ -497,7 +498,7 @@ async def mavlink_1(tester: CameraTester) -> str:
           section='General Protocol Overview', whole_run=True)
 async def lengths(tester: CameraTester) -> None:
     """Compare the lengths of the frames."""
-    if odd := tester.session.odd_lengths:
+    if odd := tester.session.record.odd_lengths:
         raise Failed(', '.join(f'{name} with {size} bytes' for name, size in odd.items()))
 
 

@@ -26,7 +26,7 @@ from illuminator_ros.illuminator.simulated_properties import (
     IlluminatorProperties,
 )
 from illuminator_ros.mavlink.messages import Address, CommandAck, heartbeat
-from illuminator_ros.payload.checks.session import MAX_ENTRIES
+from illuminator_ros.payload.checks.record import MAX_ENTRIES
 import pytest
 from support.checks_run import TESTER
 from support.conformance_run import Run
@@ -41,8 +41,8 @@ def test_the_first_light_is_checked_and_another_one_neither_changed_nor_judged()
     other = run.lights.components[1].device
     other.enabled = True
     run.finish()
-    assert run.session.found == FIRST.address
-    assert run.session.devices == {FIRST.address, SECOND.address}
+    assert run.session.components.found == FIRST.address
+    assert run.session.components.devices == {FIRST.address, SECOND.address}
     assert run.failed == set()
     assert other.enabled
     assert other.configuration == Configuration(Mode.INTERNAL_CONTROL, 100.0, 0.0, 0.0)
@@ -50,7 +50,7 @@ def test_the_first_light_is_checked_and_another_one_neither_changed_nor_judged()
 
 def test_the_target_is_checked() -> None:
     run = Run(FIRST, BAD, target=SECOND.address).finish()
-    assert run.session.found == SECOND.address
+    assert run.session.components.found == SECOND.address
     assert {'not-a-number', 'status-agrees'} <= run.failed
 
 
@@ -81,7 +81,7 @@ def test_without_the_light_heartbeat_fails_and_names_the_components_that_were_he
 def test_a_check_that_needs_an_unused_address_is_skipped_on_a_link_without_one(
         others: Sequence[Address], reason: str) -> None:
     run = Run(only=('other-target',))
-    run.session.heard.update(others)
+    run.session.components.heard.update(others)
     run.finish()
 
     assert run.result('other-target').detail == reason

@@ -350,7 +350,7 @@ def test_the_gimbal_keeps_its_yaw_lock(kind: str) -> None:
 
 def test_a_manager_without_its_status_is_found_by_its_information() -> None:
     one = run('gimbal_manager', 'no-status', only=('heartbeat', 'status-stream')).finish()
-    assert one.session.found == Address(1, 154)
+    assert one.session.components.found == Address(1, 154)
     assert one.failed == {'status-stream'}
 
 

@@ -52,7 +52,7 @@ def test_a_winch_is_checked_and_restored_by_its_own_requirements_and_those_of_ev
     session.runner.run(run())
     VirtualLink(session, devices).run_until(lambda: not session.runner.running, within=100.0)
 
-    assert session.found == DECK
+    assert session.components.found == DECK
     assert {one.requirement.name for one in suite.results if one.verdict is Verdict.FAIL} == failed
     assert len(suite.results) == len(REQUIREMENTS)
     assert suite.restored == 'the winch is as it was'

@@ -181,13 +181,13 @@ def test_without_consent_no_image_is_taken() -> None:
 def test_camera_is_one_device_whatever_its_system_id_re_8() -> None:
     done = run(address=Address(1, 100), target=Address(9, 100))
     assert not done.failed
-    assert done.session.devices == done.session.heard == {Address(255, 100)}
+    assert done.session.components.devices == done.session.components.heard == {Address(255, 100)}
 
 
 def test_component_other_than_100_is_not_a_camera_re_7() -> None:
     done = run(others=[101])
     assert not done.failed
-    assert done.session.devices == {Address(255, 100)}
+    assert done.session.components.devices == {Address(255, 100)}
     absent = run(address=Address(255, 101))
     assert absent.failed == {'heartbeat'}
     assert absent.result('heartbeat').detail.startswith(

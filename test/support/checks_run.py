@@ -24,8 +24,8 @@ from illuminator_ros.cli.conformance.run import LISTEN_TIME
 from illuminator_ros.mavlink.component import Endpoint
 from illuminator_ros.mavlink.messages import Address
 from illuminator_ros.payload.checks import requirement
+from illuminator_ros.payload.checks.coroutines import Interrupted
 from illuminator_ros.payload.checks.runner import absence, CheckRunner
-from illuminator_ros.payload.checks.session import Interrupted
 from illuminator_ros.payload.simulated import SimulatedComponents
 from support.virtual_link import VirtualLink
 
@@ -70,7 +70,7 @@ class ChecksRun:
         missing = ''
         with contextlib.suppress(Interrupted):
             await self.session.find(FIND_TIMEOUT, LISTEN_TIME)
-            if self.session.found is None:
+            if self.session.components.found is None:
                 missing = absence(self.session, self.checks, FIND_TIMEOUT)
         await self.runner.run(missing)
 

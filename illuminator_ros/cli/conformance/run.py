@@ -53,10 +53,10 @@ from ...mavlink.messages import Address
 from ...mavlink.signing import Signing
 from ...mavlink.signing_files import TimestampStore
 from ...mavlink.url import parse_url, Url
+from ...payload.checks.coroutines import Main
 from ...payload.checks.report import as_json, as_junit, catalogue, RunReport, Table
 from ...payload.checks.requirement import AnyChecks, AnyRequirement, Conditions, Result, Verdict
 from ...payload.checks.runner import absence, CheckRunner, names
-from ...payload.checks.session import Main
 from ...payload.payload_type import PayloadType
 from ...payload.simulated_settings import integer, number
 
@@ -283,20 +283,20 @@ class Conformance:
         """Find the device; record the other components on the link, or why it was not found."""
         session, checks, wait = self._session, self._checks, self._options.wait
         await session.find(wait, LISTEN_TIME)
-        state = self._link_state()
-        if session.found is None:
+        state, components = self._link_state(), session.components
+        if components.found is None:
             self._missing = (
                 absence(session, checks, wait) if state.is_open
                 else f'{NOT_OPEN}{state.name}: {state.reason}')
             return
         changed = any(one.changes for one in self._requirements)
-        self._announcement = [f'found {checks.device} {session.found}, which ' + (
+        self._announcement = [f'found {checks.device} {components.found}, which ' + (
             f'the checks will change and then restore{self._traces}' if changed else
             'stays unchanged')]
-        if others := session.devices - {session.found}:
+        if others := components.devices - {components.found}:
             self._announcement.append(
                 f'not checked: {checks.device} {names(others)}; --target selects another')
-        if others := session.heard - session.devices - {session.found}:
+        if others := components.heard - components.devices - {components.found}:
             self._announcement.append(f'also on this link: {names(others)}')
 
     def _consent(self) -> bool:
@@ -336,7 +336,8 @@ class Conformance:
 
     def _describe_device(self) -> str:
         session, device = self._session, self._checks.device
-        name, detail = (f'{device} {session.found}', session.identity) if session.found else (
+        found = session.components.found
+        name, detail = (f'{device} {found}', session.record.identity) if found else (
             f'no {device}', self._missing)
         return f'{name}: {detail}' if detail else name
 

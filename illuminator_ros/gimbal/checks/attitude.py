@@ -42,6 +42,7 @@ from ...payload.checks.component_requirements import (
     none_of,
     REQUEST_TIMEOUT,
 )
+from ...payload.checks.outcomes import Failed, Skipped
 from ...payload.checks.requirement import (
     AnyRequirement,
     COMMAND,
@@ -50,7 +51,7 @@ from ...payload.checks.requirement import (
     requirement,
     Specification,
 )
-from ...payload.checks.session import Failed, Skipped, Transaction
+from ...payload.checks.session import Transaction
 from ...payload.messages import GimbalDeviceAttitudeStatus as AttitudeStatus
 from ...payload.mount_attitude import AXES, yaw_frame
 from ...payload.rotation import Quaternion

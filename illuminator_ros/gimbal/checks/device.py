@@ -52,6 +52,7 @@ from ...mavlink.messages import (
     target_of,
 )
 from ...payload.checks import component_requirements as component
+from ...payload.checks.outcomes import Failed, Skipped
 from ...payload.checks.requirement import (
     Conditions,
     MESSAGES,
@@ -61,7 +62,7 @@ from ...payload.checks.requirement import (
     requirement,
     ROUTING,
 )
-from ...payload.checks.session import Failed, Session, Skipped
+from ...payload.checks.session import Session
 from ...payload.messages import GimbalDeviceAttitudeStatus as AttitudeStatus
 from ...payload.mount_attitude import UNSET_VECTOR
 from ...payload.rotation import Quaternion
@@ -170,13 +171,13 @@ async def north_needs_heading(tester: DeviceTester) -> None:
 
 async def _point_from_others(tester: DeviceTester, pose: Pose) -> None:
     """Send setpoints from our own address and from another component of the device's system."""
-    for source in (tester.session.address, tester.session.free_component()):
+    for source in (tester.session.address, tester.session.components.free_component()):
         await tester.point(pose, source=source)
 
 
 async def _announce_other(tester: DeviceTester, pose: Pose) -> None:
     """Announce a second manager, and send setpoints from it."""
-    other = tester.session.free_component()
+    other = tester.session.components.free_component()
     tester.announce(other)
     await tester.pause(2 * ANNOUNCE_INTERVAL)
     tester.announce(other)
@@ -200,8 +201,8 @@ async def _send_to_manager(tester: DeviceTester, pose: Pose) -> None:
 async def _point_others(tester: DeviceTester, pose: Pose) -> None:
     """Send setpoints to addresses that do not exist."""
     session = tester.session
-    for target in (session.free_component(200),
-                   Address(session.free_system(), session.device.component)):
+    for target in (session.components.free_component(200),
+                   Address(session.components.free_system(), session.device.component)):
         await tester.point(pose, target=target)
 
 

@@ -54,6 +54,7 @@ from ...mavlink.messages import (
     time_boot_ms,
 )
 from ...payload.checks import component_requirements as component
+from ...payload.checks.outcomes import fail_if, Failed, Skipped
 from ...payload.checks.requirement import (
     Conditions,
     MESSAGES,
@@ -62,7 +63,7 @@ from ...payload.checks.requirement import (
     requirement,
     ROUTING,
 )
-from ...payload.checks.session import fail_if, Failed, Session, Skipped, Transaction
+from ...payload.checks.session import Session, Transaction
 from ...payload.messages import Attitude, GlobalPositionInt
 from ...payload.messages import GimbalDeviceAttitudeStatus as AttitudeStatus
 from ...payload.mount_attitude import UNSET_VECTOR
@@ -106,7 +107,7 @@ class ManagerTester(GimbalTester):
     @property
     def other(self) -> Address:
         """Return the address of the second player."""
-        return self.session.free_component()
+        return self.session.components.free_component()
 
     @property
     def device_id(self) -> int:
@@ -403,7 +404,7 @@ async def flags_shown(tester: ManagerTester) -> None:
 async def other_target(tester: ManagerTester) -> None:
     """Send a setpoint and a command to a component that does not exist."""
     before, session = await tester.begin(), tester.session
-    other, pose = session.free_component(200), await tester.target(-2 * STEP, STEP)
+    other, pose = session.components.free_component(200), await tester.target(-2 * STEP, STEP)
     session.send(gimbal.GimbalManagerSetAttitude(
         *other, int(LEVEL | VEHICLE_FRAME), tester.device_id, quaternion_of(pose), *UNSET_VECTOR))
     one = await session.send_to_other(
@@ -420,7 +421,7 @@ async def roi(tester: ManagerTester) -> str:
     await tester.begin()
     session = tester.session
     autopilot = Address(session.device.system, mavlink.MAV_COMP_ID_AUTOPILOT1)
-    tester.vehicle = None if autopilot in session.heard else autopilot
+    tester.vehicle = None if autopilot in session.components.heard else autopilot
     try:
         await tester.pause(0.5)
         one = await session.command(

@@ -27,8 +27,9 @@ from ..axes import LEVEL, Range, read_ranges
 from ...mavlink.dialect import mavlink, short_names
 from ...mavlink.messages import Address, Message
 from ...payload.checks.component_requirements import restore_interval
+from ...payload.checks.outcomes import Failed, Skipped
 from ...payload.checks.requirement import Conditions, Specification
-from ...payload.checks.session import Failed, Session, Skipped
+from ...payload.checks.session import Session
 from ...payload.messages import GimbalDeviceAttitudeStatus as AttitudeStatus
 from ...payload.mount_attitude import (
     names_frame,

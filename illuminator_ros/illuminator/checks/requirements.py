@@ -37,6 +37,7 @@ from ..model import flag_names, float32, KNOWN_FLAGS, Mode, Status, StrobeRange
 from ...mavlink import messages
 from ...mavlink.dialect import mavlink
 from ...payload.checks import component_requirements as component
+from ...payload.checks.outcomes import fail_if, Failed, Skipped
 from ...payload.checks.requirement import (
     COMMAND,
     MESSAGES,
@@ -47,7 +48,6 @@ from ...payload.checks.requirement import (
     ROUTING,
     Specification,
 )
-from ...payload.checks.session import fail_if, Failed, Skipped
 
 CONFIGURE_SECTION = 'MAV_CMD_DO_ILLUMINATOR_CONFIGURE'
 INTERNAL = float(Mode.INTERNAL_CONTROL)
@@ -62,8 +62,8 @@ async def other_target(tester: LightTester) -> None:
     await tester.ensure_dim()
     session = tester.session
     others = (
-        session.free_component(200),
-        messages.Address(session.free_system(), session.device.component or 200))
+        session.components.free_component(200),
+        messages.Address(session.components.free_system(), session.device.component or 200))
     failures = []
     for other in others:
         one = await session.send_to_other(other, ON_OFF, 1)
@@ -465,7 +465,7 @@ REQUIREMENTS: tuple[Requirement[LightTester], ...] = (
     content, mode, limits, flags,
     component.sent_on_request(
         'information-request', messages.ComponentInformationBasic, ILLUMINATOR,
-        'COMPONENT_INFORMATION_BASIC', lambda session: session.identity or 'no names'),
+        'COMPONENT_INFORMATION_BASIC', lambda session: session.record.identity or 'no names'),
     *component.IDENTITY_STRINGS,
     component.unknown_command, component.unknown_message, component.broadcast(IlluminatorStatus),
     other_target, command_int, repeated,

@@ -32,8 +32,9 @@ from ..model import (
 )
 from ...mavlink.dialect import mavlink
 from ...payload.checks.component_requirements import restore_interval
+from ...payload.checks.outcomes import Failed, Skipped
 from ...payload.checks.requirement import Conditions, NOT_AGREED, Specification
-from ...payload.checks.session import Failed, Session, Skipped, Transaction
+from ...payload.checks.session import Session, Transaction
 
 ILLUMINATOR = Specification(
     'illuminator protocol', 'https://mavlink.io/en/services/illuminator.html')
@@ -151,14 +152,14 @@ class LightTester:
     async def _compared(self, one: Transaction, differ: Callable[[Status], list[str]]) -> Change:
         if not one.accepted:
             return Change(one)
-        mark = self.session.log.total
+        mark = self.session.record.log.total
         status = await self._after_change(differ)
         if status is None or not (not_shown := differ(status)):
             return Change(one)
         self.disagreements.append(Failed(
             f'{one.text}: {one.answer}, but then the status differs in '
             f'{" and ".join(not_shown)}: {status_text(status)}',
-            one.lines + self.session.log.since(mark)[-3:]))
+            one.lines + self.session.record.log.since(mark)[-3:]))
         return Change(one, tuple(not_shown), self.disagreements[-1])
 
     async def _after_change(self, differ: Callable[[Status], list[str]]) -> Status | None:

@@ -22,6 +22,7 @@ from itertools import pairwise
 import math
 from statistics import median_high
 
+from .outcomes import fail_if, Failed, Skipped
 from .requirement import (
     COMMAND,
     HEARTBEAT,
@@ -33,7 +34,7 @@ from .requirement import (
     Specification,
     Tester,
 )
-from .session import fail_if, Failed, REJECTIONS, Session, Skipped, Transaction
+from .session import REJECTIONS, Session, Transaction
 from ...mavlink import messages
 from ...mavlink.dialect import mavlink, raw
 from ...mavlink.messages import Address, Heartbeat, Message

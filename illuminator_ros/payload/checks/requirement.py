@@ -21,8 +21,10 @@ from dataclasses import dataclass, field
 from enum import Enum
 from typing import Any, Generic, NamedTuple, Protocol, TypeVar
 
+from .components import Components
+from .record import Record
 from .session import Session
-from ...mavlink.messages import Address, Message
+from ...mavlink.messages import Address, CommandAck, Heartbeat, Message
 
 NOT_AGREED = 'not agreed to; see --yes'
 
@@ -186,10 +188,10 @@ class PayloadChecks(Generic[T]):
     :param question: asked before these checks; ``{device}`` and the options are filled in.
     :param options: options of the command line, for :attr:`Conditions.options`.
     :param mavlink_version: the version that the device needs, 1 or 2; None if it takes both.
-    :param component: the component id that alone identifies a device, see :class:`Session`.
+    :param component: the component id that alone identifies a device, see :class:`Components`.
     :param traces: the changes that remain after the device is restored, as text.
     :param discovery: a message that is requested of all components until a device is found.
-    :param part_of: returns the component id of a part of the device, see :class:`Session`.
+    :param part_of: returns the component id of a part of the device, see :class:`Components`.
     """
 
     payload: str
@@ -211,9 +213,11 @@ class PayloadChecks(Generic[T]):
 
     def session(self, address: Address, target: Address | None = None) -> Session:
         """Return a session with a device, from our address."""
+        received = (Heartbeat, CommandAck, *self.messages)
         return Session(
-            address, self.messages, self.is_device, self.describe, target, self.component,
-            self.discovery, self.part_of)
+            address, received,
+            Components(address, self.is_device, target, self.component, self.part_of),
+            Record(received, self.describe), self.discovery)
 
 
 # For the command line, which does not use the tester.

@@ -20,8 +20,10 @@ from collections.abc import Callable, Sequence
 import logging
 from typing import Generic
 
+from .coroutines import Interrupted
+from .outcomes import DeviceLost, Failed, Skipped
 from .requirement import Conditions, NOT_AGREED, PayloadChecks, Requirement, Result, T, Verdict
-from .session import DeviceLost, Failed, Interrupted, Session, Skipped
+from .session import Session
 from ...mavlink.messages import Address
 
 # s
@@ -53,10 +55,10 @@ def absence(session: Session, checks: PayloadChecks[T], timeout: float) -> str:
 
     :param timeout: s for which the device was awaited.
     """
-    others = f'heard instead: {names(session.heard)}' if session.heard else (
+    others = f'heard instead: {names(session.components.heard)}' if session.components.heard else (
         'nothing else was heard')
-    if session.target is not None:
-        return f'{session.target} was not heard within {timeout:g} s; {others}'
+    if session.components.target is not None:
+        return f'{session.components.target} was not heard within {timeout:g} s; {others}'
     return (f'no {checks.device} was heard within {timeout:g} s, that is, no {checks.evidence}; '
             + others)
 
@@ -124,7 +126,7 @@ class CheckRunner(Generic[T]):
 
     async def _check(self, one: Requirement[T]) -> Result:
         session = self._session
-        begun, mark = session.now, session.log.total
+        begun, mark = session.now, session.record.log.total
         verdict, lines, reached = Verdict.FAIL, None, True
         try:
             await self._prepare(one)
@@ -139,7 +141,8 @@ class CheckRunner(Generic[T]):
         except Exception as error:
             _log.exception('internal error in the check %s', one.name)
             detail = f'internal error in this check: {error!r}'
-        exchange = session.log.since(mark)[-MAX_LINES:] if lines is None else lines[:MAX_LINES]
+        exchange = (session.record.log.since(mark)[-MAX_LINES:] if lines is None
+                    else lines[:MAX_LINES])
         return Result(one, verdict, detail, exchange, session.now - begun, reached)
 
     async def _prepare(self, one: Requirement[T]) -> None:

@@ -15,22 +15,23 @@
 """
 A session with one device: commands, acknowledgements, and a record of all messages. No I/O.
 
-Its coroutines wait for conditions and times. There is no event loop: time is an argument, so that
-a run against a simulated device takes no real time.
+Its coroutines take no real time in a run against a simulated device.
 """
 
 from __future__ import annotations
 
-from collections import Counter, deque
-from collections.abc import Callable, Coroutine, Generator, Iterable, Sequence
-from dataclasses import astuple, dataclass, field
+from collections.abc import Sequence
+from dataclasses import dataclass, field
 import math
-from typing import cast, NamedTuple, TypeVar
+from typing import NamedTuple, TypeVar
 
-from ..identity import Identity
+from .components import Components, Sender
+from .coroutines import CoroutineRunner
+from .outcomes import DeviceLost, Failed, Skipped
+from .record import History, Record
 from ...mavlink import messages
 from ...mavlink.component import Endpoint, HeartbeatTimer
-from ...mavlink.dialect import base_size, mavlink
+from ...mavlink.dialect import mavlink
 from ...mavlink.frame import Frame
 from ...mavlink.messages import (
     Address,
@@ -40,7 +41,6 @@ from ...mavlink.messages import (
     result_name,
 )
 
-T = TypeVar('T')
 M = TypeVar('M', bound=Message)
 
 # s
@@ -60,152 +60,8 @@ ATTEMPTS = 4
 # MESSAGE_TIMEOUT: with a device that receives nothing a run would take 40 minutes.
 UNANSWERED = 4
 REJECTIONS = 20
-# The most entries that are kept of each record, and acknowledgements of one command.
-MAX_ENTRIES = 10_000
+# The most acknowledgements of one command that are kept.
 MAX_ACKS = 400
-
-
-class Interrupted(BaseException):
-    """The run must end now."""
-
-
-@dataclass
-class _Wait:
-    condition: Callable[[], object]
-    deadline: float
-
-    def __await__(self) -> Generator[_Wait, None, None]:
-        yield self
-
-
-# A coroutine that awaits :class:`_Wait`, directly or through other coroutines.
-Main = Coroutine[_Wait, None, None]
-
-
-class CoroutineRunner:
-    """
-    Runs one coroutine after another; each awaits :meth:`until` and :meth:`sleep`.
-
-    :ivar now: time of the latest message or poll, s.
-    :ivar interrupted: whether :meth:`interrupt` was called.
-    :ivar restoring: whether interruption is ignored, because the device is being restored.
-    """
-
-    def __init__(self) -> None:
-        self.now = 0.0
-        self.interrupted = False
-        self.restoring = False
-        self._main: Main | None = None
-        self._wait: _Wait | None = None
-
-    def run(self, main: Main) -> None:
-        """Run a coroutine from the next :meth:`advance` on."""
-        self._main, self._wait = main, None
-
-    @property
-    def running(self) -> bool:
-        """Whether the coroutine has not ended."""
-        return self._main is not None
-
-    def advance(self, now: float) -> None:
-        """Continue the coroutine if its condition holds or its time has come."""
-        self.now = now
-        while self._main is not None and (
-                self._wait is None or now >= self._wait.deadline or self._wait.condition()):
-            self._step(lambda main: main.send(None))
-
-    def next_deadline(self) -> float:
-        """Return when :meth:`advance` is due, infinity if never."""
-        if self._main is None:
-            return math.inf
-        return self._wait.deadline if self._wait else self.now
-
-    def interrupt(self, now: float) -> None:
-        """Raise :class:`Interrupted` in the coroutine, unless it restores the device."""
-        self.interrupted = True
-        if not self.restoring:
-            self.advance(now)
-            self._step(lambda main: main.throw(Interrupted()))
-            self.advance(now)
-
-    def _step(self, step: Callable[[Main], _Wait]) -> None:
-        if self._main is None:
-            return
-        try:
-            self._wait = step(self._main)
-        except (StopIteration, Interrupted):
-            self._main = self._wait = None
-
-    async def until(self, condition: Callable[[], object], timeout: float) -> bool:
-        """
-        Wait for a condition, for ``timeout`` s at most, and return whether it holds.
-
-        :raises Interrupted: if the run must end.
-        """
-        if self.interrupted and not self.restoring:
-            raise Interrupted
-        await _Wait(condition, self.now + timeout)
-        return bool(condition())
-
-    async def sleep(self, seconds: float) -> None:
-        """
-        Wait for a time, s.
-
-        :raises Interrupted: if the run must end.
-        """
-        await self.until(lambda: False, seconds)
-
-
-class DeviceLost(Exception):
-    """The device has stopped sending."""
-
-
-class Skipped(Exception):
-    """A requirement cannot be checked; the text gives the reason."""
-
-
-class Failed(Exception):
-    """
-    The device does not meet a requirement; the text gives the deviation.
-
-    :ivar lines: the lines of the log that show the deviation, None for all lines of the check.
-    """
-
-    def __init__(self, reason: str, lines: list[str] | None = None) -> None:
-        super().__init__(reason)
-        self.lines = lines
-
-
-def fail_if(failures: Iterable[Failed | None]) -> None:
-    """
-    Raise if there are failures.
-
-    :raises Failed: with all of them.
-    """
-    if found := [one for one in failures if one is not None]:
-        raise Failed('; '.join(map(str, found)),
-                     [line for one in found for line in one.lines or ()])
-
-
-class History(deque[T]):
-    """
-    The newest entries, so that a flood of messages takes a bounded memory.
-
-    :ivar total: entries ever appended.
-    """
-
-    def __init__(self) -> None:
-        super().__init__(maxlen=MAX_ENTRIES)
-        self.total = 0
-
-    def append(self, entry: T, /) -> None:
-        """Append an entry; drop the oldest entry if there is no room."""
-        super().append(entry)
-        self.total += 1
-
-    def since(self, count: int) -> list[T]:
-        """Return the entries that were appended after the first ``count`` and are still kept."""
-        return list(self)[max(len(self) - (self.total - count), 0):]
 
 
 class Ack(NamedTuple):
@@ -282,21 +138,6 @@ class Transaction:
         return Failed(f'{self.text}: {reason or self.answer}', self.lines)
 
 
-def _protocol_text(message: Message) -> str:
-    if isinstance(message, CommandAck):
-        target = messages.target_of(message)
-        progress = message.result == mavlink.MAV_RESULT_IN_PROGRESS
-        return (f'COMMAND_ACK {command_name(message.command)}: {result_name(message.result)}'
-                + (f', progress {message.progress}' if progress else '')
-                + (f' to {target}' if any(target) else ''))
-    if isinstance(message, messages.Heartbeat):
-        return f'HEARTBEAT type {message.type}, autopilot {message.autopilot}'
-    if isinstance(message, messages.ComponentInformationBasic):
-        identity = astuple(Identity.from_message(message))
-        return f'{message.get_type()} {", ".join(map(repr, identity))}'
-    return message.get_type()
-
-
 class Session(Endpoint):
     """
     Sends commands to one device and records its messages.
@@ -305,54 +146,26 @@ class Session(Endpoint):
     every acknowledgement, which a component handles or drops.
 
     :param address: the address of the session.
-    :param payload_messages: the classes of the payload's messages.
-    :param is_device: whether a message identifies its sender as a device of this payload.
-    :param describe: returns the text of a message of the payload, '' for its name.
-    :param target: the device; None selects the first that is heard.
-    :param component: the component id that alone identifies the device, whose system id changes;
-        None if its address stays the same.
+    :param received: the classes of messages that it receives.
     :param discovery: a message that is requested of all components until the device is found.
-    :param part_of: returns the component id of a part of the device, from a message of the
-        device; the payload's messages of that component are recorded, too. 0 for no part.
-    :ivar found: the present address of the device, once it is heard.
-    :ivar heard: the addresses of all components that were heard.
-    :ivar devices: the addresses of the devices of this payload among them.
+    :ivar runner: runs the coroutines.
     :ivar idle_until: end of the time in which the session only listened, s.
     :ivar transactions: all commands.
-    :ivar versions: the number of frames of the device by MAVLink version.
-    :ivar odd_lengths: the latest wrong length of its MAVLink 1 frames, by message name.
-    :ivar log: a line for each message.
     """
 
     def __init__(
-        self, address: Address, payload_messages: Sequence[type[Message]],
-        is_device: Callable[[Message], bool], describe: Callable[[Message], str],
-        target: Address | None, component: int | None, discovery: type[Message] | None,
-        part_of: Callable[[Message], int],
+        self, address: Address, received: Sequence[type[Message]], components: Components,
+        record: Record, discovery: type[Message] | None,
     ) -> None:
         super().__init__()
         self.address = address
-        self.messages = (messages.Heartbeat, CommandAck, *payload_messages)
-        self.target = target
+        self.messages = received
+        self.components = components
+        self.record = record
         self.runner = CoroutineRunner()
-        self.found: Address | None = None
-        self.heard: set[Address] = set()
-        self.devices: set[Address] = set()
         self.idle_until = -math.inf
         self.transactions: History[Transaction] = History()
-        self.versions: Counter[int] = Counter()
-        self.odd_lengths: dict[str, int] = {}
-        self.log: History[str] = History()
-        self._received: dict[type[Message], History[tuple[float, Message]]] = {
-            cls: History() for cls in self.messages}
-        self._component = component
-        self._is_device = is_device
         self._discovery = discovery
-        self._part_of, self._part = part_of, 0
-        self._payload_messages = frozenset(payload_messages)
-        self._describe = describe
-        self._began: float | None = None
-        self._last_heard = -math.inf
         self._latest: dict[int, Transaction] = {}
         self._heartbeat = HeartbeatTimer(address, mavlink.MAV_TYPE_GCS, self.outgoing)
 
@@ -368,50 +181,28 @@ class Session(Endpoint):
 
     def inspect(self, frame: Frame, cls: type[Message]) -> None:
         """See :class:`Endpoint`."""
-        if self._same_device(frame.source, self.found):
-            self.versions[frame.version] += 1
-            if frame.version == 1 and len(frame.payload) != base_size(cls):
-                self.odd_lengths[cls.msgname] = len(frame.payload)
+        if self.components.is_device(frame.source):
+            self.record.inspect(frame, cls)
 
     def receive(self, source: Address, message: Message, now: float) -> None:
         """See :meth:`Endpoint.receive`."""
-        self._at(now)
-        self.heard.add(source)
-        if self._component in (None, source.component) and self._is_device(message):
-            self.devices.add(source)
-        if self.found is None and (self._same_device(source, self.target) if self.target
-                                   else source in self.devices):
-            self.found = source
-        if self._same_device(source, self.found):
-            if self.found is not None and source != self.found:
-                self.heard.discard(self.found)
-                self.devices.discard(self.found)
-            self.found = source
-            self._last_heard = now
-            self._note('<', self._describe(message) or _protocol_text(message))
-            self._record(message)
-            self._part = self._part_of(message) or self._part
-        elif self.found is not None and source == (self.found.system, self._part) and (
-                type(message) in self._payload_messages):
-            self._note('<', f'from {source}: {self._describe(message) or message.get_type()}')
-            self._record(message)
+        self.runner.now = now
+        sender = self.components.hear(source, message, now)
+        is_part = sender is Sender.PART and not isinstance(
+            message, messages.Heartbeat | CommandAck)
+        if sender is Sender.DEVICE or is_part:
+            origin = f'from {source}: ' if is_part else ''
+            self.record.note('<', origin + self.record.text(message), now)
+            self.record.add(message, now)
+            if isinstance(message, CommandAck) and message.command in self._latest:
+                self._latest[message.command].acknowledge(
+                    Ack(now, message.result, message.progress, messages.target_of(message)),
+                    self.record.log[-1])
         self.runner.advance(now)
-
-    def _same_device(self, source: Address, device: Address | None) -> bool:
-        return source == device or (
-            device is not None and source.component == device.component == self._component)
-
-    def _record(self, message: Message) -> None:
-        if (received := self._received.get(type(message))) is not None:
-            received.append((self.now, message))
-        if isinstance(message, CommandAck) and message.command in self._latest:
-            self._latest[message.command].acknowledge(
-                Ack(self.now, message.result, message.progress, messages.target_of(message)),
-                self.log[-1])
 
     def poll(self, now: float) -> None:
         """See :meth:`Endpoint.poll`."""
-        self._at(now)
+        self.runner.now = now
         self._heartbeat.poll(now)
         self.runner.advance(now)
 
@@ -421,15 +212,8 @@ class Session(Endpoint):
 
     def interrupt(self, now: float) -> None:
         """End the run, unless it restores the device."""
-        self._at(now)
-        self.runner.interrupt(now)
-
-    def _at(self, now: float) -> None:
-        self._began = now if self._began is None else self._began
         self.runner.now = now
-
-    def _note(self, direction: str, text: str) -> None:
-        self.log.append(f'{self.now - (self._began or 0.0):8.3f} s {direction} {text}')
+        self.runner.interrupt(now)
 
     # The record
 
@@ -441,44 +225,11 @@ class Session(Endpoint):
     @property
     def device(self) -> Address:
         """Return the address of the device, which must have been heard."""
-        assert self.found is not None
-        return self.found
-
-    def free_component(self, first: int = 192) -> Address:
-        """
-        Return an address of the device's system from which nothing was heard.
-
-        :param first: the lowest component id.
-        :raises Skipped: if all are in use.
-        """
-        system, taken = self.device.system, self.heard | {self.address, self.device}
-        for component in range(first, 256):
-            if (system, component) not in taken:
-                return Address(system, component)
-        raise Skipped(f'each component id from {first} of system {system} is in use')
-
-    def free_system(self) -> int:
-        """
-        Return a system id from which nothing was heard.
-
-        :raises Skipped: if all are in use.
-        """
-        taken = {one.system for one in self.heard | {self.address, self.device}}
-        for system in range(240, 0, -1):
-            if system not in taken:
-                return system
-        raise Skipped('each system id up to 240 is in use')
-
-    @property
-    def identity(self) -> str:
-        """Return the names that the device has sent, '' if there are none."""
-        received = self.received(messages.ComponentInformationBasic)
-        one = Identity.from_message(received[-1][1]) if received else Identity()
-        return ', '.join(filter(None, (one.vendor, one.model, one.serial_number)))
+        return self.components.device
 
     def received(self, cls: type[M]) -> History[tuple[float, M]]:
         """Return the messages of a class that the device has sent, with their times, s."""
-        return cast(History[tuple[float, M]], self._received.get(cls, History()))
+        return self.record.received(cls)
 
     def idle(self, cls: type[M]) -> list[tuple[float, M]]:
         """Return the messages that the device sent before the session sent a command."""
@@ -486,11 +237,11 @@ class Session(Endpoint):
 
     def send(self, message: Message, source: Address | None = None) -> None:
         """Send a message from an address, by default the session's."""
-        self._give(message, self._describe(message) or message.get_type(), source)
+        self._give(message, self.record.text(message), source)
 
     def _give(self, message: Message, text: str, source: Address | None) -> None:
         self.outgoing.append((source or self.address, message))
-        self._note('>', text + (f' from {source}' if source else ''))
+        self.record.note('>', text + (f' from {source}' if source else ''), self.now)
 
     def check_presence(self) -> None:
         """
@@ -498,7 +249,7 @@ class Session(Endpoint):
 
         :raises DeviceLost: if it has stopped.
         """
-        if self.now - self._last_heard > LOST_TIMEOUT:
+        if self.now - self.components.last_heard > LOST_TIMEOUT:
             raise DeviceLost
 
     # For coroutines
@@ -510,14 +261,14 @@ class Session(Endpoint):
         :param timeout: s to wait for the device.
         :param listen: s to listen; :attr:`idle_until` is their end.
         """
-        end = self.now + timeout
-        while self.found is None and self.now < end:
+        end, components = self.now + timeout, self.components
+        while components.found is None and self.now < end:
             if self._discovery is not None:
-                self._send(Transaction(mavlink.MAV_CMD_REQUEST_MESSAGE, (self._discovery.id,),
-                                       False),
-                           Address(0, 0))
-            await self.runner.until(lambda: self.found, min(DISCOVERY_INTERVAL, end - self.now))
-        if self.found is not None:
+                self._send(Transaction(
+                    mavlink.MAV_CMD_REQUEST_MESSAGE, (self._discovery.id,), False), Address(0, 0))
+            await self.runner.until(
+                lambda: components.found, min(DISCOVERY_INTERVAL, end - self.now))
+        if components.found is not None:
             await self.runner.sleep(listen)
             self.idle_until = self.now
 
@@ -607,15 +358,12 @@ class Session(Endpoint):
         one.sent.append(self.now)
         self._give(message, f'{message.get_type()} to {target}: {one.text}'
                    + (f', confirmation {confirmation}' if confirmation else ''), source)
-        one.lines.append(self.log[-1])
-
-    async def _acknowledged(self, one: Transaction, timeout: float) -> bool:
-        before = len(one.acks)
-        return await self.runner.until(lambda: len(one.acks) > before, timeout)
+        one.lines.append(self.record.log[-1])
 
     async def _answered(self, one: Transaction, timeout: float) -> bool:
         """Wait for the result of an attempt; return whether the device has received it."""
-        if not await self._acknowledged(one, timeout):
+        before = len(one.acks)
+        if not await self.runner.until(lambda: len(one.acks) > before, timeout):
             return False
         # After a report of progress the command must not be sent again.
         await self.runner.until(lambda: one.finals, PROGRESS_LIMIT)
