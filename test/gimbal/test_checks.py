@@ -254,6 +254,7 @@ DEVIATIONS = {
     ('gimbal', 'yaw-lock'): _turns_with_the_vehicle,
     ('gimbal', 'attitude'): _changed(AttitudeStatus, q=(0.5, 0.0, 0.0, 0.0)),
     ('gimbal', 'status-to-all'): _changed(AttitudeStatus, target_system=1),
+    ('gimbal', 'uptime'): _changed(AttitudeStatus, time_boot_ms=0),
     ('gimbal', 'limit-flags'): _changed(AttitudeStatus, failure_flags=0),
     ('gimbal', 'hold'): _moves_when_unset,
     ('gimbal_manager', 'hold'): _moves_when_unset,

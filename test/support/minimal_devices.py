@@ -253,11 +253,25 @@ class MinimalAxes:
             (2, 4), self._targets, self.ranges, strict=True) if target < low or target > high)
 
 
+class MovingDevice(MinimalDevice):
+    """A component with axes."""
+
+    axes: MinimalAxes
+
+    def link_opened(self, now: float) -> None:
+        super().link_opened(now)
+        self._move()
+
+    def _move(self) -> None:
+        self.axes.advance(STEP)
+        self.after(STEP, self._move)
+
+
 PITCH = math.radians(-90), math.radians(30)
 YAW = math.radians(-160), math.radians(160)
 
 
-class MinimalGimbal(MinimalDevice):
+class MinimalGimbal(MovingDevice):
     """
     A gimbal device with pitch and yaw that obeys its manager.
 
@@ -271,7 +285,7 @@ class MinimalGimbal(MinimalDevice):
 
     intervals = {AttitudeStatus: 0.1}
     requestable = (gimbal.GimbalDeviceInformation,)
-    messages = (*MinimalDevice.messages, gimbal.GimbalManagerStatus,
+    messages = (*MovingDevice.messages, gimbal.GimbalManagerStatus,
                 gimbal.GimbalDeviceSetAttitude, gimbal.GimbalManagerSetPitchyaw)
     ranges: ClassVar[tuple[tuple[float, float], tuple[float, float]]] = (PITCH, YAW)
     capabilities: ClassVar[int] = 32 | 128 | 256 | 512
@@ -283,14 +297,6 @@ class MinimalGimbal(MinimalDevice):
         self.axes = MinimalAxes(self.ranges)
         self.flags = ROLL_LOCK | PITCH_LOCK
         self.manager: Address | None = None
-
-    def link_opened(self, now: float) -> None:
-        super().link_opened(now)
-        self._move()
-
-    def _move(self) -> None:
-        self.axes.advance(STEP)
-        self.after(STEP, self._move)
 
     def message(self, message_id: int) -> mav.Message:
         if message_id == AttitudeStatus.id:
@@ -335,7 +341,7 @@ class MinimalGimbal(MinimalDevice):
                        (message.angular_velocity_y, message.angular_velocity_z))
 
 
-class MinimalManager(MinimalDevice):
+class MinimalManager(MovingDevice):
     """
     An autopilot that manages a gimbal on its outputs, without region of interest.
 
@@ -344,7 +350,7 @@ class MinimalManager(MinimalDevice):
 
     intervals = {AttitudeStatus: 0.1, gimbal.GimbalManagerStatus: 0.2}
     requestable = (gimbal.GimbalManagerInformation,)
-    messages = (*MinimalDevice.messages, gimbal.GimbalManagerSetAttitude,
+    messages = (*MovingDevice.messages, gimbal.GimbalManagerSetAttitude,
                 gimbal.GimbalManagerSetPitchyaw, gimbal.GimbalManagerSetManualControl)
     device_id: ClassVar[int] = 1
 
@@ -354,14 +360,6 @@ class MinimalManager(MinimalDevice):
         # Primary system and component id, and those of secondary control.
         self.control = [0, 0, 0, 0]
         self.flags = ROLL_LOCK | PITCH_LOCK
-
-    def link_opened(self, now: float) -> None:
-        super().link_opened(now)
-        self._move()
-
-    def _move(self) -> None:
-        self.axes.advance(STEP)
-        self.after(STEP, self._move)
 
     def message(self, message_id: int) -> mav.Message:
         if message_id == AttitudeStatus.id:

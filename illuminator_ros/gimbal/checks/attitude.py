@@ -41,6 +41,7 @@ from ...payload.checks.component_requirements import (
     check_command_int,
     none_of,
     REQUEST_TIMEOUT,
+    uptime,
 )
 from ...payload.checks.outcomes import Failed, Skipped
 from ...payload.checks.requirement import (
@@ -237,12 +238,6 @@ def _frame(status: AttitudeStatus) -> str:
     return f'flags 0x{status.flags:x} name both frames' if found == FRAMES else ''
 
 
-CONTENT = (
-    _statuses('attitude', 'reports a unit quaternion', STATUS, _content),
-    _statuses('yaw-frame', 'names the one frame of the reported yaw (GM-2)', STATUS, _frame),
-)
-
-
 @requirement('continuous', 'reports no attitude that its angular velocity does not explain',
              MESSAGES, STATUS, whole_run=True)
 async def continuous(tester: GimbalTester) -> str:
@@ -277,14 +272,11 @@ async def continuous(tester: GimbalTester) -> str:
     return none_of(failures, count, 'pairs')
 
 
-@requirement('uptime', 'counts time_boot_ms in real time and never backwards', MESSAGES, STATUS,
-             whole_run=True)
-async def uptime(tester: GimbalTester) -> None:
-    """Look for a step back; a restart causes one."""
-    for (_, one), (_, other) in pairwise(tester.session.received(AttitudeStatus)):
-        back = (one.time_boot_ms - other.time_boot_ms) % (1 << 32)
-        if 0 < back < 1 << 31:
-            raise Failed(f'it went back from {one.time_boot_ms} to {other.time_boot_ms} ms')
+STATUSES = (
+    _statuses('attitude', 'reports a unit quaternion', STATUS, _content),
+    _statuses('yaw-frame', 'names the one frame of the reported yaw (GM-2)', STATUS, _frame),
+    continuous, uptime(AttitudeStatus, 'time_boot_ms'),
+)
 
 
 @requirement('failures-at-rest', 'reports no failure before the first command', MESSAGES,

@@ -305,8 +305,8 @@ REQUIREMENTS: tuple[Requirement[DeviceTester], ...] = (
     ignores('other-target', 'ignores setpoints for other components and systems', ROUTING,
             'Routing Detail', 'setpoints for other addresses', _point_others),
     *component.interval_requirements(AttitudeStatus),
-    component.heartbeat_rate, *attitude.CONTENT, status_to_all, attitude.continuous,
-    attitude.uptime, *component.ACKNOWLEDGEMENTS, component.checksums,
+    component.heartbeat_rate, status_to_all, *attitude.STATUSES, *component.ACKNOWLEDGEMENTS,
+    component.checksums,
 )
 
 

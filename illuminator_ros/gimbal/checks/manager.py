@@ -23,7 +23,6 @@ component that it means.
 from __future__ import annotations
 
 from collections.abc import Callable
-from functools import partial
 import math
 
 from . import attitude
@@ -85,8 +84,6 @@ VEHICLE = (474_000_000, 85_000_000, 500_000)
 HEADING = 15.0
 PLACE = (474_010_000, 85_000_000, 470.0)
 NORTH = Pose(0.0, -15.1, -HEADING)
-
-controls = partial(requirement, needs_consent=True)
 
 
 class ManagerTester(GimbalTester):
@@ -259,7 +256,7 @@ async def attitude_stream(tester: ManagerTester) -> str:
 
 # Control
 
-@controls('take', 'gives primary control to a component that asks, and shows it', GIMBAL,
+@moves('take', 'gives primary control to a component that asks, and shows it', GIMBAL,
           STARTING)
 async def take(tester: ManagerTester) -> str:
     """Take primary control."""
@@ -267,7 +264,7 @@ async def take(tester: ManagerTester) -> str:
     return control_text(await tester.control())
 
 
-@controls('release', 'ends the control of a component that releases it', MESSAGES,
+@moves('release', 'ends the control of a component that releases it', MESSAGES,
           CONFIGURE_COMMAND)
 async def release(tester: ManagerTester) -> None:
     """Send -3, which releases control."""
@@ -276,7 +273,7 @@ async def release(tester: ManagerTester) -> None:
     await tester.leads_to(one, lambda control: control[0] == NO_COMPONENT)
 
 
-@controls('release-others', 'keeps the control of a component when another one releases', MESSAGES,
+@moves('release-others', 'keeps the control of a component when another one releases', MESSAGES,
           CONFIGURE_COMMAND)
 async def release_others(tester: ManagerTester) -> None:
     """Send -3 from two other components: one has our component id, one our system id."""
@@ -293,7 +290,7 @@ async def release_others(tester: ManagerTester) -> None:
             raise one.failure(f'from {source}: {control_text(control)}')
 
 
-@controls('secondary', 'gives secondary control, and shows it', MESSAGES,
+@moves('secondary', 'gives secondary control, and shows it', MESSAGES,
           CONFIGURE_COMMAND)
 async def secondary(tester: ManagerTester) -> None:
     """Give secondary control to the second player."""
@@ -304,7 +301,7 @@ async def secondary(tester: ManagerTester) -> None:
         await tester.configure(-3, -3, -3, -3, source=tester.other)
 
 
-@controls('unchanged', 'leaves control as it is at -1', MESSAGES,
+@moves('unchanged', 'leaves control as it is at -1', MESSAGES,
           CONFIGURE_COMMAND)
 async def unchanged(tester: ManagerTester) -> None:
     """Send -1."""
@@ -315,7 +312,7 @@ async def unchanged(tester: ManagerTester) -> None:
     await tester.leads_to(one, lambda control: control == before)
 
 
-@controls('configure-values', 'rejects ids that do not exist', MESSAGES,
+@moves('configure-values', 'rejects ids that do not exist', MESSAGES,
           CONFIGURE_COMMAND)
 async def configure_values(tester: ManagerTester) -> None:
     """Send -4 and 256."""
@@ -324,7 +321,7 @@ async def configure_values(tester: ManagerTester) -> None:
     fail_if([one.failure() if one.accepted or one.result is None else None for one in sent])
 
 
-@controls('one-player', 'obeys one player at a time when a second one takes control (GM-16)',
+@moves('one-player', 'obeys one player at a time when a second one takes control (GM-16)',
           PROPOSAL, 'Proposed Architecture')
 async def one_player(tester: ManagerTester) -> str:
     """Let the second player take control; the player without control must not move the gimbal."""
@@ -495,8 +492,8 @@ REQUIREMENTS: tuple[Requirement[ManagerTester], ...] = (
     reaches('all-devices', 'treats gimbal device 0 as all of its gimbals (GM-28)', GIMBAL,
             ADDRESSING, lambda tester, pose: tester.point(pose, device_id=0)),
     other_target, *component.interval_requirements(MANAGER_STATUS),
-    component.heartbeat_rate, *attitude.CONTENT, attitude.continuous, attitude.uptime,
-    *component.ACKNOWLEDGEMENTS, component.checksums,
+    component.heartbeat_rate, *attitude.STATUSES, *component.ACKNOWLEDGEMENTS,
+    component.checksums,
 )
 
 

@@ -118,6 +118,10 @@ class Limits(NamedTuple):
         return cls(roll, pitch, yaw, getattr(message, 'cap_flags2', 0) or message.cap_flags)
 
 
+# The ranges and capabilities of a gimbal that does not report them: all are possible.
+UNKNOWN_LIMITS = Limits(*(Range(NAN, NAN),) * 3, -1)
+
+
 def describe(message: Message) -> str:
     """Return the content of a message of the gimbal protocol, '' if its name is enough."""
     if isinstance(message, AttitudeStatus):
@@ -206,6 +210,13 @@ class GimbalTester(ABC):
             self._limits = Limits.from_message(await self.session.required(self.information))
         return self._limits
 
+    async def possible(self) -> Limits:
+        """Return the ranges and the capabilities; unlimited ones if none are reported."""
+        try:
+            return await self.limits()
+        except Skipped:
+            return UNKNOWN_LIMITS
+
     async def requires(self, capability: int) -> None:
         """Raise Skipped if the gimbal does not have a capability."""
         if not (await self.limits()).capabilities & capability:
@@ -263,11 +274,7 @@ class GimbalTester(ABC):
 
     async def target(self, pitch: float, yaw: float) -> Pose:
         """Return a pose within the ranges; an axis that the gimbal lacks keeps its angle."""
-        try:
-            limits = await self.limits()
-        except Skipped:
-            return Pose(0.0, pitch, yaw)
-        now = await self.pose()
+        limits, now = await self.possible(), await self.pose()
 
         def clipped(angle: float, low: float, high: float) -> float:
             return angle if math.isnan(low) or math.isnan(high) or low > high else min(
@@ -300,10 +307,7 @@ class GimbalTester(ABC):
 
         :raises Skipped: if there is none.
         """
-        try:
-            _, (low, high), _, capabilities = await self.limits()
-        except Skipped:
-            return -1
+        _, (low, high), _, capabilities = await self.possible()
         if not capabilities & mavlink.GIMBAL_DEVICE_CAP_FLAGS_HAS_PITCH_AXIS:
             raise Skipped('it does not have HAS_PITCH_AXIS')
         # An unknown end is NaN.

@@ -352,24 +352,6 @@ async def flags(tester: LightTester) -> None:
                      f'too hot for the checks ({status_text(status)})')
 
 
-@reports('uptime', 'counts uptime_ms in real time and never backwards', whole_run=True)
-async def uptime(tester: LightTester) -> str:
-    """Compare uptime_ms with the session's clock."""
-    seen = [(at, one.uptime_ms) for at, one in tester.session.received(IlluminatorStatus)]
-    if len(seen) < 2 or seen[-1][0] - seen[0][0] < 2:
-        raise Skipped('too few statuses')
-    for (_, one), (_, other) in zip(seen, seen[1:], strict=False):
-        back = (one - other) % (1 << 32)
-        if 0 < back < 1 << 31:
-            raise Failed(f'it went back from {one} to {other} ms: the light has restarted, or '
-                         'sends statuses late')
-    (begin, first), (end, last) = seen[0], seen[-1]
-    passed = ((last - first) % (1 << 32)) / 1000
-    if abs(passed - (end - begin)) > 0.5 + 0.05 * (end - begin):
-        raise Failed(f'it advanced by {passed:.1f} s in {end - begin:.1f} s')
-    return f'{passed:.1f} s in {end - begin:.1f} s'
-
-
 def _compared(name: str, title: str, *, accepted: bool) -> Requirement[LightTester]:
     """Return a requirement on the status after the accepted, or after the rejected changes."""
     kind = 'accepted' if accepted else 'rejected'
@@ -474,8 +456,8 @@ REQUIREMENTS: tuple[Requirement[LightTester], ...] = (
     brightness, brightness_values, *STROBE, not_a_number,
     *component.interval_requirements(IlluminatorStatus),
     thermal,
-    component.heartbeat_rate, uptime, *component.ACKNOWLEDGEMENTS,
-    agrees, unchanged, component.checksums,
+    component.heartbeat_rate, component.uptime(IlluminatorStatus, 'uptime_ms'),
+    *component.ACKNOWLEDGEMENTS, agrees, unchanged, component.checksums,
 )
 
 

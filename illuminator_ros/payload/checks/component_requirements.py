@@ -324,6 +324,26 @@ async def heartbeat_rate(tester: Tester) -> str:
     return text
 
 
+def uptime(cls: type[Message], field: str) -> Requirement[Tester]:
+    """Return the requirement on the time since start, ms, in a field of a message."""
+    @requirement('uptime', f'counts {field} in real time and never backwards', MESSAGES,
+                 cls.msgname, whole_run=True)
+    async def check(tester: Tester) -> str:
+        seen = [(at, getattr(one, field)) for at, one in tester.session.received(cls)]
+        if len(seen) < 2 or seen[-1][0] - seen[0][0] < 2:
+            raise Skipped('too few statuses')
+        for (_, one), (_, other) in pairwise(seen):
+            if 0 < (one - other) % (1 << 32) < 1 << 31:
+                raise Failed(f'it went back from {one} to {other} ms: the device has restarted, '
+                             'or sends statuses late')
+        (begin, first), (end, last) = seen[0], seen[-1]
+        passed = ((last - first) % (1 << 32)) / 1000
+        if abs(passed - (end - begin)) > 0.5 + 0.05 * (end - begin):
+            raise Failed(f'it advanced by {passed:.1f} s in {end - begin:.1f} s')
+        return f'{passed:.1f} s in {end - begin:.1f} s'
+    return check
+
+
 def none_of(failures: Sequence[Failed], total: int, objects: str) -> str:
     """
     Return how many objects were examined.
