@@ -17,6 +17,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+import random
 from typing import Any, TypeVar
 
 from illuminator_ros.illuminator.messages import STATUS_ID
@@ -43,9 +44,10 @@ T = TypeVar('T')
 
 class _Recorder(FakeLight):
     """
-    A fake light that keeps received messages, and can answer late.
+    A fake light that keeps received messages, can answer late, and can lose messages.
 
     :ivar held: commands that are not taken until they are released, by MAV_CMD.
+    :ivar loss: the share (0..1) of messages that are lost in each direction.
     """
 
     def __init__(self, source: Address, **how: Any) -> None:
@@ -53,11 +55,21 @@ class _Recorder(FakeLight):
         self.pushes = True
         self.received: Log[Any] = Log()
         self.held: dict[int, list[tuple[Address, Any]]] = {}
+        self.loss = 0.0
+
+    def send(self, message: Any) -> None:
+        if not self._is_lost():
+            super().send(message)
+
+    def _is_lost(self) -> bool:
+        return random.random() < self.loss
 
     def receive(self, source: Address, message: Any, now: float) -> None:
         if not isinstance(message, CommandLong | CommandInt):
             return
         self.received.append(message)
+        if self._is_lost():
+            return
         if message.command in self.held:
             self.held[message.command].append((source, message))
         else:
