@@ -531,7 +531,7 @@ class Gimbal:
 
     def refusal_of_claim(self, source: str) -> str:
         """Return why a claim of a source would be refused, '' if it would not."""
-        return '' if self._sources.may_hold(source) else self.refusal(source)
+        return self._sources.refusal_of_claim(source)
 
     def release(self, source: str, now: float) -> str:
         """

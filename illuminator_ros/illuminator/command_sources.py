@@ -60,6 +60,11 @@ class LightSources(Sources):
                 old.enabled if enabled is None else enabled,
                 old.brightness if brightness is None else brightness)
 
+    def forget_switch(self, source: str) -> None:
+        """Forget the ON or OFF of a source."""
+        if source in self._desired:
+            self._desired[source] = self._desired[source]._replace(enabled=None)
+
     def forget_on(self, *, brightness_is_switch: bool) -> None:
         """Forget each ON, and each brightness if that would be an ON; an OFF is kept."""
         self._desired = {

@@ -377,15 +377,23 @@ class Light:
         """
         Switch the light on or off; ``done`` is called once with the result.
 
-        While a higher source holds the light, the request is not sent but remembered.
+        While a higher source holds the light, a request is not sent. One of a stream is then
+        remembered, and any other is refused and leaves nothing behind.
 
         An OFF overtakes: requests for ON that are not confirmed are superseded.
 
         :param detail: how it was requested, for :class:`LightSwitched`.
-        :param is_stream: whether its publisher repeats it, so that a newer one replaces it.
+        :param is_stream: whether it is one of a stream of requests, which its publisher repeats, so
+            that a newer one replaces it.
         """
-        if self._can_reach(now, done, self._claim(source, now, enabled=on)):
-            self._switch.ask(on, now, done, detail, is_stream=is_stream)
+        def finished(result: Result, now: float) -> None:
+            if result.success:
+                self._sources.remember(source, enabled=on)
+            done(result, now)
+
+        refusal = self._claim(source, now, is_stream=is_stream, enabled=on)
+        if self._can_reach(now, done, refusal):
+            self._switch.ask(on, now, finished, detail, is_stream=is_stream)
             self._changed(self, now)
 
     def is_held_by_other(self, source: str) -> bool:
@@ -404,23 +412,25 @@ class Light:
         return self._sources.holder or ''
 
     def _claim(
-        self, source: str, now: float, *, enabled: bool | None = None,
+        self, source: str, now: float, *, is_stream: bool, enabled: bool | None = None,
         brightness: float | None = None,
     ) -> str:
         """Take a request; return why a source may not command the light, '' if it may."""
         if refusal := self._target.commands.refusal:
             return refusal
+        self._change_holder(self._sources.poll(now), now)
+        if not is_stream and (refusal := self._sources.refusal_of_claim(source)):
+            return refusal
         self.was_commanded = True
         self._forget_silenced(now)
         self._switch.note_request(now)
         self._changed(self, now)
-        if not self._sources.are_ranked:
-            return ''
-        self._change_holder(self._sources.poll(now), now)
         self._change_holder(self._sources.claim(source, now), now)
-        # A request to a lost light has no effect later, but an OFF replaces a remembered ON.
-        if self.connected or enabled is False:
+        # A request to a lost light has no effect later, but an OFF ends a remembered ON.
+        if is_stream and (self.connected or enabled is False):
             self._sources.remember(source, enabled=enabled, brightness=brightness)
+        elif enabled is False:
+            self._sources.forget_switch(source)
         return self._sources.refusal(source)
 
     def _forget_silenced(self, now: float) -> None:
@@ -491,7 +501,7 @@ class Light:
                 self._sources.remember(DEFAULT, brightness=changes.get('brightness'))
             done(result, now)
 
-        if self._can_reach(now, done, self._claim(DEFAULT, now)):
+        if self._can_reach(now, done, self._claim(DEFAULT, now, is_stream=False)):
             self._configuration.configure(changes, now, finished)
 
     def set_brightness(
@@ -507,7 +517,8 @@ class Light:
             if not (result.superseded or self.is_held_by_other(source)):
                 self._emit(events.SetpointFailed(self.address, result.message))
 
-        if self._can_reach(now, failed, self._claim(source, now, brightness=brightness)):
+        refusal = self._claim(source, now, is_stream=True, brightness=brightness)
+        if self._can_reach(now, failed, refusal):
             self._configuration.set_brightness(brightness, now)
 
     def set_desired(self, values: Changes, now: float) -> None:

@@ -66,6 +66,10 @@ class Sources(Arbiter[str]):
         may = source == self.holder or not self.are_ranked
         return '' if may else f'held by {self.holder or "no source"}'
 
+    def refusal_of_claim(self, source: str) -> str:
+        """Return why a claim of a source would be refused, '' if it would not."""
+        return '' if self.may_hold(source) else self.refusal(source)
+
     @property
     def shown_holder(self) -> str | None:
         """Return the holder for snapshots: '' for none, None if commands have no sources."""

@@ -48,11 +48,15 @@ class Shared:
             limits=SafetyLimits(max_brightness=80.0), off_after_silence=SILENCE))
         self.pair.run_until(lambda: self.pair.controller.lights)
 
-    def enable(self, source: str, on: bool) -> Answer:
+    def enable(self, source: str, on: bool, *, is_stream: bool = True) -> Answer:
         answer = Answer(self.pair.now)
-        self.pair.light.enable(on, self.pair.now, answer, source=source)
+        self.pair.light.enable(on, self.pair.now, answer, source=source, is_stream=is_stream)
         self.pair.turn()
         return answer
+
+    def call(self, source: str, on: bool) -> Answer:
+        """Switch by a service, which does not repeat its request."""
+        return self.enable(source, on, is_stream=False)
 
     def dim(self, source: str, brightness: float) -> None:
         self.pair.light.set_brightness(brightness, self.pair.now, source=source)
@@ -93,6 +97,71 @@ def test_a_request_of_a_lower_source_is_refused_and_not_sent() -> None:
     assert (answer.result.success, answer.result.message) == (False, 'held by safety')
     assert configured.result.message == 'held by safety'
     assert (len(shared.pair.commands(ON_OFF)), shared.pair.commands(CONFIGURE)) == (sent, [])
+
+
+@pytest.mark.parametrize('ask', [
+    lambda shared: shared.call('default', True), lambda shared: shared.call('default', False),
+    lambda shared: shared.pair.ask_configure(brightness=30.0)], ids=['on', 'off', 'set'])
+@pytest.mark.parametrize(('before', 'sent', 'holder'), [
+    (lambda shared: None, [], ''),
+    (lambda shared: shared.enable('default', True), [1.0], 'default')], ids=['nothing', 'topic'])
+def test_a_refused_call_leaves_nothing_behind_and_a_request_of_a_topic_stays(
+    ask: Callable[[Shared], Answer], before: Callable[[Shared], object], sent: list[float],
+    holder: str,
+) -> None:
+    shared = Shared(timeout=60.0)
+    shared.enable('safety', False)
+    shared.pair.run(1.0)
+    before(shared)
+    answer = ask(shared)
+    assert answer.result.message == 'held by safety'
+    released_at = shared.pair.now
+    shared.release('safety')
+    shared.pair.run(1.0)
+
+    assert (shared.sent(ON_OFF, released_at), shared.sent(CONFIGURE)) == (sent, [])
+    assert shared.holder == holder
+
+
+def test_a_refused_call_keeps_no_light_on() -> None:
+    shared = Shared(timeout=60.0)
+    shared.pair.settle()
+    shared.pair.wait_for(shared.enable('safety', True))
+    shared.pair.run(SILENCE - 1.0)
+    shared.call('autonomy', True)
+    shared.pair.run(2.0)
+
+    assert shared.light.fields['enable'] == 0
+
+
+@pytest.mark.parametrize(('answer', 'sent'), [(MavResult.ACCEPTED, [1.0]), (None, [])])
+def test_of_two_calls_only_the_one_that_succeeded_before_a_takeover_is_sent_after_it(
+    answer: MavResult | None, sent: list[float],
+) -> None:
+    shared = Shared(timeout=60.0)
+    shared.pair.settle()
+    shared.light.results[ON_OFF] = answer
+    call = shared.call('operator', True)
+    shared.pair.run(0.3)
+    assert bool(call.results) is bool(sent)
+    shared.light.results.clear()
+    released_at = shared.take_over()
+
+    assert call.result.success is bool(sent)
+    assert (shared.sent(ON_OFF, released_at), shared.holder) == (sent, 'operator')
+
+
+def test_a_call_of_off_that_fails_ends_the_on_that_was_kept_and_is_not_sent_later() -> None:
+    shared = Shared(timeout=60.0)
+    shared.pair.settle()
+    shared.pair.wait_for(shared.enable('operator', True))
+    shared.pair.close()
+    assert not shared.call('operator', False).result.success
+    shared.pair.open()
+    shared.pair.run(1.0)
+    released_at = shared.take_over()
+
+    assert (shared.sent(ON_OFF, released_at), shared.holder) == ([], 'operator')
 
 
 # The ends of the hold of ``safety``, each with the cause of the change of the holder.
@@ -273,17 +342,21 @@ def test_an_off_at_a_release_is_repeated_though_a_source_that_dims_takes_the_lig
     assert (shared.holder, shared.light.fields['enable']) == ('autonomy', 0)
 
 
-def test_an_off_for_all_lights_replaces_a_remembered_on_of_a_lost_light() -> None:
+@pytest.mark.parametrize(('is_stream', 'sent'), [(True, [0.0]), (False, [])])
+def test_an_off_for_all_lights_ends_a_remembered_on_of_a_lost_light(
+    is_stream: bool, sent: list[float],
+) -> None:
     shared = Shared(timeout=60.0)
     shared.enable('default', True)
     shared.pair.run(1.0)
     shared.pair.close()
-    enable_all([shared.pair.light], False, shared.pair.now, Answer(0.0), name=str)
+    enable_all([shared.pair.light], False, shared.pair.now, Answer(0.0), name=str,
+               is_stream=is_stream)
     shared.pair.open()
     shared.pair.run(1.0)
     released_at = shared.take_over()
 
-    assert shared.sent(ON_OFF, released_at) == [0.0]
+    assert shared.sent(ON_OFF, released_at) == sent
 
 
 @pytest.mark.parametrize(('is_switch', 'act', 'sent'), [

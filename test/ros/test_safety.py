@@ -73,7 +73,9 @@ def test_sources_hold_the_light_by_rank_and_release_it(own_ros: Ros) -> None:
 
         own_ros.publish(
             Float32, '/illuminator/operator/cmd/brightness', 40.0, node='/illuminator')
-        refused, plain = ask(own_ros, 'autonomy', True), own_ros.enable(True)
+        own_ros.publish(Bool, '/illuminator/autonomy/cmd/enable', True, node='/illuminator')
+        own_ros.synchronize()
+        refused, plain = ask(own_ros, 'operator', True), own_ros.enable(True)
         [parameter] = parameters.set(brightness=30.0)
 
         assert (refused.success, refused.message) == (False, 'held by safety')
@@ -84,18 +86,19 @@ def test_sources_hold_the_light_by_rank_and_release_it(own_ros: Ros) -> None:
         assert [command.param1 for command in light.commands(ON_OFF)] == [0.0]
         assert light.commands(CONFIGURE) == []
 
-        # The kept requests follow: of operator, then of the plain interface, then of autonomy.
+        # The messages on topics follow, first of operator and then of autonomy. The refused calls
+        # of the plain interface, which ranks between them, have left nothing behind.
         assert release('safety') == 'held by operator'
         parameters.wait(brightness=40.0)
-        assert release('operator') == 'held by default'
+        assert release('operator') == 'held by autonomy'
         eventually(lambda: light.fake.fields['enable'] == 1)
-        assert release('default') == 'held by autonomy'
         own_ros.publish(Bool, '/illuminator/autonomy/cmd/enable', False, node='/illuminator')
         eventually(lambda: light.fake.fields['enable'] == 0)
         assert release('autonomy') == 'held by no source'
 
-        holder.wait(lambda message: message.data == '')
-        bridge.wait_for('light 1/243 is held by autonomy: default has released it')
+        holder.wait(lambda message: message.data == '', count=2)
+        assert holder.values == ['', 'safety', 'operator', 'autonomy', '']
+        bridge.wait_for('light 1/243 is held by autonomy: operator has released it')
         bridge.wait_for('light 1/243 is held by no source: autonomy has released it')
 
 

@@ -299,9 +299,9 @@ def _refusal(gimbal: Gimbal, name: str, now: float) -> str:
     if name == 'take_control':
         # Higher sources also need this control, and no other service takes it.
         return ''
-    if name == 'release_control':
-        return gimbal.refusal_of_claim(DEFAULT)
-    return gimbal.claim(DEFAULT, now)
+    # A refused request leaves no claim behind.
+    refusal = gimbal.refusal_of_claim(DEFAULT)
+    return refusal if refusal or name == 'release_control' else gimbal.claim(DEFAULT, now)
 
 
 class _LatestPlace:
