@@ -218,7 +218,7 @@ def _serve(
         return executable.refuse(start_failure(error, failed))
     # The existing objects stay: a garbage collection that visits them would only delay answers.
     gc.freeze()
-    termination.calls(bridge.end)
+    termination.calls(bridge.end, bridge.report_late)
     bridge.run()
     rclpy.try_shutdown()
     return 0

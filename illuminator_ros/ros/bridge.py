@@ -18,6 +18,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Hashable, Mapping, Sequence, Set
 import contextlib
+import functools
 import itertools
 import logging
 import math
@@ -113,6 +114,9 @@ class Bridge:
         self._wake = threading.Event()
         self._ended = threading.Event()
         self._ending = threading.Lock()
+        # The lines for the devices that are not in their final state at the end, by log and key.
+        self._late: dict[tuple[NodeLog, Hashable], str] = {
+            (self.log, None): 'the link does not answer: devices may still be on'}
         self._closed = threading.Event()
         self._housekeeping = threading.Thread(
             target=self._keep_house, name='housekeeping', daemon=True)
@@ -218,25 +222,34 @@ class Bridge:
             return lambda key, severity, text: reports.put((log, key, severity, text))
 
         def start(now: float) -> None:
-            self._component.close(now)
-            for log, payload in zip(self._logs, self._payloads, strict=True):
-                payload.shut_down(now, reporter(log))
+            steps: list[Callable[[float], None]] = [self._component.close]
+            steps += (functools.partial(payload.shut_down, report=reporter(log))
+                      for log, payload in zip(self._logs, self._payloads, strict=True))
+            for step in steps:
+                # The failure of one payload must not leave the devices of another one on.
+                try:
+                    step(now)
+                except Exception as error:
+                    self.log.error(f'internal error: {error!r}')
             reports.put((self.log, None, logging.DEBUG, 'the link answers'))
 
         deadline = time.monotonic() + OFF_LIMIT
         self.link.call(start)
-        late: dict[tuple[NodeLog, Hashable], str] = {
-            (self.log, None): 'the link does not answer: devices may still be on'}
         with contextlib.suppress(queue.Empty):
-            while late:
+            while self._late:
                 log, key, severity, text = reports.get(
                     timeout=max(deadline - time.monotonic(), 0.0))
                 if severity is None:
-                    late[log, key] = text
+                    self._late[log, key] = text
                 else:
-                    late.pop((log, key), None)
+                    self._late.pop((log, key), None)
                     log.write(severity, text)
-        for (log, _), text in late.items():
+        self.report_late()
+
+    def report_late(self) -> None:
+        """Log the devices that are not in their final state, at the end; from any thread."""
+        late, self._late = self._late, {}
+        for (log, _), text in list(late.items()):
             log.error(text)
 
     def _keep_house(self) -> None:

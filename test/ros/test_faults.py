@@ -15,9 +15,12 @@
 """An exception in the bridge neither ends the node nor leaves a caller without an answer."""
 
 from collections.abc import Iterator
+import threading
+import time
 from typing import Any
 
 from diagnostic_msgs.msg import DiagnosticArray
+from illuminator_ros.illuminator.client import IlluminatorClient
 from illuminator_ros.illuminator.light import Light
 from illuminator_ros.illuminator.ros.event_publisher import EventPublisher
 from illuminator_ros.ros.bridge import Bridge
@@ -35,7 +38,7 @@ from support.ports import free_port
 from support.recording import Call
 from support.ros import Parameters, Ros, STREAM
 from support.slow import CLOCK
-from support.waiting import eventually
+from support.waiting import eventually, PATIENCE
 
 
 @pytest.fixture(scope='module')
@@ -84,6 +87,40 @@ def assert_works(ros: Ros) -> None:
     """Check that services, parameters and the link still work."""
     assert ros.enable().success
     assert Parameters(ros).set(brightness=55.0)[0].successful
+
+
+def test_the_light_goes_off_although_a_payload_fails_at_the_end(
+    own_ros: Ros, port: int, capfd: pytest.CaptureFixture[str],
+) -> None:
+    with (ServedLight(port, enable=1) as light,
+          embedded_bridge(own_ros.domain, port, off_on_shutdown=True) as bridge,
+          Fault(IlluminatorClient, 'close')):
+        Parameters(own_ros).wait(brightness=100.0)
+
+        bridge.end()
+
+        eventually(lambda: not light.fake.fields['enable'])
+    assert "internal error: RuntimeError('injected')" in capfd.readouterr().err
+
+
+def test_a_link_that_hangs_delays_the_end_for_a_limited_time_and_is_named(
+    own_ros: Ros, port: int, capfd: pytest.CaptureFixture[str],
+) -> None:
+    hanging, released = threading.Event(), threading.Event()
+
+    def hang(now: float) -> None:
+        hanging.set()
+        released.wait(PATIENCE)
+
+    with embedded_bridge(own_ros.domain, port) as bridge:
+        bridge.link.call(hang)
+        assert hanging.wait(PATIENCE)
+        began = time.monotonic()
+        bridge.end()
+        # Its limits are 0.75 s together; the rest is for a busy machine.
+        assert time.monotonic() - began < 1.5
+        released.set()
+    assert 'the link does not answer: devices may still be on' in capfd.readouterr().err
 
 
 def start_set(ros: Ros, atomically: bool) -> Call:
