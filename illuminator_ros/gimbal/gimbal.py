@@ -296,8 +296,7 @@ class Gimbal:
                 self._emit(events.GimbalLost(self.key, reason))
             else:
                 self._link_problem = ''
-                self._may_take = (
-                    self._settings.auto_take_control and not self._commands.refusal)
+                self._may_take = self._settings.auto_take_control
                 self._identity_query = Repetition()
                 if self._settings.attitude_interval:
                     self._interval_query = Repetition()
@@ -452,7 +451,6 @@ class Gimbal:
 
     def close(self, now: float) -> None:
         """Answer all requests; :meth:`release_control` is still possible."""
-        self._may_take = False
         for manager in self._managers.values():
             for queue in manager.queues:
                 queue.replace(now, self._commands.refusal)

@@ -409,6 +409,7 @@ class GimbalManager(Payload):
     def close(self, now: float) -> None:
         """See :meth:`Payload.close`: the device stays where it is, and follows nothing more."""
         self.stop(now)
+        self._setpoint = None
 
     # Setpoints
 
@@ -559,7 +560,7 @@ class GimbalManager(Payload):
             return
         converts = setpoint.frame is YawFrame.EARTH and not self._accepts_earth_frame(now)
         ahead = self._ahead(setpoint, now)
-        self._send_due = math.inf if self._commands.refusal else now + (
+        self._send_due = now + (
             FOLLOW_INTERVAL if setpoint.turning != STILL or converts or self._roi is not None
             else HOLD_INTERVAL)
         attitude, self._clipped = clip(

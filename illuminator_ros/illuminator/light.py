@@ -383,8 +383,8 @@ class Light:
         An OFF overtakes: requests for ON that are not confirmed are superseded.
 
         :param detail: how it was requested, for :class:`LightSwitched`.
-        :param is_stream: whether it is one of a stream of requests, which its publisher repeats, so
-            that a newer one replaces it.
+        :param is_stream: whether it is one of a stream, which its publisher repeats: a newer one
+            replaces it.
         """
         def finished(result: Result, now: float) -> None:
             if result.success:
@@ -462,7 +462,7 @@ class Light:
         holder, desired = self._sources.holder, self._sources.desired
 
         def done(result: Result, now: float) -> None:
-            if not result.success:
+            if not (result.success or result.superseded):
                 self._emit(events.DesiredStateFailed(self.address, holder or '', result.message))
 
         if not self._can_reach(now, done):
@@ -548,7 +548,7 @@ class Light:
         :param report: see :class:`~..payload.last_change.LastChange`. The failure of a light that
             is not heard is permanent until it is heard.
         """
-        self._switch.switch_off_finally(now, report)
+        self._switch.switch_off_finally(now, report, connected=self.connected)
         if not self.connected:
             report(Result(False, self.unreachable(now), permanent=True), now)
         self._changed(self, now)

@@ -291,8 +291,9 @@ class LightSwitch:
         """Return a value that no request has asked for, to be sent again; None if it must not."""
         if result.success:
             return None
-        self._emit(events.AutomaticSwitch(
-            self._target.address, _is_on(desired.change), desired.reason, result.message))
+        if not result.superseded:
+            self._emit(events.AutomaticSwitch(
+                self._target.address, _is_on(desired.change), desired.reason, result.message))
         return None if due is None else replace(desired, since=due)
 
     def cancel(self, message: str, now: float) -> None:
@@ -308,10 +309,12 @@ class LightSwitch:
         self._rules = ()
         self._reconciler.cancel(message, now, superseded=True)
 
-    def switch_off_finally(self, now: float, report: Done) -> None:
+    def switch_off_finally(self, now: float, report: Done, *, connected: bool) -> None:
         """Switch the light off whenever it may be on; see :meth:`.light.Light.close`."""
         self._last_off = LastChange(self._target, SWITCHES[False], report,
                                     counts_from=self._last_on_at(now) + OVERTAKING_TIME)
+        if connected:
+            self._last_off.poll(now)
 
     def stop_on(self, message: str, now: float) -> None:
         """Send no further ON: its source no longer holds the light."""

@@ -20,6 +20,7 @@ from collections.abc import Callable, Iterator
 import contextlib
 import math
 from pathlib import Path
+import signal
 from typing import Any
 
 from illuminator_ros.gimbal.messages import (
@@ -50,6 +51,7 @@ from support.processes import ended, Program, slow_python  # noqa: E402
 from support.ros import (  # noqa: E402
     bridge_arguments,
     Parameters,
+    repeated,
     Ros,
     running_bridge,
     start_bridge,
@@ -405,6 +407,28 @@ def test_the_release_at_the_end_is_in_the_log_of_the_node_of_the_gimbal(
         assert program.end() == 0
         [found] = [one for one in program.lines if line in one]
         assert '[gimbal]' in found
+
+
+@pytest.mark.parametrize('number', [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])
+def test_the_gimbal_stands_still_and_is_free_whatever_is_requested_at_the_end_of_its_node(
+    own_ros: Ros, number: int,
+) -> None:
+    manager, port = FakeManager(primary=OURS), free_port()
+    program = start_bridge(own_ros.domain, port, '-r', '__node:=gimbal', payloads='[gimbal]')
+    try:
+        with served_gimbals(port, manager, link=Link):
+            own_ros.subscribe(Bool, '/gimbal/in_control').wait_value(True)
+            turning = Vector3Stamped(vector=Vector3(z=0.2))
+            with repeated(own_ros.publisher(Vector3Stamped, '/gimbal/cmd/rate'), turning):
+                eventually(lambda: manager.received)
+                own_ros.start(Trigger, '/gimbal/take_control', Trigger.Request())
+                assert (program.end(number), 'Traceback' in program.log) == (0, False)
+            eventually(lambda: manager.primary == NO_COMPONENT)
+            last = manager.received[-1]
+            assert not any((last.angular_velocity_x, last.angular_velocity_y,
+                            last.angular_velocity_z))
+    finally:
+        program.kill()
 
 
 def test_gm_3_earth_frame_is_refused_where_the_gimbal_lacks_it(

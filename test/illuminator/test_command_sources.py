@@ -134,9 +134,9 @@ def test_a_refused_call_keeps_no_light_on() -> None:
     assert shared.light.fields['enable'] == 0
 
 
-@pytest.mark.parametrize(('answer', 'sent'), [(MavResult.ACCEPTED, [1.0]), (None, [])])
+@pytest.mark.parametrize(('answer', 'sent'), [(mavlink.MAV_RESULT_ACCEPTED, [1.0]), (None, [])])
 def test_of_two_calls_only_the_one_that_succeeded_before_a_takeover_is_sent_after_it(
-    answer: MavResult | None, sent: list[float],
+    answer: int | None, sent: list[float],
 ) -> None:
     shared = Shared(timeout=60.0)
     shared.pair.settle()

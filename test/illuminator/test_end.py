@@ -18,22 +18,35 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
+import math
 import random
 
 from illuminator_ros.illuminator.client import enable_all
+from illuminator_ros.illuminator.commands import SWITCHES
+from illuminator_ros.illuminator.events import (
+    AutomaticSwitch,
+    DesiredStateFailed,
+    LightEvent,
+    LightHeld,
+    LightSwitched,
+    SetpointFailed,
+)
 from illuminator_ros.illuminator.light import Light, Settings
-from illuminator_ros.illuminator.model import SafetyLimits
+from illuminator_ros.illuminator.messages import STATUS_ID
+from illuminator_ros.illuminator.model import SafetyLimits, Status
 from illuminator_ros.illuminator.simulated_properties import (
     IlluminatorBehaviour,
     IlluminatorProperties,
 )
+from illuminator_ros.mavlink.command_sender import CommandSender
 from illuminator_ros.mavlink.dialect import mavlink
-from illuminator_ros.mavlink.messages import Address
-from illuminator_ros.payload.attempt import Result
+from illuminator_ros.mavlink.messages import Address, CommandAck
+from illuminator_ros.payload.attempt import Result, StatusReport, Target
 from illuminator_ros.payload.command_sources import SourceSettings
+from illuminator_ros.payload.last_change import LastChange
 import pytest
-from support.back_to_back import Pair
-from support.fake_light import FakeLight
+from support.back_to_back import BRIDGE, Pair
+from support.fake_light import FakeLight, LIGHT, status_message
 from support.faulty_wire import Faults
 from support.records import Answer
 from support.shared_address import SharedAddress
@@ -42,6 +55,8 @@ ON_OFF, CONFIGURE = mavlink.MAV_CMD_ILLUMINATOR_ON_OFF, mavlink.MAV_CMD_DO_ILLUM
 ENDING = 'the bridge is ending'
 # s that the bridge waits for the lights.
 LIMIT = 0.6
+# Events of changes that the bridge makes, or fails to make.
+ACTIONS = (AutomaticSwitch, DesiredStateFailed, LightHeld, LightSwitched, SetpointFailed)
 SOURCES = ('safety', 'default', 'autonomy')
 LATE = Address(1, 250)
 
@@ -57,11 +72,13 @@ class Ending:
         self.pair = pair
         self.reports: dict[Address, Result] = {}
         self.before, self.ended_at = 0, 0.0
+        self.events: list[LightEvent] = []
 
     def begin(self, *, off: bool = True) -> None:
         """Do what the bridge does at its end, in one turn."""
         self.before = len(self.pair.near.sent)
         self.ended_at = self.pair.now
+        self.pair.controller.events.subscribe(self.events.append)
         self.pair.controller.close(self.pair.now)
         if off:
             self.pair.controller.client.switch_off_finally(self.pair.now, self._report)
@@ -188,6 +205,7 @@ def test_whatever_is_under_way_and_comes_an_off_is_the_last_change_and_reports_a
 
     assert set(ending.changes()) <= {(ON_OFF, 0.0)}
     assert {len(answer.results) for answer in users.answers} <= {1}
+    assert [event for event in ending.events if isinstance(event, ACTIONS)] == []
     assert all(not answer.result.success and ENDING in answer.result.message
                for answer in users.answers[begun:])
     for address in pair.controller.lights:
@@ -229,20 +247,43 @@ def test_a_closed_bridge_sends_no_change_but_off_where_that_is_asked_for(
     assert pair.recorder.failed_setpoints == []
 
 
+@pytest.mark.parametrize('is_switch', [False, True])
 def test_an_on_that_the_off_overtakes_on_the_way_is_followed_by_another_off(
-    ending: Ending, light: FakeLight,
+    ending: Ending, light: FakeLight, is_switch: bool,
 ) -> None:
     pair, wire = ending.pair, ending.pair.near.wire
+    light.brightness_is_switch = is_switch
     assert pair.enable(False).success
+    pair.settle()
     wire.faults, prompt = replace(wire.faults, latency=0.15), wire.faults
-    pair.ask_enable(True)
+    if is_switch:
+        pair.light.set_brightness(60.0, pair.now)
+        pair.turn()
+    else:
+        pair.ask_enable(True)
     wire.faults = prompt
     ending.begin()
+    pair.run(0.1)
+    assert (light.fields['enable'], ending.reports[light.source].success) == (0, False)
+    pair.run(0.05)
+    assert light.fields['enable'] == 1
     pair.run_until(lambda: ending.reports[light.source].success, within=LIMIT)
-    pair.run(LIMIT)
 
     assert light.fields['enable'] == 0
-    assert light.shone
+
+
+def test_an_off_is_repeated_so_often_that_some_of_its_frames_may_be_lost(
+    ending: Ending, light: FakeLight,
+) -> None:
+    wire = ending.pair.near.wire
+    wire.faults, faultless = replace(wire.faults, drop=1.0), wire.faults
+    ending.begin()
+    ending.pair.run(0.35)
+    wire.faults = faultless
+    ending.pair.run(0.15)
+
+    assert light.fields['enable'] == 0
+    assert ending.reports[light.source].success
 
 
 def test_an_end_without_an_on_under_way_is_as_short_as_the_round_trip(
@@ -339,3 +380,45 @@ def test_a_light_that_does_not_show_off_is_reported_with_the_reason(
     report = ending.reports[light.source]
     assert (report.success, report.permanent) == (False, is_permanent)
     assert report.message.startswith(reason) and bool(reason) is bool(report.message)
+    assert not is_permanent or len(ending.changes()) == 1
+
+
+class Last:
+    """The last OFF of a light, whose command was sent at 0 s, and its reports."""
+
+    def __init__(self) -> None:
+        self.sender = CommandSender(BRIDGE)
+        target = Target(LIGHT, self.sender, kind='light', status_id=STATUS_ID,
+                        status_name='ILLUMINATOR_STATUS')
+        self.reports: list[tuple[float, bool]] = []
+        self.off: LastChange[Status] = LastChange(
+            target, SWITCHES[False],
+            lambda result, now: self.reports.append((now, result.success)))
+        self.off.poll(0.0)
+
+    def take(
+        self, on: bool, now: float, *, sent_by: float | None = None, shared_address: bool = False,
+    ) -> None:
+        """Take a status."""
+        self.off.reported(StatusReport(
+            Status.from_message(status_message(enable=int(on))),
+            now if sent_by is None else sent_by, shared_address=shared_address), now)
+
+
+def test_a_light_that_shows_off_stays_reported_whatever_the_late_acknowledgement_is() -> None:
+    last = Last()
+    last.take(False, 0.1)
+    before = list(last.reports)
+    denied = CommandAck(ON_OFF, mavlink.MAV_RESULT_DENIED, 0, 0, *BRIDGE)
+    last.sender.acknowledge(LIGHT, denied, 0.2)
+
+    assert last.reports == before
+    assert last.off.next_deadline() == math.inf
+
+
+def test_a_status_that_may_be_older_than_the_off_is_followed_by_a_request_for_another() -> None:
+    last = Last()
+    last.take(False, 0.01, sent_by=-0.01)
+
+    assert last.reports == [(0.0, False)]
+    assert last.off.next_deadline() <= 0.02

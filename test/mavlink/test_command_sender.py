@@ -33,7 +33,7 @@ from illuminator_ros.mavlink.command_sender import (
     PROGRESS_TIMEOUT,
 )
 from illuminator_ros.mavlink.dialect import mavlink
-from illuminator_ros.mavlink.messages import Address, CommandInt, CommandLong
+from illuminator_ros.mavlink.messages import Address, CommandInt, CommandLong, heartbeat, Message
 import pytest
 from support.command_rig import (
     ACCEPTED,
@@ -310,6 +310,31 @@ def test_commands_of_one_target_can_be_ended_without_those_of_others() -> None:
     assert [len(run.outcomes) for run in rig.runs] == [1, 1, 0]
     rig.ack(ACCEPTED, source=OTHER)
     assert kept.outcome.accepted
+
+
+def test_closed_sender_ends_all_commands_and_sends_no_others_than_those_of_the_end() -> None:
+    rig = Rig()
+
+    def may_send(sent: Command | Message) -> bool:
+        return isinstance(sent, Command) and sent.params[:1] == (0.0,)
+
+    sent, waiting, request = (rig.start(405, params=(1.0,)), rig.start(405, params=(1.0,)),
+                              rig.start(mavlink.MAV_CMD_REQUEST_MESSAGE, OTHER, params=(440.0,)))
+    last = rig.start(406, OTHER, params=(0.0,))
+    rig.sender.close(rig.now, may_send)
+    assert [run.status for run in (sent, waiting)] == [STATUS.CLOSED] * 2
+    before = len(rig.frames)
+    refused = [rig.start(405, params=(1.0,)), rig.start(406, params=(40.0,))]
+    rig.sender.send(heartbeat(mavlink.MAV_TYPE_GCS))
+    assert [run.status for run in refused] == [STATUS.CLOSED] * 2
+    assert (rig.sender.refusal, len(rig.frames)) == ('the bridge is ending', before)
+
+    began, off = rig.now, rig.start(405, params=(0.0,))
+    rig.run(2.05)
+    # It is repeated for as long as the process lasts.
+    assert [round(at - began, 3) for at, message in rig.frames[before:]
+            if message.command == 405] == [round(0.1 * number, 3) for number in range(21)]
+    assert [run.outcomes for run in (off, last, request)] == [[]] * 3
 
 
 @pytest.mark.parametrize('by', ['acknowledgement', 'silence', 'lost link'])

@@ -20,6 +20,7 @@ from collections.abc import Iterable, Iterator
 import contextlib
 import os
 from pathlib import Path
+import threading
 from typing import Any
 
 from rcl_interfaces import srv
@@ -180,6 +181,24 @@ class Ros(SpunNode):
     ) -> Any:
         """Call a service of a node and return its answer."""
         return self.start(type_, service, request, node).result(timeout)
+
+
+@contextlib.contextmanager
+def repeated(publisher: Any, message: Any, period: float = 0.002) -> Iterator[None]:
+    """Publish a message again and again, with a period, s."""
+    ended = threading.Event()
+
+    def publish() -> None:
+        while not ended.wait(period):
+            publisher.publish(message)
+
+    thread = threading.Thread(target=publish)
+    thread.start()
+    try:
+        yield
+    finally:
+        ended.set()
+        thread.join()
 
 
 class Parameters:

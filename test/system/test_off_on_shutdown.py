@@ -17,7 +17,6 @@
 from collections.abc import Callable, Iterator
 import contextlib
 import signal
-import threading
 from unittest import mock
 
 from illuminator_ros.mavlink.dialect import mavlink
@@ -31,11 +30,8 @@ from std_msgs.msg import Bool
 from support.embedded import embedded_bridge
 from support.light import Address, CONFIGURE, ON_OFF, ServedLight
 from support.processes import Program
-from support.ros import Parameters, Ros, start_bridge, start_slow_bridge
+from support.ros import Parameters, repeated, Ros, start_bridge, start_slow_bridge
 from support.waiting import eventually
-
-# s between messages of a publisher.
-PERIOD = 0.002
 
 
 @contextlib.contextmanager
@@ -55,24 +51,6 @@ def lit(
 def assert_goes_off(light: ServedLight) -> None:
     # The light may go off after the end of the bridge.
     eventually(lambda: light.fake.fields['enable'] == 0)
-
-
-@contextlib.contextmanager
-def repeated_on(ros: Ros, topic: str) -> Iterator[None]:
-    """Publish ON again and again."""
-    publisher, ended = ros.publisher(Bool, topic), threading.Event()
-
-    def publish() -> None:
-        while not ended.wait(PERIOD):
-            publisher.publish(Bool(data=True))
-
-    thread = threading.Thread(target=publish)
-    thread.start()
-    try:
-        yield
-    finally:
-        ended.set()
-        thread.join()
 
 
 def assert_ends(program: Program, number: int = signal.SIGTERM) -> None:
@@ -140,8 +118,9 @@ def test_off_is_the_last_change_whatever_is_requested_at_the_end(
         try:
             for node in ('/illuminator', '/illuminator_1_244'):
                 Parameters(own_ros, node).wait(brightness=100.0)
-            with (repeated_on(own_ros, '/illuminator/cmd/enable'),
-                  repeated_on(own_ros, '/illuminator_1_244/cmd/enable')):
+            first, second = (own_ros.publisher(Bool, f'{node}/cmd/enable') for node in (
+                '/illuminator', '/illuminator_1_244'))
+            with repeated(first, Bool(data=True)), repeated(second, Bool(data=True)):
                 eventually(lambda: all(one.commands(ON_OFF) for one in (light, other)))
                 own_ros.start_enable()
                 Parameters(own_ros).start_set(brightness=20.0)
