@@ -33,9 +33,11 @@ class AnswerSpacing:
     The times of the answers of one service; callable from any thread.
 
     :param spread: s, the limit in place of :data:`MAX_SPREAD`.
+    :ivar clients: how many the service has.
     """
 
     def __init__(self, spread: float = MAX_SPREAD) -> None:
+        self.clients = 0
         self._spread = spread
         self._lock = threading.Lock()
         self._open = 0
@@ -46,14 +48,10 @@ class AnswerSpacing:
         with self._lock:
             self._open += 1
 
-    def time_of_answer(self, clients: int, now: float) -> float:
-        """
-        Return when the next answer may be sent, which is ``now`` or later.
-
-        :param clients: of the service.
-        """
+    def time_of_answer(self, now: float) -> float:
+        """Return when the next answer may be sent, which is ``now`` or later."""
         with self._lock:
-            count, due = max(self._open, clients), max(self._pause_ends, now)
+            count, due = max(self._open, self.clients), max(self._pause_ends, now)
             if count > MAX_UNSPACED:
                 rest = max(now + self._spread - due, 0.0)
                 self._pause_ends = due + min(

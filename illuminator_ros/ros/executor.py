@@ -244,7 +244,7 @@ class NodeExecutor(SingleThreadedExecutor):
         response: Any,
     ) -> None:
         now = time.monotonic()
-        due = spacing.time_of_answer(self._count_clients(service), now)
+        due = spacing.time_of_answer(now)
         if len(self._calls) >= MAX_WAITING:
             due = now
         # The middleware waits up to 0.1 s before it sends an answer to a client that it has not
@@ -254,13 +254,9 @@ class NodeExecutor(SingleThreadedExecutor):
             self.call(functools.partial(_send, service, header, response), due)
         else:
             _send(service, header, response)
-
-    def _count_clients(self, service: Service) -> int:
-        """Return how many clients a service has, 0 if that is unknown."""
-        for node in self.get_nodes():
+        for node in self.get_nodes()[:1]:
             with contextlib.suppress(InvalidHandle):
-                return node.count_clients(service.service_name)
-        return 0
+                spacing.clients = node.count_clients(service.service_name)
 
     @staticmethod
     def _deliver(subscription: Subscription) -> None:

@@ -27,9 +27,10 @@ import pytest
 NOW = 100.0
 
 
-def spaced(requests: int) -> AnswerSpacing:
+def spaced(clients: int, requests: int) -> AnswerSpacing:
     """Return the spacing of a service that has taken some requests."""
     spacing = AnswerSpacing()
+    spacing.clients = clients
     for _ in range(requests):
         spacing.note_request()
     return spacing
@@ -42,17 +43,17 @@ def spaced(requests: int) -> AnswerSpacing:
 def test_pause_follows_an_answer_where_there_are_many_clients_or_open_requests(
     clients: int, requests: int, pause: float,
 ) -> None:
-    spacing = spaced(requests)
+    spacing = spaced(clients, requests)
 
-    times = [spacing.time_of_answer(clients, NOW) for _ in range(2)]
+    times = [spacing.time_of_answer(NOW) for _ in range(2)]
 
     assert times == pytest.approx([NOW, NOW + pause * PAUSE_PER_CLIENT])
 
 
 def test_answer_after_the_pause_is_sent_at_once() -> None:
-    spacing = spaced(2)
-    spacing.time_of_answer(20, NOW)
-    assert spacing.time_of_answer(20, NOW + 21 * PAUSE_PER_CLIENT) == NOW + 21 * PAUSE_PER_CLIENT
+    spacing = spaced(20, 2)
+    spacing.time_of_answer(NOW)
+    assert spacing.time_of_answer(NOW + 21 * PAUSE_PER_CLIENT) == NOW + 21 * PAUSE_PER_CLIENT
 
 
 @pytest.mark.parametrize('clients', [1, 20, 500])
@@ -60,9 +61,9 @@ def test_answer_after_the_pause_is_sent_at_once() -> None:
 def test_answers_to_requests_that_came_together_are_spread_over_the_limit_at_most(
     clients: int, requests: int,
 ) -> None:
-    spacing = spaced(requests)
+    spacing = spaced(clients, requests)
 
-    times = [spacing.time_of_answer(clients, NOW) for _ in range(requests)]
+    times = [spacing.time_of_answer(NOW) for _ in range(requests)]
 
     assert times == sorted(times)
     assert times[-1] <= NOW + MAX_SPREAD

@@ -246,13 +246,15 @@ def test_answers_are_spaced_where_a_service_has_more_clients_than_are_answered_a
     callers = [clients('slow') for _ in range(answer_spacing.MAX_UNSPACED + 1)]
     eventually(lambda: node.count_clients('~/slow') == len(callers))
     calls = []
-    for caller in callers[:2]:
+    # Call in turn: the node counts the clients after the first answer, so the third one waits.
+    for caller in callers[:3]:
         calls += call(caller, waiting, 1)
         waiting[-1](Trigger.Response())
 
-    calls[0].result()
+    for answered in calls[:2]:
+        answered.result()
     Call(fast.call_async(Trigger.Request())).result()
-    assert not calls[1].answered
+    assert not calls[2].answered
 
 
 def test_answer_that_comes_while_the_executor_sends_another_one_does_not_stop_it(
