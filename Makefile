@@ -4,7 +4,7 @@ PYTHON_IN_VENV := .venv/bin/python
 TESTS ?= test
 
 SECONDS ?= 60
-# Options of bench/run.py, such as '--repeat 3 --json run.json'.
+# Arguments of bench/run.py, such as '--repeat 3 enable'.
 BENCH ?=
 
 .PHONY: help demo test check lint unit fuzz soak bench clean environment

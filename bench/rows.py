@@ -16,19 +16,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, field, replace
-import itertools
-import statistics
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import NamedTuple
 
-# Statistic -> value; the key of a single figure is VALUE.
-Figures = dict[str, float]
-VALUE = 'value'
-QUANTILES = {'p50': 0.5, 'p95': 0.95, 'p99': 0.99}
+# By statistic; that of a single figure is ''.
+Figures = Mapping[str, float]
 
 
-@dataclass(frozen=True)
-class Target:
+class Target(NamedTuple):
     """
     A value that must not exceed a limit.
 
@@ -40,7 +36,7 @@ class Target:
     limit: float
 
     @property
-    def met(self) -> bool:
+    def is_met(self) -> bool:
         """Whether the value is within the limit."""
         return self.value <= self.limit
 
@@ -50,8 +46,7 @@ class Row:
     """
     One measurement.
 
-    :param peers: the figures of others, measured in the same run; ratios are to the first.
-    :param spread: the least and the greatest ratio of repeated runs.
+    :param peers: the figures of others, measured in the same run; the ratio is to the first.
     """
 
     what: str
@@ -60,67 +55,39 @@ class Row:
     peers: Mapping[str, Figures] = field(default_factory=dict)
     targets: Sequence[Target] = ()
     note: str = ''
-    spread: Mapping[str, tuple[float, float]] = field(default_factory=dict)
 
-    @property
-    def ratios(self) -> Figures:
-        """Ours divided by the first peer's."""
-        for peer in self.peers.values():
-            return {name: value / peer[name] for name, value in self.ours.items()
-                    if peer.get(name)}
-        return {}
-
-
-def quantile(values: Sequence[float], share: float) -> float:
-    """Return the value that this share of the values does not exceed."""
-    return sorted(values)[min(int(share * len(values)), len(values) - 1)]
-
-
-def quantiles(values: Sequence[float]) -> Figures:
-    """Return p50, p95 and p99."""
-    return {name: quantile(values, share) for name, share in QUANTILES.items()}
+    def __str__(self) -> str:
+        """Return a row of a Markdown table: what, ours, peers, ratio, targets."""
+        peers = '; '.join(f'{name}: {_text(values)} {self.unit}'
+                          for name, values in self.peers.items())
+        first: Figures = next(iter(self.peers.values()), {})
+        ratios = {name: value / first[name] for name, value in self.ours.items()
+                  if first.get(name)}
+        targets = '; '.join(f'{one.text}: {"met" if one.is_met else "MISSED"}'
+                            for one in self.targets)
+        what = f'{self.what} ({self.note})' if self.note else self.what
+        return (f'| {what} | {_text(self.ours)} {self.unit} | {peers} | {_text(ratios)} | '
+                f'{targets} |')
 
 
-def one(value: float) -> Figures:
-    """Return a single figure."""
-    return {VALUE: value}
+def _text(figures: Figures) -> str:
+    return ' / '.join(f'{value:,.0f}' if abs(value) >= 1000 else f'{value:.3g}'
+                      for value in figures.values())
 
 
-def middle(values: Sequence[float]) -> Figures:
-    """Return the median as a single figure."""
-    return one(statistics.median(values))
+def quantiles(values: Sequence[float], *shares: float) -> Figures:
+    """Return some quantiles, p50, p95 and p99 by default; 1 is the greatest value."""
+    ordered = sorted(values)
+    return {f'p{100 * share:g}': ordered[min(int(share * len(ordered)), len(ordered) - 1)]
+            for share in shares or (0.5, 0.95, 0.99)}
 
 
-def times(ours: Figures, peer: Figures, limit: float, name: str = VALUE,
-          whose: str = 'the peer') -> Target:
-    """Limit the ratio of a figure to the peer's."""
-    ratio = f'1/{1 / limit:g} of' if limit < 1 else f'{limit:g} times'
-    label = '' if name == VALUE else f'{name} '
-    return Target(f'{label}at most {ratio} {whose}', ours[name] / peer[name], limit)
+def times(ours: Figures, peer: Figures, limit: float, name: str = '', whose: str = '') -> Target:
+    """Limit the ratio of a figure to that of a peer."""
+    ratio = f'1/{1 / limit:g}' if limit < 1 else f'{limit:g} times'
+    return Target(f'{name} at most {ratio} {whose}'.strip(), ours[name] / peer[name], limit)
 
 
 def at_most(value: float, limit: float, unit: str) -> Target:
     """Limit a figure itself."""
-    return Target(f'at most {limit:g} {unit}' if limit else f'0 {unit}', value, limit)
-
-
-def median_of(runs: Sequence[Sequence[Row]]) -> list[Row]:
-    """Return a row for each of repeated runs: medians, judged targets, and ranges of ratios."""
-    found: dict[str, list[Row]] = {}
-    for row in itertools.chain.from_iterable(runs):
-        found.setdefault(row.what, []).append(row)
-    return [_median(rows) if len(rows) > 1 else rows[0] for rows in found.values()]
-
-
-def _median(rows: Sequence[Row]) -> Row:
-    def figures(each: Iterable[Figures]) -> Figures:
-        listed = list(each)
-        return {name: statistics.median(one[name] for one in listed) for name in listed[0]}
-
-    return replace(
-        rows[0], ours=figures(row.ours for row in rows),
-        peers={name: figures(row.peers[name] for row in rows) for name in rows[0].peers},
-        targets=[replace(target, value=statistics.median(row.targets[at].value for row in rows))
-                 for at, target in enumerate(rows[0].targets)],
-        spread={name: (min(row.ratios[name] for row in rows),
-                       max(row.ratios[name] for row in rows)) for name in rows[0].ratios})
+    return Target(f'at most {limit:g} {unit}', value, limit)

@@ -18,15 +18,16 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 import contextlib
+import functools
 import os
+from pathlib import Path
 import random
 import socket
 import time
 from typing import Any
 
 from pymavlink.dialects.v20 import ardupilotmega
-
-from .rig import udp_queue
+from support.ports import free_port
 
 # Frames that are prepared: a multiple of 256, so that repeating them continues the sequence.
 PREPARED = 1024
@@ -44,6 +45,7 @@ ARDUPILOT = ('AHRS', 'EKF_STATUS_REPORT')
 # for them, and less than the 208 KiB that any system grants.
 FULL = 150_000
 CHUNK = 32
+BAUD = 921_600
 
 
 def frames(names: Sequence[str] = (*COMMON, *ARDUPILOT), count: int = PREPARED) -> list[bytes]:
@@ -64,101 +66,102 @@ def _message(name: str, draw: random.Random) -> Any:
     kind = getattr(ardupilotmega, f'MAVLink_{name.lower()}_message')
     if name == 'HEARTBEAT':
         return kind(2, 3, 81, 4, 4, 3)
-    values: list[Any] = []
+
+    def value(type_: str) -> float:
+        if type_ in ('float', 'double'):
+            return draw.uniform(-100, 100)
+        return draw.randrange(1 << (min(int(''.join(filter(str.isdigit, type_))), 32) - 1))
+
     # Lengths are in wire order, types in the order of the definition.
     lengths = dict(zip(kind.ordered_fieldnames, kind.array_lengths, strict=True))
-    for field, type_ in zip(kind.fieldnames, kind.fieldtypes, strict=True):
-        length = lengths[field]
-
-        def value(type_: str = type_) -> Any:
-            if type_ in ('float', 'double'):
-                return draw.uniform(-100, 100)
-            bits = int(''.join(filter(str.isdigit, type_)))
-            return draw.randrange(1 << (min(bits, 32) - 1))
-        values.append([value() for _ in range(length)] if length else value())
-    return kind(*values)
+    return kind(*([value(type_) for _ in range(lengths[field])] if lengths[field] else value(type_)
+                  for field, type_ in zip(kind.fieldnames, kind.fieldtypes, strict=True)))
 
 
 class Line:
-    """A way to one receiver."""
+    """
+    A way to one receiver, which must be ready before frames are fed.
 
-    def __init__(self, send: Callable[[Sequence[bytes]], None], busy: Callable[[], bool],
-                 close: Callable[[], None]) -> None:
-        self._send, self._busy, self.close = send, busy, close
-        self.sent = 0
+    :ivar urls: the connection URL of the bridge, that of pymavlink, the arguments of
+        ``peers/bare_receiver.py``.
+    """
 
-    def feed(self, prepared: Sequence[bytes], rate: float, count: int) -> float:
+    def __init__(self, transport: str) -> None:
+        self._sent = 0
+        self._port = free_port(socket.SOCK_STREAM)
+        at = f'127.0.0.1:{self._port}'
+        self._stack = contextlib.ExitStack()
+        self._send: Callable[[Sequence[bytes]], None]
+        self.urls: tuple[str, str, tuple[object, ...]]
+        if transport == 'UDP':
+            self._socket = self._stack.enter_context(socket.socket(type=socket.SOCK_DGRAM))
+            self._socket.connect(('127.0.0.1', self._port))
+            self.urls = f'udpin://{at}', f'udpin:{at}', ('udp', self._port)
+            self._send = self._send_datagrams
+        elif transport == 'TCP':
+            self._socket = self._stack.enter_context(
+                socket.create_server(('127.0.0.1', self._port)))
+            self.urls = f'tcpout://{at}', f'tcp:{at}', ('tcp', self._port)
+            self._send = self._send_stream
+        else:
+            far, near = os.openpty()
+            self._stack.callback(os.close, near)
+            self._stack.callback(os.close, far)
+            path = os.ttyname(near)
+            self.urls = f'serial://{path}:{BAUD}', f'{path},{BAUD}', ('serial', path)
+            self._send = functools.partial(_write, far)
+        self._is_udp = transport == 'UDP'
+
+    def __enter__(self) -> Line:
+        return self
+
+    def __exit__(self, *error: object) -> None:
+        self._stack.close()
+
+    def _send_stream(self, part: Sequence[bytes]) -> None:
+        if self._socket.getsockopt(socket.SOL_SOCKET, socket.SO_ACCEPTCONN):
+            self._socket.settimeout(20.0)
+            self._socket = self._stack.enter_context(self._socket.accept()[0])
+        # TCP itself limits the rate.
+        self._socket.sendall(b''.join(part))
+
+    def _send_datagrams(self, part: Sequence[bytes]) -> None:
+        for frame in part:
+            with contextlib.suppress(ConnectionError):
+                self._socket.send(frame)
+
+    def feed(self, prepared: Sequence[bytes], rate: float, count: int) -> None:
         """
-        Send frames; return the s that it took.
+        Send frames.
 
         :param rate: frames per second; 0 = as many as the receiver takes without loss.
         """
-        began = time.monotonic()
-        done = 0
+        began, done = time.monotonic(), 0
         while done < count:
             if rate:
+                time.sleep(max(began + done / rate - time.monotonic(), 0.001))
                 due = min(int((time.monotonic() - began) * rate) + 1, count)
             else:
                 due = min(done + CHUNK, count)
-                while self._busy():
+                while self._is_udp and _queued(self._port) > FULL:
                     time.sleep(0.0002)
-            if due > done:
-                at = self.sent % len(prepared)
-                part = prepared[at:at + due - done]
-                self._send(part)
-                done += len(part)
-                self.sent += len(part)
-            if rate:
-                time.sleep(max(began + done / rate - time.monotonic(), 0.001))
-        return time.monotonic() - began
+            at = self._sent % len(prepared)
+            part = prepared[at:at + due - done]
+            self._send(part)
+            done += len(part)
+            self._sent += len(part)
 
 
-def udp_line(port: int) -> Line:
-    """Return a line to a UDP port, a datagram for each frame."""
-    sender = socket.socket(type=socket.SOCK_DGRAM)
-    sender.connect(('127.0.0.1', port))
-
-    def send(part: Sequence[bytes]) -> None:
-        for frame in part:
-            with contextlib.suppress(ConnectionError):
-                sender.send(frame)
-
-    return Line(send, lambda: udp_queue(port)[0] > FULL, sender.close)
+def _queued(port: int) -> int:
+    """Return the bytes that wait in the socket of a UDP port."""
+    for line in Path('/proc/net/udp').read_text().splitlines()[1:]:
+        fields = line.split()
+        if fields[1].endswith(f':{port:04X}'):
+            return int(fields[4].partition(':')[2], 16)
+    raise RuntimeError(f'UDP port {port} is not bound')
 
 
-class TcpListener:
-    """Accepts the connections of the receivers."""
-
-    def __init__(self) -> None:
-        self._listener = socket.create_server(('127.0.0.1', 0))
-        self.port: int = self._listener.getsockname()[1]
-
-    def line(self) -> Line:
-        """Return a line to the next client."""
-        self._listener.settimeout(20.0)
-        connection, _ = self._listener.accept()
-        self._listener.close()
-        connection.settimeout(20.0)
-        connection.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
-        # TCP itself limits the rate.
-        return Line(lambda part: connection.sendall(b''.join(part)), lambda: False,
-                    connection.close)
-
-
-class SerialPort:
-    """A pseudo-terminal without a speed limit."""
-
-    def __init__(self) -> None:
-        self._far, self._near = os.openpty()
-        self.path = os.ttyname(self._near)
-
-    def line(self) -> Line:
-        """Return a line to the program that has opened it."""
-        os.close(self._near)
-
-        def send(part: Sequence[bytes]) -> None:
-            data = b''.join(part)
-            while data:
-                data = data[os.write(self._far, data):]
-
-        return Line(send, lambda: False, lambda: os.close(self._far))
+def _write(descriptor: int, part: Sequence[bytes]) -> None:
+    data = b''.join(part)
+    while data:
+        data = data[os.write(descriptor, data):]

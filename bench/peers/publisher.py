@@ -12,12 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""
-A bare publisher that datagrams control.
-
-``publish COUNT INTERVAL``: publish the time of publishing COUNT times, INTERVAL s apart.
-``relay TIME``: publish TIME at once.
-"""
+"""A bare publisher: each datagram makes it publish the time of publishing."""
 
 from __future__ import annotations
 
@@ -27,7 +22,7 @@ import sys
 import time
 
 import rclpy
-from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
+from rclpy.qos import DurabilityPolicy, QoSProfile
 from std_msgs.msg import Float64
 
 
@@ -36,21 +31,15 @@ def main() -> None:
     rclpy.init()
     node = rclpy.create_node('publisher')
     # The QoS of the bridge's state topics.
-    publisher = node.create_publisher(Float64, '~/time', QoSProfile(
-        depth=1, reliability=ReliabilityPolicy.RELIABLE,
-        durability=DurabilityPolicy.TRANSIENT_LOCAL))
+    publisher = node.create_publisher(
+        Float64, '~/time', QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL))
     control = socket.socket(type=socket.SOCK_DGRAM)
     control.bind(('127.0.0.1', int(sys.argv[1])))
     print('ready', flush=True)
     with contextlib.suppress(KeyboardInterrupt):
         while True:
-            what, *numbers = control.recv(100).split()
-            if what == b'relay':
-                publisher.publish(Float64(data=float(numbers[0])))
-                continue
-            for _ in range(int(numbers[0])):
-                publisher.publish(Float64(data=time.monotonic()))
-                time.sleep(float(numbers[1]))
+            control.recv(100)
+            publisher.publish(Float64(data=time.monotonic()))
 
 
 if __name__ == '__main__':

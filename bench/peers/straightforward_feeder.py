@@ -20,6 +20,7 @@ It checks nothing, and has neither a heartbeat nor a service. Its argument is th
 
 from __future__ import annotations
 
+import contextlib
 import math
 import os
 import sys
@@ -27,6 +28,7 @@ from typing import Any, cast
 
 from pymavlink.dialects.v10 import ardupilotmega
 import rclpy
+from rclpy.executors import ExternalShutdownException
 from rclpy.node import Node
 from rclpy.qos import qos_profile_sensor_data
 from sensor_msgs.msg import Imu, NavSatFix
@@ -71,4 +73,5 @@ class Feeder(Node):
 rclpy.init()
 node = Feeder(sys.argv[1])
 print('ready', flush=True)
-rclpy.spin(node)
+with contextlib.suppress(KeyboardInterrupt, ExternalShutdownException):
+    rclpy.spin(node)

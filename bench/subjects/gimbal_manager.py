@@ -24,26 +24,23 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Iterator
 import contextlib
+import itertools
 import math
 import socket
 import time
-from typing import Any
 
 from illuminator_ros.gimbal import messages as gimbal
 from illuminator_ros.mavlink import messages as mav
-from illuminator_ros.mavlink.dialect import decode, mavlink
-from illuminator_ros.mavlink.frame import Decoder
+from illuminator_ros.mavlink.dialect import mavlink
 from illuminator_ros.payload.rotation import Quaternion
-from support.frames import Codec
+from support.ports import free_port
 
-from ..rig import Bench, bridge, free_port, peer
-from ..rows import at_most, one, quantiles, Row, times
+from ..devices import Side
+from ..rig import alternate, Bench, bridge, peer, udp, wait_until
+from ..rows import at_most, Row, times
 
 MANAGER, DEVICE = mav.Address(1, 194), mav.Address(1, 154)
 PLAYERS = [mav.Address(255, 100 + number) for number in range(20)]
-CLASSES: dict[int, type[mav.Message]] = {cls.id: cls for cls in (
-    mav.CommandAck, gimbal.GimbalDeviceSetAttitude, gimbal.GimbalManagerStatus)}
-WARM_UP = 50
 RATE, SECONDS = 1000, 10.0
 # s between setpoints, as players send them. Without pauses the ratio depends on the processors
 # that are awake: 4.3 to 8.3.
@@ -52,126 +49,72 @@ PERIOD = 0.02
 STEP = 0.1
 
 
-class Line:
-    """A UDP socket with MAVLink messages of any senders."""
-
-    def __init__(self, port: int = 0) -> None:
-        self.socket = socket.socket(type=socket.SOCK_DGRAM)
-        self.socket.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 1 << 22)
-        self.socket.bind(('127.0.0.1', port))
-        self._codec, self._decoder = Codec(), Decoder()
-
-    def frame(self, source: mav.Address, message: mav.Message) -> bytes:
-        """Return a message as a frame."""
-        return self._codec.frame(source, message)
-
-    def send(self, source: mav.Address, message: mav.Message, port: int) -> None:
-        """Send a message."""
-        self.socket.sendto(self.frame(source, message), ('127.0.0.1', port))
-
-    def receive(self, timeout: float) -> list[Any]:
-        """Return the messages of the next datagram, none after the time."""
-        self.socket.settimeout(max(timeout, 1e-4))
-        try:
-            return self._messages(self.socket.recv(65536))
-        except TimeoutError:
-            return []
-
-    def arrival(self, wanted: type[mav.Message]) -> float:
-        """
-        Wait for a message, and return the arrival time of its datagram, before decoding.
-
-        :raises TimeoutError: if no datagram comes.
-        """
-        self.socket.settimeout(5.0)
-        while True:
-            data, now = self.socket.recv(65536), time.perf_counter()
-            if any(isinstance(message, wanted) for message in self._messages(data)):
-                return now
-
-    def _messages(self, data: bytes) -> list[Any]:
-        return [decode(CLASSES[frame.message_id], frame.payload)
-                for frame in self._decoder.feed(data) if frame.message_id in CLASSES]
-
-    def drain(self) -> None:
-        """Drop the datagrams that have arrived."""
-        self.socket.setblocking(False)
-        with contextlib.suppress(BlockingIOError):
-            while True:
-                self.socket.recv(65536)
-
-
-def configure(player: mav.Address) -> mav.CommandLong:
+def configure(player: mav.Address) -> mav.Message:
     """Return the command by which a player takes control."""
     return mav.CommandLong(
         *MANAGER, mavlink.MAV_CMD_DO_GIMBAL_MANAGER_CONFIGURE, 0, *player, -1, -1, 0, 0, 0)
 
 
-def setpoint(player: mav.Address, pitch: float = 0.0) -> gimbal.GimbalManagerSetPitchyaw:
+def setpoint(player: mav.Address, pitch: float = 0.0) -> mav.Message:
     """Return a setpoint whose yaw belongs to one player."""
     return gimbal.GimbalManagerSetPitchyaw(
         *MANAGER, 0, 0, pitch, STEP * (PLAYERS.index(player) - 10), math.nan, math.nan)
 
 
 @contextlib.contextmanager
-def managed() -> Iterator[tuple[int, Line, Line]]:
+def managed() -> Iterator[tuple[int, Side, Side]]:
     """Run a manager; yield its port, its device, and players of which the first has control."""
     port = free_port()
-    device, players = Line(), Line()
-    with bridge(f'udpin://127.0.0.1:{port}', name='gimbal_manager',
-                payloads='[gimbal_manager]'):
-        until = time.monotonic() + 20.0
-        while time.monotonic() < until:
-            device.send(DEVICE, mav.heartbeat(mavlink.MAV_TYPE_GIMBAL), port)
-            players.send(PLAYERS[0], mav.heartbeat(mavlink.MAV_TYPE_GCS), port)
-            players.send(PLAYERS[0], configure(PLAYERS[0]), port)
-            device.receive(0.1)
-            if any(isinstance(message, mav.CommandAck) and message.result == 0
-                   for _ in range(20) for message in players.receive(0.01)):
-                yield port, device, players
-                break
-        else:
-            raise RuntimeError('the manager gives no control')
-    device.socket.close()
-    players.socket.close()
+
+    def has_control() -> bool:
+        device.beat()
+        players.beat()
+        players.send(configure(PLAYERS[0]))
+        return any(isinstance(message, mav.CommandAck) and message.result == 0
+                   for _ in range(20) for message in players.receive(0.01))
+
+    with (Side(port, mavlink.MAV_TYPE_GIMBAL, DEVICE) as device,
+          Side(port, mavlink.MAV_TYPE_GCS, *PLAYERS) as players,
+          bridge(udp(port), 'gimbal_manager', payloads='[gimbal_manager]')):
+        wait_until(has_control, 'a player has control')
+        yield port, device, players
 
 
-def measure(bench: Bench) -> Iterator[Row]:
+def gimbal_manager(bench: Bench) -> Iterator[Row]:
     """Measure the path of a setpoint, then the competition."""
     yield _setpoints(bench)
     yield from _competition(bench)
 
 
 def _setpoints(bench: Bench) -> Row:
-    took: dict[str, list[float]] = {'manager': [], 'forwarder': []}
-    far = Line().socket
-    far.settimeout(5.0)
-    with far, managed() as (port, device, players):
-        forward = free_port()
-        with peer('forwarder', str(forward), str(far.getsockname()[1])):
-            beat = 0.0
-            for number in range(bench.amount(400, 20)):
-                if time.monotonic() >= beat:
-                    beat = time.monotonic() + 0.5
-                    device.send(DEVICE, mav.heartbeat(mavlink.MAV_TYPE_GIMBAL), port)
-                    players.send(PLAYERS[0], mav.heartbeat(mavlink.MAV_TYPE_GCS), port)
-                    time.sleep(0.01)
-                data = players.frame(PLAYERS[0], setpoint(
-                    PLAYERS[0], pitch=0.3 * math.sin(number)))
-                time.sleep(PERIOD)
-                device.drain()
-                began = time.perf_counter()
-                players.socket.sendto(data, ('127.0.0.1', port))
-                took['manager'].append(
-                    (device.arrival(gimbal.GimbalDeviceSetAttitude) - began) * 1e3)
-                time.sleep(PERIOD)
-                began = time.perf_counter()
-                players.socket.sendto(data, ('127.0.0.1', forward))
-                far.recv(2048)
-                took['forwarder'].append((time.perf_counter() - began) * 1e3)
-    ours, theirs = (quantiles(values[bench.amount(WARM_UP, 0):]) for values in took.values())
-    return Row('setpoint of a MAVLink player through the manager to the device', 'ms', ours,
-               {'bare UDP forwarder': theirs}, [times(ours, theirs, 3.0, 'p50')])
+    forward = free_port()
+    with managed() as (port, device, players), socket.socket(type=socket.SOCK_DGRAM) as far:
+        far.settimeout(5.0)
+        far.bind(('127.0.0.1', 0))
+        numbers = itertools.count()
+
+        def path(to: int, arrival: socket.socket, kind: int) -> float:
+            device.beat()
+            players.beat()
+            data = players.frame(setpoint(PLAYERS[0], 0.3 * math.sin(next(numbers))))
+            time.sleep(PERIOD)
+            device.drain()
+            arrival.settimeout(5.0)
+            began = time.perf_counter()
+            players.socket.sendto(data, ('127.0.0.1', to))
+            # The message id is in bytes 7 to 9 of a frame.
+            while int.from_bytes(arrival.recv(2048)[7:10], 'little') != kind:
+                pass
+            return time.perf_counter() - began
+
+        with peer('forwarder', forward, far.getsockname()[1]):
+            found = alternate({
+                'ours': lambda: path(port, device.socket, gimbal.GimbalDeviceSetAttitude.id),
+                'forwarder': lambda: path(forward, far, gimbal.GimbalManagerSetPitchyaw.id)},
+                bench.amount(400, 3), bench.amount(50, 1))
+    return Row('setpoint of a MAVLink player through the manager to the device', 'ms',
+               found['ours'], {'bare UDP forwarder': found['forwarder']},
+               [times(found['ours'], found['forwarder'], 3.0, 'p50')])
 
 
 def _competition(bench: Bench) -> Iterator[Row]:
@@ -180,21 +123,18 @@ def _competition(bench: Bench) -> Iterator[Row]:
     obeyed: set[int] = set()
     holders: set[int] = set()
     statuses = sent = 0
-    with managed() as (port, device, players):
-        for line in (players, device):
-            line.drain()
-        began, beat = time.monotonic(), 0.0
+    with managed() as (_, device, players):
+        players.drain()
+        device.drain()
+        began = time.monotonic()
         # One more second is for late answers.
         while (now := time.monotonic()) < began + seconds + 1.0:
-            if now >= beat:
-                beat = now + 0.5
-                device.send(DEVICE, mav.heartbeat(mavlink.MAV_TYPE_GIMBAL), port)
-                for player in PLAYERS:
-                    players.send(player, mav.heartbeat(mavlink.MAV_TYPE_GCS), port)
+            device.beat()
+            players.beat()
             while sent < min(now - began, seconds) * RATE:
                 player = PLAYERS[sent % len(PLAYERS)]
-                players.send(player, configure(player), port)
-                players.send(player, setpoint(player), port)
+                players.send(configure(player), player)
+                players.send(setpoint(player), player)
                 sent += 1
             while received := players.receive(0.0):
                 results.update(message.result for message in received
@@ -206,11 +146,11 @@ def _competition(bench: Bench) -> Iterator[Row]:
                     statuses += now < began + seconds
                     holders.add(message.primary_control_compid)
     unanswered = sent - results.total()
-    yield Row(f'{sent} commands of {len(PLAYERS)} players that compete for control, with as many '
-              f'setpoints, {RATE} a second', 'commands', one(unanswered), targets=[
-                  at_most(unanswered, 0, 'without an answer'),
+    yield Row(f'{RATE} commands a second of {len(PLAYERS)} players that compete for control, with '
+              'as many setpoints', 'commands unanswered', {'': unanswered}, targets=[
+                  at_most(unanswered, 0, 'unanswered'),
                   at_most(max(len(obeyed), len(holders)) - 1, 0, 'instants with two players')],
               note=f'{results[0]} accepted, {results[2]} denied')
     rate = statuses / seconds
-    yield Row('GIMBAL_MANAGER_STATUS meanwhile', 'Hz', one(rate), targets=[
+    yield Row('GIMBAL_MANAGER_STATUS meanwhile', 'Hz', {'': rate}, targets=[
         at_most(round(abs(rate - 5.0), 3), 0.5, 'Hz from 5')])

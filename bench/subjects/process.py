@@ -1,0 +1,118 @@
+# Copyright 2026 The illuminator_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""The memory of a process, and many nodes in one."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+import contextlib
+from pathlib import Path
+import statistics
+import time
+
+from support.ports import free_port
+
+from ..rig import Bench, bridge, Client, cpu_share, peer, resident, simulator, udp, wait_until
+from ..rows import at_most, Figures, quantiles, Row, times
+
+# s for which a light sends statuses before the memory is measured, and the soak.
+SERVED, SOAK = 3.0, 15.0
+# MB; the second is the growth that the allocator causes.
+LIMIT, GROWTH = 20.0, 1.0
+
+
+def memory(bench: Bench) -> Iterator[Row]:
+    """Compare the memory with that of a node with one SetBool service; let the bridge serve."""
+    took = []
+    for _ in range(bench.amount(3, 1)):
+        port = free_port()
+        with contextlib.ExitStack() as stack:
+            stack.enter_context(simulator(port))
+            programs = stack.enter_context(bridge(udp(port))), stack.enter_context(
+                peer('empty_server'))
+            client = stack.enter_context(Client(bench))
+            for name in ('/illuminator/enable', '/empty/enable'):
+                client.meet(name)
+                for _ in range(bench.amount(20, 2)):
+                    client.call(name)
+            time.sleep(bench.amount(SERVED, 0.1))
+            took.append([resident(program.pid) for program in programs])
+    ours, theirs = (statistics.median(values) for values in zip(*took, strict=True))
+    yield Row('resident memory', 'MB', {'': ours}, {'node with one SetBool service': {'': theirs}},
+              [at_most(ours - theirs, LIMIT, 'MB above the peer')])
+    yield growth(bench)
+
+
+def growth(bench: Bench) -> Row:
+    """Call ``~/enable`` of a light at 10 Hz for some time; the first quarter is the warm-up."""
+    seconds, port = bench.amount(SOAK, 0.4), free_port()
+    with (simulator(port, '--status-interval', '0.1'), bridge(udp(port)) as program,
+          Client(bench) as client):
+        client.meet('/illuminator/enable')
+        used = []
+        for _ in range(40):
+            client.call('/illuminator/enable')
+            used.append(resident(program.pid))
+            time.sleep(seconds / 40)
+    grown = used[-1] - used[10]
+    return Row(f'memory gained in {seconds:g} s at 10 Hz, after the first quarter', 'MB',
+               {'': grown}, targets=[at_most(grown, GROWTH, 'MB')])
+
+
+# Participants that discover the nodes, one after the other. Half of them miss the first
+# announcement of the bridge, and the row judges the longest discovery.
+PARTICIPANTS = 5
+# Limits for 100 lights and fewer: MB, threads, s.
+MEMORY, THREADS, DISCOVERY = 190.0, 20, 3.0
+
+
+def seen(bench: Bench, names: list[str]) -> float:
+    """Return the time until a participant has discovered the services of all nodes, s."""
+    with Client(bench) as client:
+        began = time.monotonic()
+        clients = [client.client(f'/{name}/enable') for name in names]
+        wait_until(lambda: all(one.service_is_ready() for one in clients), 'all nodes are seen')
+        return time.monotonic() - began
+
+
+def nodes(bench: Bench) -> Iterator[Row]:
+    """Serve 1, 10 and 100 lights, with a node for each in one process."""
+    alone: Figures = {}
+    for count in bench.amount((1, 10, 100), (2,)):
+        port = free_port()
+        names = ['illuminator', *(f'illuminator_2_{n}' for n in range(2, count + 1))]
+        arguments = ('--count', str(count), '--system-id', '2', '--component-id', '1')
+        with simulator(port, *arguments), bridge(udp(port), target_component=1) as program:
+            seen(bench, names)
+            discoveries = [seen(bench, names) for _ in range(bench.amount(PARTICIPANTS, 1))]
+            with Client(bench) as client:
+                client.meet(f'/{names[-1]}/enable')
+                time.sleep(bench.amount(2.0, 0.0))
+                share = cpu_share(program.pid, bench.amount(3.0, 0.1))
+                calls = quantiles([client.enable(f'/{names[-1]}/enable') * 1e3
+                                   for _ in range(bench.amount(150, 3))])
+            taken = resident(program.pid)
+            threads = len([*Path(f'/proc/{program.pid}/task').iterdir()])
+        alone = alone or calls
+        kind = f'nodes in one process: {count}'
+        yield Row(f'CPU, each light at 1 Hz, {kind}', '%', {'': share})
+        yield Row(f'memory, {kind}', 'MB', {'': taken}, targets=[
+            at_most(taken, MEMORY, 'MB'), at_most(threads, THREADS, 'threads')],
+            note=f'{threads} threads')
+        yield Row(f'~/enable of the last, {kind}', 'ms', calls, {'the smallest number': alone},
+                  [times(calls, alone, 1.2, 'p50')] if calls is not alone else [])
+        yield Row(f'discovery of all by a new participant, {kind}', 's',
+                  quantiles(discoveries, 0.5, 1),
+                  targets=[at_most(max(discoveries), DISCOVERY, 's')])

@@ -1,0 +1,223 @@
+# Copyright 2026 The illuminator_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Calls of services, and the start and end of the programs."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+import contextlib
+import functools
+import signal
+import sys
+import threading
+import time
+
+from illuminator_ros.mavlink.dialect import mavlink
+from rcl_interfaces.srv import SetParameters
+from rclpy.parameter import Parameter
+from support.ports import free_port
+from support.processes import ended, Program, start_interpreter
+
+from ..devices import serving
+from ..rig import (
+    alternate,
+    Bench,
+    bridge,
+    Client,
+    interleaved,
+    PATIENCE,
+    peer,
+    PEERS,
+    ready,
+    simulator,
+    udp,
+)
+from ..rows import at_most, quantiles, Row, times
+
+OURS, MINIMAL, EMPTY, SCRIPT = (
+    f'/{name}/enable' for name in ('illuminator', 'minimal', 'empty', 'straightforward'))
+CLIENTS = 50
+
+
+def enable(bench: Bench) -> Iterator[Row]:
+    """
+    Call ``~/enable`` over UDP, acknowledged by the light and verified by a status.
+
+    The light is the simulator. In a second row it is a minimal light, which answers almost
+    immediately, so that the row shows the bridge's own share.
+    """
+    ports = [free_port() for _ in range(3)]
+    with contextlib.ExitStack() as stack:
+        for program in (
+                simulator(ports[0]), simulator(ports[1]),
+                ready(start_interpreter('bench.devices', str(ports[2])), 'ready'),
+                bridge(udp(ports[0])), bridge(udp(ports[2]), 'minimal'),
+                peer('straightforward', f'udpin:127.0.0.1:{ports[1]}'), peer('empty_server')):
+            stack.enter_context(program)
+        client = stack.enter_context(Client(bench))
+        for name in (OURS, MINIMAL, EMPTY, SCRIPT):
+            client.meet(name)
+        found = alternate({name: functools.partial(client.enable, name)
+                           for name in (OURS, MINIMAL, EMPTY, SCRIPT)},
+                          bench.amount(1500, 3), bench.amount(50, 1))
+    ours, minimal, empty, script = found.values()
+    yield Row(
+        '~/enable over UDP, verified', 'ms', ours,
+        {'empty SetBool server': empty, 'straightforward script': script},
+        [times(ours, empty, 1.9, 'p50'), times(ours, empty, 2.0, 'p99'),
+         times(ours, script, 1.2, 'p50', 'the script')], 'the script does not verify')
+    yield Row('~/enable of a light that answers at once', 'ms', minimal,
+              {'empty SetBool server': empty})
+    yield at_once(bench)
+
+
+def at_once(bench: Bench) -> Row:
+    """Call from many clients at the same moment."""
+    port = free_port()
+    with contextlib.ExitStack() as stack:
+        stack.enter_context(simulator(port))
+        stack.enter_context(bridge(udp(port)))
+        callers = [stack.enter_context(Client(bench)) for _ in range(bench.amount(CLIENTS, 5))]
+        for caller in callers:
+            caller.meet(OURS)
+        answers: list[bool] = []
+
+        def call(caller: Client) -> None:
+            answers.append(caller.call(OURS, patience=10.0)[1] is not None)
+
+        threads = [threading.Thread(target=call, args=(caller,)) for caller in callers]
+        began = time.monotonic()
+        for thread in threads:
+            thread.start()
+        for thread in threads:
+            thread.join()
+        seconds = time.monotonic() - began
+    return Row(f'~/enable called by {len(callers)} clients at the same moment, all answered', 's',
+               {'': seconds}, targets=[at_most(answers.count(False), 0, 'calls unanswered')])
+
+
+LIGHTS, CALLS, ROUNDS = 4, 100, 3
+BESIDE, ALONE = 'beside a silent light', 'undisturbed'
+
+
+def parallel(bench: Bench) -> Iterator[Row]:
+    """Call three lights; in every second round one more is silent and called meanwhile."""
+    port = free_port()
+    names = ['illuminator', *(f'illuminator_1_{243 + number}' for number in range(1, LIGHTS))]
+    *others, silent = (f'/{name}/enable' for name in names)
+    took: dict[str, list[float]] = {BESIDE: [], ALONE: []}
+    with (bridge(udp(port), target_component=243), serving(port, LIGHTS) as lights,
+          Client(bench) as client, Client(bench) as second):
+        for service in others:
+            client.meet(service)
+        second.meet(silent)
+        stop = threading.Event()
+
+        def keep_calling() -> None:
+            while not stop.is_set():
+                second.call(silent, patience=10.0)
+
+        for _ in range(bench.amount(ROUNDS, 1)):
+            for kind, values in took.items():
+                thread = threading.Thread(target=keep_calling)
+                if kind == BESIDE:
+                    stop.clear()
+                    lights[-1].silent = {mavlink.MAV_CMD_ILLUMINATOR_ON_OFF}
+                    lights[-1].asked.clear()
+                    thread.start()
+                    lights[-1].asked.wait(PATIENCE)
+                for number in range(bench.amount(CALLS, 3)):
+                    values.append(client.enable(others[number % len(others)]) * 1e3)
+                if kind == BESIDE:
+                    stop.set()
+                    lights[-1].silent = set()
+                    thread.join()
+    ours, alone = quantiles(took[BESIDE]), quantiles(took[ALONE])
+    yield Row('~/enable of three lights beside a silent one', 'ms', ours, {ALONE: alone},
+              [times(ours, alone, 3.0, 'p99')])
+
+
+def limited(what: str, took: list[float], limit: float) -> Row:
+    """Return a row of times, s, the longest of which has a limit, ms."""
+    took = [seconds * 1e3 for seconds in took]
+    return Row(what, 'ms', quantiles(took, 0.5, 1), targets=[at_most(max(took), limit, 'ms')],
+               note=f'{len(took)} tries')
+
+
+def limits(bench: Bench) -> Iterator[Row]:
+    """Measure the documented time limits of answers and of the end of the programs."""
+    tries, port = range(bench.amount(5, 1)), free_port()
+    with bridge(udp(port)), Client(bench) as client:
+        client.client('/illuminator/set_parameters', SetParameters)
+
+        def set_brightness(value: float) -> float:
+            """Return the time until a set of the parameter is answered, s."""
+            return client.call('/illuminator/set_parameters', SetParameters.Request(
+                parameters=[Parameter('brightness', value=value).to_parameter_msg()]))[0]
+
+        client.meet('/illuminator/enable', success=False)
+        yield limited('~/enable without a light fails',
+                      [client.call('/illuminator/enable')[0] for _ in tries], 300)
+        yield limited('a set of parameters without a light fails',
+                      [set_brightness(50.0) for _ in tries], 300)
+        with serving(port) as (light,):
+            client.meet('/illuminator/enable')
+            light.silent = {mavlink.MAV_CMD_DO_ILLUMINATOR_CONFIGURE}
+            yield limited('a set of parameters is answered beside a silent light',
+                          [set_brightness(10.0 + number) for number in tries], 900)
+    for what, off in (('the bridge ends', False),
+                      ('the bridge switches the light off and ends', True)):
+        yield limited(what, [end(bench, off, (signal.SIGINT, signal.SIGTERM)[number % 2])
+                             for number in tries], 1000)
+
+
+def end(bench: Bench, off: bool, number: int) -> float:
+    """Return the time from a signal to the end of a bridge, s."""
+    port = free_port()
+    with (simulator(port), bridge(udp(port), off_on_shutdown=off) as program,
+          Client(bench) as client):
+        client.meet('/illuminator/enable')
+        client.call('/illuminator/enable')
+        began = time.monotonic()
+        if program.end(number):
+            raise RuntimeError(program.log)
+        return time.monotonic() - began
+
+
+NODE = 'node with one SetBool service'
+
+
+def startup(bench: Bench) -> Iterator[Row]:
+    """Start the bridge and a node with one service, until ``~/enable`` answers."""
+    port = free_port()
+    took: dict[str, list[float]] = {OURS: [], NODE: []}
+    with simulator(port):
+        for number, name in enumerate(interleaved([OURS, NODE], bench.amount(16, 1))):
+            # Each start has a node name of its own: a name that was discovered before is faster.
+            node = f'started_{number}'
+            with Client(bench) as client:
+                client.client(f'/{node}/enable')
+                began = time.monotonic()
+                program = (
+                    start_interpreter('illuminator_ros.bridge', '--ros-args', '-r',
+                                      f'__node:={node}', '-p', f'connection_url:={udp(port)}')
+                    if name == OURS
+                    else Program(sys.executable, str(PEERS / 'empty_server.py'), node))
+                with ended(program):
+                    client.meet(f'/{node}/enable', success=False)
+                    took[name].append((time.monotonic() - began) * 1e3)
+    found = {name: quantiles(values) for name, values in took.items()}
+    yield Row('start of the process until ~/enable answers', 'ms', found[OURS],
+              {NODE: found[NODE]}, [times(found[OURS], found[NODE], 1.6, 'p50')])

@@ -1,0 +1,167 @@
+# Copyright 2026 The illuminator_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Messages on topics: a status to its subscribers, a rate to a gimbal."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+import contextlib
+import functools
+import itertools
+import math
+import queue
+import socket
+import struct
+import time
+from typing import Any
+
+from geometry_msgs.msg import Vector3, Vector3Stamped
+from illuminator_ros.gimbal import messages as of_gimbals
+from illuminator_ros.mavlink import messages as mav
+from illuminator_ros.mavlink.dialect import mavlink
+from illuminator_ros.payload.messages import GimbalDeviceAttitudeStatus
+from std_msgs.msg import Bool, Float64
+from support.ports import free_port
+
+from ..devices import MinimalLight, Side
+from ..rig import alternate, Bench, bridge, Client, PATIENCE, peer, udp, wait_until
+from ..rows import Row, times
+
+# s between two messages; longer than the path of one.
+INTERVAL = 0.008
+
+
+def status(bench: Bench) -> Iterator[Row]:
+    """
+    Measure the time from an ILLUMINATOR_STATUS on the wire to a subscriber.
+
+    The peers are a bare publisher and subscriber: from before the call of ``publish`` to the
+    subscriber, by CLOCK_MONOTONIC, which the processes of a machine share. A status makes seven
+    messages, ``~/enabled`` first and ``~/uptime`` last. Each is measured with a subscriber of its
+    own: the first message occupies a shared subscriber until after the last one arrives.
+    """
+    yield over(bench, 'enabled', Bool, 'first')
+    yield over(bench, 'uptime', Float64, 'last')
+
+
+def over(bench: Bench, topic: str, type_: type[Any], place: str) -> Row:
+    """Measure bridge and peer in turn."""
+    port, control_port = free_port(), free_port()
+    arrived: queue.SimpleQueue[tuple[float, Any]] = queue.SimpleQueue()
+    with contextlib.ExitStack() as stack:
+        stack.enter_context(bridge(udp(port)))
+        stack.enter_context(peer('publisher', control_port))
+        client = stack.enter_context(Client(bench))
+        light = stack.enter_context(MinimalLight(port))
+        control = stack.enter_context(socket.socket(type=socket.SOCK_DGRAM))
+        control.connect(('127.0.0.1', control_port))
+
+        def came(message: Any) -> None:
+            arrived.put((time.monotonic(), message.data))
+
+        def ours() -> float:
+            light.beat()
+            time.sleep(INTERVAL)
+            sent = light.status()
+            return arrived.get(timeout=PATIENCE)[0] - sent
+
+        def bare() -> float:
+            time.sleep(INTERVAL)
+            control.send(b'publish')
+            at, sent = arrived.get(timeout=PATIENCE)
+            return at - float(sent)
+
+        def arrives(send: Callable[[], object]) -> bool:
+            light.beat()
+            send()
+            time.sleep(0.1)
+            return not arrived.empty()
+
+        for of_topic, name, send in (
+                (Float64, '/publisher/time', functools.partial(control.send, b'publish')),
+                (type_, f'/illuminator/{topic}', light.status)):
+            client.subscribe(of_topic, name, came)
+            # The first ones may get lost.
+            wait_until(functools.partial(arrives, send), f'messages on {name}')
+            while not arrived.empty():
+                arrived.get()
+        found = alternate({'ours': ours, 'bare': bare}, *bench.amount((8, 2, 50), (1, 1, 3)))
+    return Row(
+        f'status on the wire to a subscriber of ~/{topic}, the {place} of seven topics', 'ms',
+        found['ours'], {'bare publisher and subscriber': found['bare']},
+        [times(found['ours'], found['bare'], 1.6, 'p50')])
+
+
+MANAGER, BRIDGE = mav.Address(1, 1), mav.Address(1, 194)
+NAN = math.nan
+
+
+def reports() -> Iterator[mav.Message]:
+    """Yield what a manager sends once a second, besides heartbeats."""
+    yield of_gimbals.GimbalManagerInformation(0, 0xFFFF, 1, -1, 1, -1, 1, -1, 1)
+    yield of_gimbals.GimbalManagerStatus(0, 0, 1, *BRIDGE, 0, 0)
+    yield GimbalDeviceAttitudeStatus(
+        0, 0, 0, mavlink.GIMBAL_DEVICE_FLAGS_YAW_IN_VEHICLE_FRAME, (1, 0, 0, 0),
+        NAN, NAN, NAN, 0, NAN, NAN, 1)
+
+
+def gimbal(bench: Bench) -> Iterator[Row]:
+    """
+    Measure the time from a message on ``~/cmd/rate`` to the datagram.
+
+    The peer is a bare subscriber that sends a datagram. The time runs from before the call of
+    ``publish`` to the arrival of the datagram. This process takes all times.
+    """
+    port = free_port()
+    with contextlib.ExitStack() as stack:
+        manager = stack.enter_context(Side(port, mavlink.MAV_TYPE_QUADROTOR, MANAGER))
+        bare = stack.enter_context(socket.socket(type=socket.SOCK_DGRAM))
+        bare.bind(('127.0.0.1', 0))
+        bare.settimeout(1.0)
+        stack.enter_context(bridge(
+            udp(port), 'gimbal', payloads='[gimbal]', setpoint_timeout=60.0))
+        stack.enter_context(peer('subscriber', bare.getsockname()[1]))
+        client = stack.enter_context(Client(bench))
+        numbers = itertools.count(1)
+        publishers = {name: client.node.create_publisher(Vector3Stamped, f'/{name}/cmd/rate', 10)
+                      for name in ('gimbal', 'subscriber')}
+
+        def path(name: str, rates: Callable[[], list[float]]) -> float:
+            if manager.beat():
+                for message in reports():
+                    manager.send(message)
+            time.sleep(INTERVAL)
+            # The rates are exact in float32.
+            rate = next(numbers) % 4096 / 65536
+            message = Vector3Stamped(vector=Vector3(z=rate))
+            began = time.monotonic()
+            publishers[name].publish(message)
+            while time.monotonic() < began + 1.0:
+                if rate in rates():
+                    return time.monotonic() - began
+            return 0.0
+
+        actions = {
+            'gimbal': lambda: path('gimbal', lambda: [
+                abs(message.angular_velocity_z) for message in manager.receive(1.0)
+                if isinstance(message, of_gimbals.GimbalManagerSetAttitude)]),
+            'subscriber': lambda: path(
+                'subscriber', lambda: [*struct.unpack('<3f', bare.recv(2048))])}
+        for name, action in actions.items():
+            wait_until(action, f'rates of {name} arrive')
+        found = alternate(actions, *bench.amount((12, 2, 50), (1, 1, 3)))
+    yield Row('~/cmd/rate to the datagram', 'ms', found['gimbal'],
+              {'bare subscriber that sends a datagram': found['subscriber']},
+              [times(found['gimbal'], found['subscriber'], 1.5, 'p50')])
