@@ -25,7 +25,7 @@ from diagnostic_msgs.msg import DiagnosticArray
 from rclpy.node import Node
 
 from .diagnostics import link_diagnostics, LinkDiagnostics, Report
-from .node import STREAM_QOS
+from .qos import STREAM_QOS
 from ..mavlink.component import Component
 from ..mavlink.link import Link
 

@@ -23,10 +23,11 @@ import threading
 from typing import Any, Generic, NamedTuple, TypeVar
 
 from rclpy.node import Node
-from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
+from rclpy.qos import QoSProfile, ReliabilityPolicy
 
 from .executor import DeferredService, Respond, Take
 from .link_call import LinkCalls, MAX_PENDING
+from .qos import STATE_QOS
 from .throttled_log import NodeLog
 from ..mavlink.link import Link
 
@@ -34,11 +35,6 @@ T = TypeVar('T')
 # Takes success and a message.
 Answer = Callable[[bool, str], None]
 
-# Late subscribers get the last value.
-STATE_QOS = QoSProfile(
-    depth=1, reliability=ReliabilityPolicy.RELIABLE,
-    durability=DurabilityPolicy.TRANSIENT_LOCAL)
-STREAM_QOS = QoSProfile(depth=10, reliability=ReliabilityPolicy.RELIABLE)
 # Matches reliable and best-effort publishers. Messages may be lost, especially the first ones of a
 # publisher; the next one of a stream replaces them.
 COMMAND_QOS = QoSProfile(depth=10, reliability=ReliabilityPolicy.BEST_EFFORT)

@@ -18,7 +18,8 @@ from __future__ import annotations
 
 from typing import Any
 
-from illuminator_ros.ros.node import NodeInterface, Publication, STREAM_QOS
+from illuminator_ros.ros.node import NodeInterface, Publication
+from illuminator_ros.ros.qos import STREAM_QOS
 import pytest
 from std_msgs.msg import Bool
 

@@ -43,15 +43,16 @@ from ...ros.conversions import quaternion_message
 from ...ros.diagnostics_publisher import DiagnosticsSource, MakeReports
 from ...ros.parameter_services import ParameterServices
 from ...ros.payload import Host
+from ...ros.qos import STREAM_QOS
 from ...ros.throttled_log import NodeLog
 
 T = TypeVar('T')
 
 PUBLICATIONS = (
     ros_node.Publication('connected', Bool),
-    ros_node.Publication('attitude', QuaternionStamped, ros_node.STREAM_QOS),
-    ros_node.Publication('angular_velocity', Vector3Stamped, ros_node.STREAM_QOS),
-    ros_node.Publication('angles', Vector3Stamped, ros_node.STREAM_QOS),
+    ros_node.Publication('attitude', QuaternionStamped, STREAM_QOS),
+    ros_node.Publication('angular_velocity', Vector3Stamped, STREAM_QOS),
+    ros_node.Publication('angles', Vector3Stamped, STREAM_QOS),
     ros_node.Publication('yaw_lock', Bool),
     ros_node.Publication('in_control', Bool),
     ros_node.Publication('controller', String),

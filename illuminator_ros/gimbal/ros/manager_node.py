@@ -40,9 +40,10 @@ from ...payload.rotation import enu_ned, ned_frd, Quaternion, Vector
 from ...ros.conversions import quaternion_message, read_orientation, read_quaternion, read_vector
 from ...ros.diagnostics import ERROR, Finding, LinkDiagnostics, Report, Value, WARN
 from ...ros.diagnostics_publisher import DiagnosticsSource, MakeReports
-from ...ros.node import AnyCommand, CommandTopic, NodeInterface, Publication, STREAM_QOS
+from ...ros.node import AnyCommand, CommandTopic, NodeInterface, Publication
 from ...ros.parameters import ParameterError, ParameterSpec, Values
 from ...ros.payload import Host, RosPayload, ServedPayload, ShutdownReport
+from ...ros.qos import STREAM_QOS
 
 # The name of ROS in the lists of players.
 ROS = 'ros'

@@ -27,7 +27,7 @@ from .parameters import BeamGeometry
 from ..events import LightEvent, LightLost, StatusReceived
 from ..model import Mode, Status
 from ...payload.rotation import Quaternion
-from ...ros.node import STATE_QOS
+from ...ros.qos import STATE_QOS
 
 Point = tuple[float, float, float]
 

@@ -28,8 +28,9 @@ from .diagnostics import FlagLog
 from .. import events, model
 from ...payload.command_sources import DEFAULT, describe
 from ...ros.diagnostics import ERROR, WARN
-from ...ros.node import NodeInterface, Publication, STREAM_QOS
+from ...ros.node import NodeInterface, Publication
 from ...ros.parameters import DeviceParameters
+from ...ros.qos import STREAM_QOS
 from ...ros.throttled_log import NodeLog
 
 # One value of each status, by topic. ``enabled`` is first, since callers wait for it.

@@ -48,7 +48,7 @@ from ...payload.rotation import Vector
 from ...ros.conversions import GEOID_SEPARATION, quaternion_message
 from ...ros.device_nodes import ABSENCE_DELAY
 from ...ros.diagnostics_publisher import DiagnosticsSource, MakeReports
-from ...ros.node import Answer, NodeInterface, Publication, RequestService, STREAM_QOS
+from ...ros.node import Answer, NodeInterface, Publication, RequestService
 from ...ros.parameter_services import ParameterServices
 from ...ros.parameters import (
     DeviceParameters,
@@ -58,6 +58,7 @@ from ...ros.parameters import (
     Values,
 )
 from ...ros.payload import Host, RosPayload, ServedPayload
+from ...ros.qos import STREAM_QOS
 
 # The frame of ~/image/attitude: its axes point to east, north and up (REP-105).
 EARTH_FRAME = 'map'
