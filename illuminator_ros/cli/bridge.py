@@ -77,7 +77,7 @@ class Executable(NamedTuple):
 
 def usage(executable: Executable) -> str:
     """Return the text of ``--help``."""
-    from .options import invocation
+    from .arguments import invocation
     from ..ros.parameters import LINK_PARAMETERS, ParameterSpec
 
     kind, name = executable.load(), executable.name

@@ -33,17 +33,9 @@ import time
 from types import FrameType
 from typing import Any
 
+from ..arguments import invocation, option, Parser
 from ..entry_point import print_output
-from ..options import (
-    add_mavlink_version,
-    add_signing,
-    address,
-    invocation,
-    mavlink_version,
-    option,
-    Parser,
-    signing,
-)
+from ..options import add_mavlink_version, add_signing, address, mavlink_version, signing
 from ..payloads import DEFAULT_PAYLOAD, PAYLOADS
 from ..termination import SIGNALS
 from ...mavlink.link import Link

@@ -21,7 +21,8 @@ from collections.abc import Iterable, Mapping
 
 from .components import SettingError, Types
 from .console import describe_commands
-from ..options import add_mavlink_version, add_signing, invocation, option, Parser
+from ..arguments import invocation, option, Parser
+from ..options import add_mavlink_version, add_signing
 from ..payloads import DEFAULT_PAYLOAD, PAYLOADS
 from ...payload.payload_type import PayloadType
 from ...payload.simulated_settings import integer
