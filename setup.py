@@ -34,7 +34,8 @@ setup(
     # With package.xml's set by catkin_prepare_release, which wants it written here in full.
     version='0.1.0',
     packages=find_packages(include=[f'{package_name}*']),
-    package_data={package_name: ['py.typed', 'ros/fastdds.xml']},
+    package_data={package_name: [
+        'py.typed', 'ros/fastdds.xml', 'cli/monitor/monitor.tcss', 'cli/monitor/page.html']},
     data_files=[
         ('share/ament_index/resource_index/packages', [f'resource/{package_name}']),
         (f'share/{package_name}', ['package.xml']),
@@ -45,13 +46,13 @@ setup(
     # The oldest versions that the tests have passed with.
     install_requires=['setuptools', 'pymavlink>=2.4.50', 'fastcrc>=0.3'],
     extras_require={
-        'monitor': ['rich>=13.3'],
+        'monitor': ['textual>=8', 'textual-serve>=1.1'],
         'serial': ['pyserial>=3.5'],
         'yaml': ['pyyaml>=5.4'],
         # "colcon test" looks here for pytest.
         # scipy is the oracle for rotations; mavsdk is another player at a gimbal.
-        'test': ['pytest', 'pytest-timeout', 'hypothesis', 'pyserial', 'pyyaml', 'rich', 'scipy',
-                 'mavsdk>=4.1'],
+        'test': ['pytest', 'pytest-timeout', 'hypothesis', 'pyserial', 'pyyaml', 'scipy',
+                 'mavsdk>=4.1', 'textual>=8', 'textual-serve>=1.1'],
     },
     zip_safe=True,
     maintainer='The illuminator_ros developers',

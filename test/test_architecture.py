@@ -171,13 +171,27 @@ def test_shared_protocol_modules_name_no_payload() -> None:
 
 # The parts of the monitor that may use the terminal, and those that may use the ROS graph.
 @pytest.mark.parametrize(('part', 'foreign'), [
-    ('model', ROS | IO | TIME | {'rich'}), ('key_bindings', ROS | IO | TIME | THREADS | {'rich'}),
-    ('view', ROS | IO | TIME | THREADS), ('terminal', ROS | {'rich'}),
-    ('ros_graph', {'rich'} | IO | TIME | THREADS)])
+    ('table', ROS | IO | TIME | THREADS | {'textual'}), ('app', ROS | THREADS),
+    ('terminal', ROS), ('web', ROS | {'textual'}), ('ros_graph', {'textual'} | IO | THREADS)])
 def test_part_of_the_monitor_imports_only_its_own_libraries(
     part: str, foreign: set[str],
 ) -> None:
     assert roots(imports(f'{PACKAGE}.cli.monitor.{part}')) & foreign == set()
+
+
+def test_monitor_loads_no_mavlink() -> None:
+    pytest.importorskip('textual')
+    script = """
+import sys
+from illuminator_ros.cli.monitor import app, run
+from illuminator_ros.cli.payloads import PAYLOADS
+views = [one.load('view') for one in PAYLOADS.values() if one.view]
+print(len(views), *(name for name in sys.modules if 'mavlink' in name))
+"""
+    loaded = subprocess.run([sys.executable, '-c', script], cwd=ROOT, text=True, check=True,
+                            capture_output=True, env=environment()).stdout
+
+    assert loaded == '3\n'
 
 
 def tracked() -> list[Path]:

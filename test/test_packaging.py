@@ -32,15 +32,15 @@ PACKAGE = 'illuminator_ros'
 KEYS = {'fastcrc': 'python3-pymavlink-pip', 'hypothesis': 'python3-hypothesis',
         'numpy': 'python3-numpy',
         'pymavlink': 'python3-pymavlink-pip', 'pytest': 'python3-pytest',
-        'rich': 'python3-rich', 'scipy': 'python3-scipy', 'serial': 'python3-serial',
+        'scipy': 'python3-scipy', 'serial': 'python3-serial',
         'yaml': 'python3-yaml',
         'catkin_pkg': 'python3-catkin-pkg-modules'}
 
 pytestmark = pytest.mark.timeout(300)
-# Extras of setup.py.
-OPTIONAL = {'python3-rich'}
-# Modules without a rosdep key; tests skip if one is absent.
-PEERS = {'mavsdk'}
+# Modules of the extra "monitor", without a rosdep key.
+OPTIONAL = {'textual', 'textual_serve', 'aiohttp'}
+# Further ones without a key. Tests skip if one is absent.
+PEERS = {'mavsdk', *OPTIONAL}
 
 
 def imported(folder: Path) -> set[str]:

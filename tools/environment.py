@@ -40,11 +40,12 @@ VERSIONS = ((3, 12), (3, 11), (3, 10), (3, 13))
 # Lower bounds: the oldest with which the tests have passed. The wheels of ROS 2 Jazzy stand in
 # for a ROS installation; nothing of them is needed where ROS is sourced.
 ROS = ['ros-jazzy-rclpy[fastrtps]>=7.1', 'ros-jazzy-common-interfaces>=5.3']
-# rich, 14 MB with what it brings, draws the monitor; nothing else needs it.
-PACKAGE = ['pymavlink>=2.4.50', 'fastcrc>=0.3', 'pyserial>=3.5', 'rich>=13.3']
+# textual and textual-serve, 40 MB with what they bring, show the monitor; nothing else needs them.
+PACKAGE = ['pymavlink>=2.4.50', 'fastcrc>=0.3', 'pyserial>=3.5', 'textual>=8',
+           'textual-serve>=1.1']
 TEST = ['pytest>=8', 'pytest-timeout>=2.3', 'pytest-xdist>=3.8', 'hypothesis>=6.100',
         'pyyaml>=6', 'wheel>=0.38', 'ruff>=0.8', 'mypy>=1.13', 'colcon-common-extensions>=0.3',
-        'catkin_pkg>=0.5', 'scipy>=1.10']
+        'catkin_pkg>=0.5', 'scipy>=1.10', 'matplotlib>=3.8']
 # ROS's linters, which a ROS installation has, and the plugins for flake8 that rosdep and setup-ros
 # install with them. flake8-builtins as in Ubuntu 24.04: later ones have rules that ROS does not.
 LINT = ['ros-ament-lint>=0.17', 'ros-ament-flake8>=0.17', 'ros-ament-pep257>=0.17', 'flake8>=7',

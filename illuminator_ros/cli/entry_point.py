@@ -29,7 +29,8 @@ from .termination import Termination
 _REMEDIES = {
     'rclpy': 'source the setup file of ROS 2, as in "source /opt/ros/jazzy/setup.bash"',
     'fastcrc': 'pip install fastcrc',
-    'rich': "sudo apt install python3-rich, or pip install 'rich>=13.3'",
+    **dict.fromkeys(('textual', 'textual_serve', 'aiohttp'),
+                    "PIP_BREAK_SYSTEM_PACKAGES=1 pip install 'textual>=8' 'textual-serve>=1.1'"),
     # rclpy needs it.
     'yaml': 'sudo apt install python3-yaml, or pip install pyyaml',
     'visualization_msgs': 'sudo apt install ros-jazzy-visualization-msgs',

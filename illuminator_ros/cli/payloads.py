@@ -26,14 +26,17 @@ PAYLOADS: Mapping[str, PayloadType] = {one.name: one for one in (
     PayloadType(
         'illuminator', ros='illuminator_ros.illuminator.ros.lights:ILLUMINATOR',
         simulated='illuminator_ros.illuminator.simulated:SIMULATED',
-        checks='illuminator_ros.illuminator.checks.requirements:CHECKS'),
+        checks='illuminator_ros.illuminator.checks.requirements:CHECKS',
+        view='illuminator_ros.illuminator.ros.monitor_view:VIEW'),
     PayloadType('rededge', ros='illuminator_ros.rededge.ros.camera_node:REDEDGE',
                 simulated='illuminator_ros.rededge.simulated:SIMULATED',
-                checks='illuminator_ros.rededge.checks:CHECKS'),
+                checks='illuminator_ros.rededge.checks:CHECKS',
+                view='illuminator_ros.rededge.ros.monitor_view:VIEW'),
     PayloadType(
         'gimbal', ros='illuminator_ros.gimbal.ros.gimbals:GIMBAL',
         simulated='illuminator_ros.gimbal.simulated_device:SIMULATED',
-        checks='illuminator_ros.gimbal.checks.device:CHECKS'),
+        checks='illuminator_ros.gimbal.checks.device:CHECKS',
+        view='illuminator_ros.gimbal.ros.monitor_view:VIEW'),
     PayloadType(
         'gimbal_manager', ros='illuminator_ros.gimbal.ros.manager_node:GIMBAL_MANAGER',
         simulated='illuminator_ros.gimbal.simulated_manager:SIMULATED',

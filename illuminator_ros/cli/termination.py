@@ -60,15 +60,15 @@ class Termination:
         self.is_terminal = sys.stderr is not None and sys.stderr.isatty()
         self._output: OutputQueue | None = None
         self._lock = threading.Lock()
-        self._end: Callable[[], None] | None = None
-        self._last: Callable[[], None] | None = None
+        self._end: Callable[[], object] | None = None
+        self._last: Callable[[], object] | None = None
         self._signalled = False
         # When the process must have ended, s.
         self._deadline = math.inf
         atexit.register(self._write_output, OUTPUT_LIMIT)
         threading.Thread(target=self._wait, name='termination', daemon=True).start()
 
-    def calls(self, end: Callable[[], None], last: Callable[[], None] | None = None) -> None:
+    def calls(self, end: Callable[[], object], last: Callable[[], object] | None = None) -> None:
         """
         Call ``end()`` on the first signal; without it a signal ends the process at once.
 
@@ -127,7 +127,7 @@ class Termination:
             self._output.finish(max(until - time.monotonic(), OVERDUE_OUTPUT_LIMIT))
 
 
-def _run_in_thread(function: Callable[[], None]) -> threading.Thread | None:
+def _run_in_thread(function: Callable[[], object]) -> threading.Thread | None:
     """Call a function in a new thread or, if no thread can be started, in this one."""
     thread = threading.Thread(target=function, name='end', daemon=True)
     try:

@@ -31,18 +31,20 @@ class PayloadType(NamedTuple):
     :param ros: its node, topics, services and parameters.
     :param simulated: its simulated device.
     :param checks: the requirements that ``conformance`` checks.
+    :param view: how the monitor shows its devices.
     """
 
     name: str
     ros: str = ''
     simulated: str = ''
     checks: str = ''
+    view: str = ''
 
     def load(self, part: str) -> Any:
         """
         Import a part and return it.
 
-        :param part: ``ros``, ``simulated`` or ``checks``.
+        :param part: ``ros``, ``simulated``, ``checks`` or ``view``.
         :raises LookupError: if the payload does not have that part.
         """
         module, _, attribute = getattr(self, part).partition(':')

@@ -19,9 +19,9 @@ import re
 from typing import Any
 
 from illuminator_ros.cli.bridge import Executable, usage
-from illuminator_ros.cli.monitor import key_bindings, model
 from illuminator_ros.cli.monitor import ros_graph as graph
-from illuminator_ros.cli.monitor.run import parser
+from illuminator_ros.cli.monitor.run import DEFAULT_WEB, parser
+from illuminator_ros.cli.payloads import PAYLOADS
 from illuminator_ros.gimbal.ros.gimbals import GIMBAL_PARAMETERS
 from illuminator_ros.gimbal.ros.manager_node import MANAGER_PARAMETERS
 from illuminator_ros.illuminator.messages import IlluminatorStatus
@@ -30,6 +30,7 @@ from illuminator_ros.illuminator.ros.parameters import DEVICE_PARAMETERS, LIGHT_
 from illuminator_ros.mavlink.dialect import entry_names, mavlink, short_names
 from illuminator_ros.mavlink.messages import CommandAck, ComponentInformationBasic
 from illuminator_ros.rededge.ros import camera_node as camera
+from illuminator_ros.ros import monitor_view
 from illuminator_ros.ros.parameters import LINK_PARAMETERS as SHARED_PARAMETERS
 from illuminator_ros.ros.parameters import ParameterSpec
 import pytest
@@ -149,13 +150,26 @@ def test_the_protocol_page_has_each_command_and_error_flag() -> None:
         assert rows[f'{name} ({flag})'] == [LEVELS[level], text]
 
 
-def test_the_monitor_page_has_the_keys_states_and_limits_of_the_code() -> None:
-    assert [(tuple(re.findall('`([^`]+)`', cells[0])), cells[1])
-            for cells in table(MONITOR, 'key')] == [
-                (keys, text) for keys, text, _ in key_bindings.BINDINGS]
-    assert [cells[0] for cells in table(MONITOR, 'state')] == [
-        f'`{state.value}`' for state in model.State]
-    assert all(f'`{topic}`' in MONITOR for topic in graph.SIGNATURE)
-    for text in (f'for {model.SILENCE:g} s', f'within {graph.ANSWER_LIMIT:g} s',
-                 f'`--wait` {parser().get_default("wait"):g} s'):
+def test_the_monitor_page_has_the_keys_states_topics_and_limits_of_the_code() -> None:
+    app = pytest.importorskip('illuminator_ros.cli.monitor.app')
+    web = pytest.importorskip('illuminator_ros.cli.monitor.web')
+    views = [one.load('view') for one in PAYLOADS.values() if one.view]
+
+    def keys(heading: str) -> list[tuple[tuple[str, ...], str]]:
+        return [(tuple(re.findall('`([^`]+)`', cells[0])), cells[1])
+                for cells in table(MONITOR, heading)]
+
+    assert keys('key') == [(names, text) for names, text, _, _ in app.COMMON_KEYS]
+    for view in views:
+        assert keys(f'key for a {view.kind}') == [(key.keys, key.text) for key in view.keys]
+    assert [[kind, topics] for kind, topics, _ in table(MONITOR, 'kind')] == [
+        [view.kind, ', '.join(f'`{topic}`' for topic in view.signature)] for view in views]
+    assert [word for cells in table(MONITOR, 'state') for word in re.findall('`(.+?)`', cells[0])
+            ] == [*dict.fromkeys(word for view in sorted(views, key=lambda view: len(view.states),
+                                                         reverse=True) for word in view.states),
+                  *monitor_view.STATES]
+    for text in (f'for {monitor_view.SILENCE:g} s', f'within {graph.ANSWER_LIMIT:g} s',
+                 f'`--wait` {parser().get_default("wait"):g} s', f'{web.MAX_TABS} at most',
+                 f'after {app.QUESTION_LIFETIME:g} s', f'http://{DEFAULT_WEB}/'):
         assert text in MONITOR
+

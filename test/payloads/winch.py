@@ -38,7 +38,8 @@ from illuminator_ros.payload.listeners import Listeners
 from illuminator_ros.payload.payload_type import PayloadType
 
 WINCH = PayloadType('winch', ros='payloads.winch_ros:WINCH',
-                    simulated='payloads.winch:SIMULATED', checks='payloads.winch_checks:CHECKS')
+                    simulated='payloads.winch:SIMULATED', checks='payloads.winch_checks:CHECKS',
+                    view='payloads.winch_view:VIEW')
 
 WinchStatus = mavlink.MAVLink_winch_status_message
 # s without a message after which a winch is lost.

@@ -12,118 +12,128 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""The monitor in a ROS graph: the lights that it finds, their values, and its requests."""
+"""The monitor in a ROS graph: the devices that it finds, their values, and its requests."""
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 import contextlib
-from typing import Any
+import time
+from typing import Any, cast
 
-from illuminator_ros.cli.monitor import key_bindings
-from illuminator_ros.cli.monitor.model import Light, Outcome, State
-from illuminator_ros.cli.monitor.ros_graph import lights_among, TOPICS
-from illuminator_ros.cli.monitor.run import Monitor
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
+from illuminator_ros.cli.monitor import ros_graph
+from illuminator_ros.cli.payloads import PAYLOADS
+from illuminator_ros.gimbal.ros.gimbal_node import PUBLICATIONS as GIMBAL_TOPICS
 from illuminator_ros.illuminator.ros.event_publisher import PUBLICATIONS
+from illuminator_ros.illuminator.ros.monitor_view import VIEW as LIGHT
 from illuminator_ros.ros.graph import type_name
+from illuminator_ros.ros.monitor_view import Device, View
+from payloads.winch import WINCH
 import pytest
 from rclpy.node import Node
-from std_msgs.msg import Bool, Float32, UInt32
+from std_msgs.msg import Bool, Float32, String, UInt32
 from support.light import ServedLight
-from support.ros import Ros, STATE
+from support.processes import ended, python
+from support.ros import Ros, running_bridge, STATE, STREAM
 from support.slow import CLOCK
-from support.waiting import eventually, PATIENCE
+from support.waiting import eventually
 
-VALUES = {'temperature': 61.5, 'mode': 'external_sync', 'connected': True, 'enabled': True,
-          'brightness': 30.0, 'strobe_period': 0.5, 'strobe_duty_cycle': 20.0}
-SIGNATURE = {f'/bow/{topic}': type_name(TOPICS[topic])
-             for topic in ('connected', 'enabled', 'brightness', 'error_flags')}
+VIEWS: list[View] = [one.load('view') for one in (*PAYLOADS.values(), WINCH) if one.view]
+TYPES: dict[str, type[Any]] = {
+    'connected': Bool, 'enabled': Bool, 'brightness': Float32, 'error_flags': UInt32}
+SIGNATURE = {f'/bow/{topic}': type_name(type_) for topic, type_ in TYPES.items()}
 
 
 class Watching:
     """A monitor in the domain of a ROS client, by the slow clock."""
 
     def __init__(self, ros: Ros) -> None:
-        self._node = Node('monitor', context=ros.context, enable_rosout=False,
-                          start_parameter_services=False)
-        self._monitor = Monitor(self._node, CLOCK)
+        self.node = Node('monitor', context=ros.context, enable_rosout=False,
+                         start_parameter_services=False)
+        self.graph = ros_graph.Graph(self.node, VIEWS, clock=CLOCK)
 
     def close(self) -> None:
         """End the monitor."""
-        self._monitor.end()
-        self._node.destroy_node()
+        self.node.destroy_node()
 
     @property
     def names(self) -> list[str]:
-        """Return the names of the lights."""
-        return [light.name for light in self._monitor.lights()]
+        """Return the names of the devices, after a poll."""
+        self.graph.poll()
+        return [device.name for device in self.graph.devices]
 
-    def light(self, name: str = '/illuminator') -> Light:
-        """Return the known state of a light."""
-        [light] = [light for light in self._monitor.lights() if light.name == name]
-        return light
+    def wait(self, condition: Callable[[Device], Any], name: str = '/illuminator') -> Device:
+        """Wait until a device is known and the condition holds; return it."""
+        eventually(lambda: name in self.names)
+        [found] = [device for device in self.graph.devices if device.name == name]
+        eventually(lambda: self.names and condition(found))
+        return found
 
-    def wait(self, condition: Callable[[Light], Any], name: str = '/illuminator',
-             timeout: float = PATIENCE) -> Light:
-        """Wait until a light is known and the condition holds; return it."""
-        eventually(lambda: name in self.names, within=timeout)
-        eventually(lambda: condition(self.light(name)), within=timeout)
-        return self.light(name)
-
-    def wait_names(self, *names: str) -> None:
-        """Wait until the monitor has exactly these lights."""
-        eventually(lambda: self.names == sorted(names))
-
-    def ask(self, ask: key_bindings.Ask, name: str = '/illuminator') -> None:
-        """Send a request to a light."""
-        self._monitor.graph.submit(name, ask)
-
-    def outcome(self, text: str, outcome: Outcome, name: str = '/illuminator') -> str:
-        """Wait until a request has this outcome, and return the answer."""
-        light = self.wait(lambda light: light.action and light.action.text == text
-                          and light.action.outcome is outcome, name)
-        assert light.action is not None
-        return light.action.answer
-
-    def clear_gone(self) -> None:
-        """Forget the lights that are gone."""
-        self._monitor.graph.clear_gone()
+    def press(self, key: str, name: str = '/illuminator') -> str:
+        """Send the request of a key, wait for its outcome, and return outcome and answer."""
+        device = self.wait(lambda _: True, name)
+        [found] = [one for one in device.view.keys if key in one.keys]
+        request = found.request(device, '')
+        assert not isinstance(request, str), request
+        self.graph.submit(device, request)
+        self.wait(lambda device: device.action and device.action[1][0] != '...', name)
+        assert device.action is not None
+        return f'{device.action[1][0]}: {device.action[2]}'
 
 
-@pytest.fixture(scope='module')
-def monitor(ros: Ros, shared_bridge: object) -> Iterator[Watching]:
-    """Watch the module's domain."""
-    with contextlib.closing(Watching(ros)) as made:
+@pytest.fixture
+def monitor(own_ros: Ros) -> Iterator[Watching]:
+    """Watch a domain of the test's own."""
+    with contextlib.closing(Watching(own_ros)) as made:
         yield made
 
 
-def test_monitor_shows_a_light_with_the_link_and_identity_and_sends_its_requests(
-    light: ServedLight, monitor: Watching,
+def test_monitor_shows_a_light_with_link_and_identity_and_sends_its_requests(
+    own_ros: Ros, port: int, monitor: Watching,
 ) -> None:
-    monitor.wait(lambda light: light.state(light.heard_at) is State.OFF)
-    assert monitor.names == ['/illuminator']
+    with (running_bridge(own_ros.domain, port, diagnostics_period=0.1),
+          ServedLight(port, error_status=1, brightness=30.0, temp_c=61.5) as light):
+        monitor.wait(lambda device: device.state == 'off')
+        assert monitor.press('space').startswith('done: on, confirmed by ILLUMINATOR_STATUS')
+        monitor.wait(lambda device: device.state == 'ON')
+        assert monitor.press('s').startswith('done')
+        # The agreed brightness counts, not the reported one of a hot light.
+        monitor.wait(lambda device: device.diagnosed('lamp', 'agreed'))
+        assert monitor.press('+').startswith('done')
+        assert monitor.press('r').startswith('done')
 
-    light.report(brightness=30.0, temp_c=61.5, error_status=1, strobe_period=0.5,
-                 strobe_duty_cycle=20.0, mode=2)
-    monitor.ask(key_bindings.switch)
-
-    assert 'confirmed by ILLUMINATOR_STATUS' in monitor.outcome('on', Outcome.DONE)
-    shown = monitor.wait(
-        lambda light: light.flags == ['thermal throttling'] and light.link and light.lamp
-        and all(light.value(name) == value for name, value in VALUES.items())
-        and light.link.number('round_trip_p50_ms') is not None)
-    assert shown.link is not None and shown.link.number('loss_percent') == 0.0
-    assert shown.lamp is not None and shown.lamp.values['vendor'] == 'maker'
-    assert light.fake.fields['enable'] == 1
-    for ask, text in ((key_bindings.refresh, 'refresh'), (key_bindings.strobe, 'no strobe')):
-        monitor.ask(ask)
-        monitor.outcome(text, Outcome.DONE)
-    assert light.fake.fields['strobe_period'] == 0.0
-    light.report(mode=1, error_status=0, brightness=45.0)
-    monitor.wait(lambda light: light.setpoint == 45.0)
+        shown = monitor.wait(lambda device: device.number('link', 'round_trip_p50_ms'))
+        assert shown.diagnosed('lamp', 'vendor') == 'maker'
+        assert shown.values['temperature'] == 61.5
+        assert (light.fake.fields['strobe_period'], light.fake.fields['brightness']) == (1.0, 40.0)
 
 
-def test_topics_of_the_monitor_are_those_of_a_light() -> None:
-    # The monitor has a table of its own, since the import of the bridge's takes 0.15 s.
-    assert {one.name: one.type for one in PUBLICATIONS} == TOPICS
+@pytest.mark.parametrize(('simulated', 'module', 'keys'), [
+    ('gimbal_manager', 'gimbal', 'tl'), ('rededge', 'rededge', ('p', 'space'))])
+def test_monitor_operates_a_gimbal_and_a_camera(
+    own_ros: Ros, port: int, monitor: Watching, simulated: str, module: str, keys: Sequence[str],
+) -> None:
+    # By the clock of this machine: by the slow one, a capture takes long.
+    url = f'127.0.0.1:{port}'
+    with (ended(python('illuminator_ros.simulator', f'udpout://{url}', '--payload', simulated)),
+          ended(python(f'illuminator_ros.{module}', f'udpin://{url}', env={
+              'ROS_DOMAIN_ID': str(own_ros.domain)})) as node):
+        node.wait_for('link open')
+        monitor.wait(lambda device: device.state == 'ok', f'/{module}')
+        for key in keys:
+            # Again where the machine has paused for longer than a heartbeat may.
+            while not monitor.press(key, f'/{module}').startswith('done'):
+                pass
+        # An attitude, or the image that was captured.
+        topic = {'gimbal': 'angles', 'rededge': 'image/index'}[module]
+        monitor.wait(lambda device: topic in device.values, f'/{module}')
+
+
+def test_topics_of_the_views_are_those_of_the_nodes() -> None:
+    # The views have tables of their own, since those of the nodes would import MAVLink.
+    for view, publications in ((VIEWS[0], PUBLICATIONS), (VIEWS[2], GIMBAL_TOPICS)):
+        published = {one.name: one.type for one in publications} | {'source': String}
+        assert {name: topic.type for name, topic in view.topics.items()}.items() <= (
+            published.items())
 
 
 class FakeBridge:
@@ -131,32 +141,70 @@ class FakeBridge:
 
     def __init__(self, ros: Ros, name: str) -> None:
         self._node = ros.node
-        self._publishers = []
-        for topic, message in (('connected', Bool(data=True)), ('enabled', Bool(data=True)),
-                               ('brightness', Float32(data=10.0)), ('error_flags', UInt32())):
-            self._publishers.append(
-                self._node.create_publisher(TOPICS[topic], f'{name}/{topic}', STATE))
-            self._publishers[-1].publish(message)
+        self.publishers = {}
+        for topic, value in (('connected', True), ('enabled', True), ('brightness', 10.0),
+                             ('error_flags', 0)):
+            self.publishers[topic] = self._node.create_publisher(
+                TYPES[topic], f'{name}/{topic}', STATE)
+            self.publishers[topic].publish(TYPES[topic](data=value))
 
     def destroy(self) -> None:
         """Leave the graph."""
-        for publisher in self._publishers:
+        for publisher in self.publishers.values():
             self._node.destroy_publisher(publisher)
 
 
-def test_light_that_leaves_is_marked_can_be_cleared_and_can_return(own_ros: Ros) -> None:
-    with contextlib.closing(Watching(own_ros)) as monitor:
-        first = FakeBridge(own_ros, '/one')
-        FakeBridge(own_ros, '/two')
-        monitor.wait_names('/one', '/two')
+def test_device_that_leaves_is_gone_can_be_cleared_and_can_return(
+    own_ros: Ros, monitor: Watching,
+) -> None:
+    first = FakeBridge(own_ros, '/one')
+    FakeBridge(own_ros, '/two')
+    eventually(lambda: monitor.names == ['/one', '/two'])
 
-        first.destroy()
-        monitor.wait(lambda light: light.gone_at is not None, '/one')
-        monitor.clear_gone()
-        monitor.wait_names('/two')
+    first.destroy()
+    monitor.wait(lambda device: device.state == 'gone', '/one')
+    again = FakeBridge(own_ros, '/one')
+    monitor.wait(lambda device: device.state == 'ON', '/one')
+    again.destroy()
+    monitor.wait(lambda device: device.state == 'gone', '/one')
+    monitor.graph.clear_gone()
+    assert monitor.names == ['/two']
 
-        FakeBridge(own_ros, '/one')
-        monitor.wait(lambda light: light.value('brightness') == 10.0, '/one')
+    FakeBridge(own_ros, '/one')
+    monitor.wait(lambda device: device.values.get('brightness') == 10.0, '/one')
+
+
+def test_hostile_graph_neither_stops_nor_fills_the_monitor(
+    own_ros: Ros, monitor: Watching, monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr(ros_graph, 'MAX_DEVICES', 3)
+    bridges = [FakeBridge(own_ros, f'/l{number}') for number in range(5)]
+    mode = own_ros.node.create_publisher(String, '/l0/mode', STATE)
+    mode.publish(String(data='\x1b[2J' + 'x' * 5000))
+    diagnostics = own_ros.node.create_publisher(DiagnosticArray, '/diagnostics', STREAM)
+    monitor.wait(lambda device: device.state == 'ON' and 'mode' in device.values, '/l0')
+    eventually(lambda: len(monitor.names) == 3)
+
+    def flood() -> bool:
+        for kind in range(8):
+            diagnostics.publish(DiagnosticArray(status=[DiagnosticStatus(
+                level=bytes([255]), name=f'x: {kind}\x1b', message='\x07' * 9, values=[
+                    KeyValue(key='node', value='/l0'), KeyValue(key='k', value='\r\n'),
+                    *(KeyValue(key=f'k{number}', value='v') for number in range(999))])]))
+        # Too large to be read, and broken.
+        mode.publish(String(data='y' * 100_000))
+        for one in (diagnostics, bridges[0].publishers['enabled']):
+            one.publish(b'\0\1\0\0\xff\xff\xff\xff')
+        return bool(monitor.names and monitor.graph.devices[0].diagnoses)
+
+    eventually(flood)
+    shown = monitor.wait(lambda device: len(device.diagnoses) == ros_graph.MAX_DIAGNOSES, '/l0')
+    assert (shown.values['enabled'], shown.state) == (True, 'ON')
+    assert shown.values['mode'] == ' [2J' + 'x' * (ros_graph.MAX_TEXT - 4)
+    for one in shown.diagnoses.values():
+        assert (one.level, one.message) == (3, ' ' * 9)
+        assert len(one.values) == ros_graph.MAX_VALUES
+    assert all(text.isprintable() for text in shown.diagnoses)
 
 
 @pytest.mark.parametrize(('topics', 'publishers', 'found'), [
@@ -173,4 +221,27 @@ def test_light_is_a_node_that_publishes_all_its_signature_topics_with_their_type
 ) -> None:
     listed = [(name, [type_]) for name, type_ in topics.items()]
 
-    assert lights_among(listed, lambda topic: int(topic in publishers)) == found
+    assert [*ros_graph.devices_among(listed, VIEWS, lambda topic: int(topic in publishers))
+            ] == found
+
+
+def test_hundred_lights_at_10_hz_take_less_than_a_third_of_a_core(
+    own_ros: Ros, monitor: Watching, monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    topics = [f'/l{number}/{topic}' for number in range(100) for topic in LIGHT.topics]
+    publishers = [own_ros.node.create_publisher(
+        LIGHT.topics[name.rpartition('/')[2]].type, name,
+        STATE if LIGHT.topics[name.rpartition('/')[2]].is_state else STREAM) for name in topics]
+    eventually(lambda: len(monitor.names) == 100)
+    # Each value changes each time, which is the worst case.
+    messages = [cast(Any, one.msg_type)() for one in publishers]
+    spent = 0.0
+    for _ in range(20):
+        for one, message in zip(publishers, messages, strict=True):
+            one.publish(message)
+        before = time.thread_time()
+        monitor.graph.poll()
+        spent += time.thread_time() - before
+
+    # 0.25 s lie between two polls.
+    assert spent / 20 < 0.25 * 0.3

@@ -42,8 +42,8 @@ def main(module: str) -> None:
     place: Any = import_module(PLACES[module])
     if hasattr(place, 'Link'):
         place.Link = SlowLink
-    if hasattr(place, 'Monitor'):
-        place.Monitor = partial(place.Monitor, clock=CLOCK)
+    if hasattr(place, 'Graph'):
+        place.Graph = partial(place.Graph, clock=CLOCK)
     # An orderly end may take longer on a busy machine.
     import_module('illuminator_ros.cli.termination').LIMIT = PATIENCE  # type: ignore[attr-defined]
     if hasattr(place, 'OFF_LIMIT'):

@@ -28,6 +28,7 @@ from support.ports import free_port
 from support.processes import python, ROOT, run
 
 PROGRAMS = ('bridge', 'simulator', 'monitor')
+MONITOR_REMEDY = "PIP_BREAK_SYSTEM_PACKAGES=1 pip install 'textual>=8' 'textual-serve>=1.1'"
 ROS_REMEDY = 'source the setup file of ROS 2, as in "source /opt/ros/jazzy/setup.bash"'
 
 
@@ -154,7 +155,7 @@ def test_wrong_argument_is_one_line_with_status_2(
 
 @pytest.mark.parametrize(('command', 'package', 'remedy'), [
     ('bridge', 'rclpy', ROS_REMEDY), ('monitor', 'rclpy', ROS_REMEDY),
-    ('monitor', 'rich', "sudo apt install python3-rich, or pip install 'rich>=13.3'"),
+    ('monitor --web', 'textual_serve', MONITOR_REMEDY),
     ('bridge', 'fastcrc', 'pip install fastcrc'),
     ('bridge', 'yaml', 'sudo apt install python3-yaml, or pip install pyyaml'),
     ('bridge --ros-args -p beam_range:=5.0', 'visualization_msgs',

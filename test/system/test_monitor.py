@@ -14,6 +14,7 @@
 
 """``monitor`` as a process, with and without a terminal."""
 
+import json
 import os
 import re
 import signal
@@ -45,6 +46,8 @@ def test_keys_switch_and_dim_the_light(own_ros: Ros, port: int) -> None:
         screen.wait_for('/illuminator off')
 
         screen.type(' ')
+        screen.wait_for('It can dazzle')
+        screen.type('\r')
         screen.wait_for('on: done')
         screen.type('\x1b[D')
         screen.wait_for('brightness 90 %: done')
@@ -56,7 +59,7 @@ def test_keys_switch_and_dim_the_light(own_ros: Ros, port: int) -> None:
     'q', '\x03', 'SIGTERM', 'SIGQUIT', 'SIGHUP'])
 def test_end_restores_the_terminal(own_ros: Ros, way: str) -> None:
     with monitor(own_ros) as screen:
-        screen.wait_for('no lights in this ROS graph yet')
+        screen.wait_for('no devices in this ROS graph yet')
 
         if way.startswith('SIG'):
             screen.send(signal.Signals[way])
@@ -78,7 +81,7 @@ def test_stopped_monitor_restores_the_terminal_until_it_continues(
 ) -> None:
     shell = f'{job} & echo pid $!; fg; echo in the shell; read line; fg'
     with monitor(own_ros, shell=shell) as screen:
-        screen.wait_for('no lights in this ROS graph yet')
+        screen.wait_for('no devices in this ROS graph yet')
 
         if way == '\x1a':
             screen.type(way)
@@ -90,7 +93,7 @@ def test_stopped_monitor_restores_the_terminal_until_it_continues(
 
         screen.forget()
         screen.type('\n')
-        screen.wait_for('no lights in this ROS graph yet')
+        screen.wait_for('no devices in this ROS graph yet')
         screen.type('q')
         assert screen.wait() == 0
         eventually(lambda: screen.restored)
@@ -98,7 +101,7 @@ def test_stopped_monitor_restores_the_terminal_until_it_continues(
 
 def test_monitor_ends_with_status_0_when_its_terminal_closes(own_ros: Ros) -> None:
     with monitor(own_ros) as screen:
-        screen.wait_for('no lights in this ROS graph yet')
+        screen.wait_for('no devices in this ROS graph yet')
 
         screen.hang_up()
 
@@ -107,12 +110,12 @@ def test_monitor_ends_with_status_0_when_its_terminal_closes(own_ros: Ros) -> No
 
 def test_screen_follows_the_size_of_the_terminal(own_ros: Ros) -> None:
     with monitor(own_ros, size=(24, 100)) as screen:
-        screen.wait_for('a all off')
+        screen.wait_for('a ALL OFF')
 
         screen.forget()
         screen.resize(5, 30)
 
-        screen.wait_for('space on/off [+]/- brightness …')
+        screen.wait_for('ROS graph y( |$)')
 
 
 def test_without_a_terminal_monitor_prints_a_table(own_ros: Ros) -> None:
@@ -123,7 +126,10 @@ def test_without_a_terminal_monitor_prints_a_table(own_ros: Ros) -> None:
         outcome = run(MONITOR, '--wait', '20', env=domain(own_ros))
         failed = run(MONITOR, '--once', '--wait', '20', env=domain(own_ros),
                      redirection='> /dev/full')
+        loaded = run(MONITOR, '--json', '--wait', '20', env=domain(own_ros))
 
+    [one] = json.loads(loaded.stdout)
+    assert (one['name'], one['values']['brightness']) == ('/illuminator', 30.0)
     heading, row = outcome.stdout.splitlines()
     assert heading.split()[:3] == ['LIGHT', 'STATE', 'BRIGHT']
     assert row.split()[:4] == ['/illuminator', 'off', '30', '%']
@@ -133,7 +139,7 @@ def test_without_a_terminal_monitor_prints_a_table(own_ros: Ros) -> None:
 
 
 @pytest.mark.parametrize(('redirection', 'error'), [
-    ('', 'monitor: no light found within 0.1 s: check that a bridge runs, with '
+    ('', 'monitor: no device found within 0.1 s: check that a bridge runs, with '
          'ROS_DOMAIN_ID={domain} as here\n'),
     ('>&-', 'monitor: standard output is closed\n')])
 def test_failure_is_one_line_with_status_1(own_ros: Ros, redirection: str, error: str) -> None:

@@ -198,7 +198,7 @@ def test_hanging_program_is_forced_to_end_within_a_second() -> None:
 
 @pytest.mark.parametrize('name', ['bridge', 'simulator', 'conformance', 'monitor'])
 def test_signals_are_handled_before_anything_slow_is_imported(name: str) -> None:
-    slow = {'rclpy', 'pymavlink', 'argparse', 'logging', 'numpy', 'socket', 'rich'}
+    slow = {'rclpy', 'pymavlink', 'argparse', 'logging', 'numpy', 'socket', 'textual'}
 
     loaded = subprocess.run(
         [sys.executable, '-c', f'import sys, illuminator_ros.{name}; print(*sys.modules)'],

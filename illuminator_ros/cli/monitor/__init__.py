@@ -13,30 +13,34 @@
 # limitations under the License.
 
 """
-The executable ``monitor``: the lights in a ROS graph, as ``top`` shows processes.
+The executable ``monitor``: the devices in a ROS graph, as ``top`` shows processes.
 
-``model`` holds the lights, ``key_bindings`` the meaning of keys, ``view`` the screen: without ROS
-and without a clock. ``ros_graph`` fills the model from the ROS graph and calls services,
-``terminal`` is the terminal, ``run`` the command line.
+``ros_graph`` takes their values from the ROS graph and sends requests, ``app`` is the screen,
+``table`` its columns, ``terminal`` the terminal, ``web`` the server for browsers, ``run`` the
+command line. Each payload has a view of its own (``ros/monitor_view.py``).
 """
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 import signal
 
 from ..entry_point import run_program
+from ..payloads import PAYLOADS
 from ..termination import Termination
+from ...payload.payload_type import PayloadType
 
 
-def main(args: list[str] | None = None) -> int:
+def main(args: list[str] | None = None, payloads: Mapping[str, PayloadType] = PAYLOADS) -> int:
     """
-    Show the lights until ``q`` or a signal; see :mod:`~.run`.
+    Show the devices until ``q`` or a signal; see :mod:`~.run`.
 
     :param args: the command line without the program's name.
+    :param payloads: the payloads whose devices are shown.
     """
     def start(termination: Termination) -> int:
         from .run import run
-        return run(args, termination)
+        return run(args, termination, payloads)
 
     # Ctrl-\ too: it would leave the terminal without echo.
     return run_program('monitor', start, more=[signal.SIGQUIT])

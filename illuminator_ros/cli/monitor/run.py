@@ -12,15 +12,17 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""The monitor as a process: command line, node, and the loop of the screen."""
+"""The monitor as a process: command line, node, and the screen or one table."""
 
 from __future__ import annotations
 
 import argparse
-from collections.abc import Callable
-import io
+import asyncio
+from collections.abc import Mapping
+import functools
 import os
 import sys
+import termios
 import threading
 import time
 import uuid
@@ -29,42 +31,22 @@ import rclpy
 from rclpy.node import Node
 from rclpy.signals import SignalHandlerOptions
 from rclpy.utilities import remove_ros_args
-from rich.console import Console
-from rich.live import Live
 
-from . import terminal
-from .key_bindings import KeyBindings, KeyDecoder
-from .model import DiscoveredLights, Light
 from .ros_graph import Graph
-from .view import plain, screen, ViewState
-from ..entry_point import (
-    CANNOT_CREATE,
-    log_directory_refusal,
-    one_line,
-    parameter_file_refusal,
-    print_output,
-    start_failure,
-    wrong_arguments,
-)
-from ..options import option, Parser
+from .table import as_json, plain
+from .. import entry_point
+from ..arguments import option, Parser
 from ..termination import Termination
-from ...payload.simulated_settings import number
-from ...ros.executor import NodeExecutor
-from ...ros.throttled_log import NodeLog
+from ...payload.payload_type import PayloadType
+from ...ros.monitor_view import Device, LOST, NOT_KNOWN
 
-# s between updates of the screen.
-INTERVAL = 0.25
-# s without a new light after which the table counts as complete.
+# s without a new device after which the table counts as complete.
 SETTLING = 1.0
-# s to wait for the thread: an interpreter that ends while the thread is inside rclpy aborts. After
-# a signal the process ends sooner.
-END_LIMIT = 5.0
-# Characters; enough for each column of a table for a file or a pipe.
-PLAIN_WIDTH = 400
+DEFAULT_WEB = '127.0.0.1:8000'
 DESCRIPTION = """\
-Shows the lights in a ROS graph: state, brightness, strobe, temperature, link and errors of each
-light of every bridge. Keys switch and dim the selected one; ? lists them. If standard input or
-output is not a terminal, it prints one table and ends.
+Shows the lights, gimbals and cameras of all bridges in a ROS graph, in a terminal or a browser,
+with keys and clicks to operate the selected one; ? lists them. If standard input or output is not
+a terminal, it prints one table and ends.
 """
 EPILOG = """\
 examples:
@@ -72,61 +54,79 @@ examples:
   ros2 run illuminator_ros monitor --once | grep LOST
   NO_COLOR=1 ros2 run illuminator_ros monitor
 
-exit status: 0 after q or a signal, or with a table printed; 1 if no light was found for that
-table, or a package is missing; 2 if an argument is wrong.
+exit status: 0 after q or a signal, or with a table printed; 1 if no device was found for that
+table, the address cannot be used, or a package is missing; 2 if an argument is wrong.
 """
 
 
-class Monitor:
+def address(text: str) -> tuple[str, int]:
     """
-    The lights that a node discovers, in a thread of its own.
+    Return host and port of an address.
 
-    :ivar clock: returns the time, s.
-    :ivar lights: returns copies of the lights as they are now.
+    :raises ValueError: if it is none.
     """
+    host, _, port = text.rpartition(':')
+    if not (host and port.isascii() and port.isdigit() and int(port) < 65536):
+        raise ValueError('is not HOST:PORT')
+    return host.strip('[]'), int(port)
 
-    def __init__(self, node: Node, clock: Callable[[], float] = time.monotonic) -> None:
-        self.clock = clock
-        lights = DiscoveredLights()
-        self.lights = lights.snapshot
-        self.graph = Graph(node, lights, clock)
-        self._executor = NodeExecutor(node.context, NodeLog(node.get_logger()))
-        self._executor.add_node(node)
-        self._thread = threading.Thread(target=self._executor.run, name='ros', daemon=True)
-        self._thread.start()
 
-    def end(self) -> None:
-        """End the thread."""
-        self._executor.end()
-        self._thread.join(END_LIMIT)
+def seconds(text: str) -> float:
+    """
+    Return a length of time, s.
+
+    :raises ValueError: if it is none.
+    """
+    if not 0.1 <= float(text) <= 3600:
+        raise ValueError(f'{text} is outside 0.1 to 3600')
+    return float(text)
 
 
 def parser() -> argparse.ArgumentParser:
     """Return the parser of the command line."""
     made = Parser('monitor', DESCRIPTION, EPILOG)
+    made.add_argument('--source', default='', metavar='NAME',
+                      help='source of commands to use for devices that have sources')
+    made.add_argument('--web', type=option(address), nargs='?', const=address(DEFAULT_WEB),
+                      metavar='HOST:PORT', help=f'serve a browser (default: {DEFAULT_WEB})')
+    made.add_argument('--token', action='store_true',
+                      help='admit a browser only by a one-time token, which the printed URL has; '
+                           'every address except loopback needs it')
     made.add_argument('--once', action='store_true', help='print one table and end')
-    made.add_argument('--wait', type=option(number(0.1, 3600)), default=6.0, metavar='S',
-                      help='longest search for lights before that table, s (default: 6)')
-    made.add_argument('--ascii', action='store_true',
-                      help='draw with ASCII characters only')
+    made.add_argument('--json', action='store_true', help='print all values as JSON and end')
+    made.add_argument('--wait', type=option(seconds), default=6.0, metavar='S',
+                      help='longest search for devices before that table, s (default: 6)')
+    made.add_argument('--ascii', action='store_true', help='draw with ASCII characters only')
     return made
 
 
-def run(args: list[str] | None, termination: Termination) -> int:
+def complain(reason: str) -> None:
+    """Print why something failed."""
+    print(f'monitor: {reason}', file=sys.stderr)
+
+
+def run(
+    args: list[str] | None, termination: Termination, payloads: Mapping[str, PayloadType],
+) -> int:
     """Run the monitor; see the text of ``--help``."""
     arguments = sys.argv[1:] if args is None else args
-    failed = wrong_arguments('monitor')
+    failed = entry_point.wrong_arguments('monitor')
+    # textual-serve runs this command line again, for each tab, with a driver of its own.
+    is_tab = 'TEXTUAL_DRIVER' in os.environ
     try:
         # rcl reads the files as soon as it parses the arguments.
-        refusal = parameter_file_refusal(arguments)
+        refusal = entry_point.parameter_file_refusal(arguments)
         own = [] if refusal else remove_ros_args(['monitor', *arguments])[1:]
         options = parser().parse_args(own)
-        if refusal := refusal or log_directory_refusal():
-            print(f'monitor: {refusal}', file=sys.stderr)
+        if refusal := refusal or entry_point.log_directory_refusal():
+            complain(refusal)
             return 2
+        if options.web and not is_tab:
+            from .web import serve
+            return serve(options.web, options.token, termination, complain)
         termination.calls(lambda: None)
         rclpy.init(args=['monitor', *arguments], signal_handler_options=SignalHandlerOptions.NO)
-        failed = CANNOT_CREATE
+        failed = entry_point.CANNOT_CREATE
         # Several monitors may run, and they do not need /rosout.
         node = Node(f'illuminator_monitor_{uuid.uuid4().hex[:8]}', enable_rosout=False,
                     start_parameter_services=False)
@@ -134,91 +134,75 @@ def run(args: list[str] | None, termination: Termination) -> int:
         return int(end.code or 0)
     except Exception as error:
         # rclpy has an exception for each kind of wrong argument.
-        print(f'monitor: {one_line(start_failure(error, failed))}', file=sys.stderr)
+        complain(entry_point.one_line(entry_point.start_failure(error, failed)))
         return 2
-    monitor = Monitor(node)
-    console = Console(highlight=False)
-    interactive = (sys.stdin is not None and sys.stdin.isatty() and console.is_terminal
-                   and not console.is_dumb_terminal and not options.once)
+    views = [one.load('view') for one in payloads.values() if one.view]
+    graph = Graph(node, views, options.source)
+    is_interactive = is_tab or os.environ.get('TERM', 'dumb') not in ('dumb', 'unknown') and all(
+        stream is not None and stream.isatty() for stream in (sys.stdin, sys.stdout))
     try:
-        if interactive:
-            with terminal.while_it_lasts():
-                _watch(monitor, console, termination, ascii_only=options.ascii)
-            return 0
-        return _print_once(monitor, options, termination)
+        if options.once or options.json or not is_interactive:
+            return _print_once(graph, options, termination)
+        return _watch(graph, options.ascii, termination, is_tab)
     finally:
-        monitor.end()
         node.destroy_node()
         rclpy.try_shutdown()
 
 
-def _watch(
-    monitor: Monitor, console: Console, termination: Termination, *, ascii_only: bool,
-) -> None:
-    """Show the lights until the end is requested."""
-    bindings = KeyBindings(monitor.graph.submit, monitor.graph.clear_gone)
-    keyboard = terminal.Keyboard(sys.stdin.fileno())
-    decoder = KeyDecoder()
-    stopped = threading.Event()
-    ascii_only = ascii_only or console.options.ascii_only
+def _watch(graph: Graph, ascii_only: bool, termination: Termination, is_tab: bool) -> int:
+    """Show the devices until the end is requested."""
+    from . import terminal
+    from .app import MonitorApp
+    ascii_only = ascii_only or not sys.stdout.encoding.lower().startswith('utf')
+    make = functools.partial(MonitorApp, graph, ascii_only=ascii_only)
+    server, restore = os.getppid(), None
+    if is_tab:
+        app = make(is_alive=lambda: os.getppid() == server)
+    else:
+        restore = functools.partial(termios.tcsetattr, 0, termios.TCSANOW, termios.tcgetattr(0))
+        app = make(stop=terminal.suspend, is_alive=terminal.is_open,
+                   driver_class=terminal.TerminalDriver)
 
-    def stop() -> None:
-        stopped.set()
-        keyboard.wake()
+    async def show() -> None:
+        loop = asyncio.get_running_loop()
+        termination.calls(functools.partial(loop.call_soon_threadsafe, app.exit), last=restore)
+        await app.run_async()
 
-    def end() -> None:
-        bindings.end()
-        keyboard.wake()
-
-    while not bindings.quit:
-        stopped.clear()
-        with (terminal.quiet_errors(), terminal.unbuffered(sys.stdin.fileno()) as restore,
-              terminal.suspended_by(stop),
-              Live(console=console, screen=True, auto_refresh=False) as live):
-            termination.calls(end, last=restore)
-            while not (bindings.quit or bindings.stop or stopped.is_set()):
-                lights = monitor.lights()
-                bindings.update(lights)
-                view = ViewState(lights, bindings.selected, monitor.clock(), bindings.show_help,
-                                 ascii_only=ascii_only)
-                live.update(screen(view, console.width, console.height), refresh=True)
-                data = keyboard.read(terminal.ESCAPE_TIMEOUT if decoder.waiting else INTERVAL, end)
-                for key in decoder.feed(data):
-                    bindings.press(key, lights, monitor.clock())
-        if not bindings.quit:
-            terminal.suspend(job=bindings.stop)
-            bindings.resume()
-    keyboard.close()
+    try:
+        with terminal.quiet_errors():
+            asyncio.run(show())
+    except OSError:
+        if is_tab or terminal.is_open():
+            raise
+    if is_tab or terminal.is_open():
+        return app.return_code or 0
+    # The interpreter would write the remaining output at its exit.
+    entry_point.discard_output()
+    return 0
 
 
-def is_complete(light: Light) -> bool:
-    """Return whether a light has published its state."""
-    return light.link is not None and (
-        light.value('connected') is False or light.value('enabled') is not None)
+def is_complete(device: Device) -> bool:
+    """Return whether a device has published its state."""
+    return device.state == LOST or 'link' in device.diagnoses and device.state != NOT_KNOWN
 
 
-def _print_once(monitor: Monitor, options: argparse.Namespace, termination: Termination) -> int:
+def _print_once(graph: Graph, options: argparse.Namespace, termination: Termination) -> int:
     """Print one table."""
     if sys.stdout is None:
-        print('monitor: standard output is closed', file=sys.stderr)
+        complain('standard output is closed')
         return 1
     ended = threading.Event()
     termination.calls(ended.set)
-    lights = monitor.lights()
     until = time.monotonic() + options.wait
-    # Lights are discovered one after the other and publish their state in several messages.
-    complete_since = time.monotonic()
+    # Devices are discovered one after the other and publish their state in several messages.
+    complete_since, known = time.monotonic(), 0
     while not ended.wait(0.1) and time.monotonic() < min(until, complete_since + SETTLING):
-        before, lights = lights, monitor.lights()
-        if len(lights) != len(before) or not lights or not all(map(is_complete, lights)):
-            complete_since = time.monotonic()
-    if not lights:
-        print(f'monitor: no light found within {options.wait:g} s: check that a bridge runs, with '
-              f'ROS_DOMAIN_ID={os.environ.get("ROS_DOMAIN_ID", 0)} as here', file=sys.stderr)
+        graph.poll()
+        if len(graph.devices) != known or not known or not all(map(is_complete, graph.devices)):
+            complete_since, known = time.monotonic(), len(graph.devices)
+    if not known:
+        complain(f'no device found within {options.wait:g} s: check that a bridge runs, with '
+                 f'ROS_DOMAIN_ID={os.environ.get("ROS_DOMAIN_ID", 0)} as here')
         return 1
-    table = io.StringIO()
-    Console(file=table, width=PLAIN_WIDTH, color_system=None, highlight=False, soft_wrap=True
-            ).print(plain(ViewState(lights, None, monitor.clock())))
-    written = print_output(lambda reason: print(f'monitor: {reason}', file=sys.stderr),
-                           *(line.rstrip() for line in table.getvalue().splitlines()))
-    return 0 if written else 1
+    lines = [as_json(graph.devices)] if options.json else plain(graph.devices)
+    return 0 if entry_point.print_output(complain, *lines) else 1

@@ -12,82 +12,50 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""The terminal: its settings, stopping and continuing, and the keys."""
+"""The terminal: where the screen is written, stopping and continuing, errors of the middleware."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 import contextlib
 import errno
-import functools
 import os
-import select
 import signal
 import sys
-import tempfile
 import termios
 import threading
-from typing import IO
+from typing import Any
 
-from ..entry_point import discard_output
-
-# s after an escape in which the rest of its sequence must arrive.
-ESCAPE_TIMEOUT = 0.05
+from textual.drivers.linux_driver import LinuxDriver
 
 
-@contextlib.contextmanager
-def while_it_lasts() -> Iterator[None]:
-    """End without an error if the terminal closes."""
+class TerminalDriver(LinuxDriver):
+    """Textual's terminal, written on stdout: the middleware writes its errors on stderr."""
+
+    def __init__(self, *arguments: Any, **options: Any) -> None:
+        super().__init__(*arguments, **options)
+        assert sys.__stdout__ is not None
+        self._file = sys.__stdout__
+        # Textual would start again although it has not stopped.
+        signal.signal(signal.SIGCONT, signal.SIG_DFL)
+        signal.signal(signal.SIGTSTP, self._take_stop)
+
+    def _take_stop(self, *_: object) -> None:
+        """Take a SIGTSTP; the process stops only in :func:`suspend`."""
+        request_stop()
+        self._app.call_later(self._app.run_action, 'press("ctrl+z")')
+
+
+def is_open() -> bool:
+    """Return whether the terminal at stdin has not been closed."""
     try:
-        yield
-    except (OSError, termios.error) as error:
-        if error.args[0] != errno.EIO:
-            raise
-        # The interpreter would write the remaining output at its exit.
-        discard_output()
+        termios.tcgetattr(0)
+    except termios.error as error:
+        return bool(error.args[0] != errno.EIO)
+    return True
 
 
-@contextlib.contextmanager
-def unbuffered(descriptor: int) -> Iterator[Callable[[], None]]:
-    """
-    Let a terminal pass on each key at once, without an echo.
-
-    Yield a function that restores it without waiting for pending output.
-    """
-    before = termios.tcgetattr(descriptor)
-    changed = termios.tcgetattr(descriptor)
-    changed[3] &= ~(termios.ICANON | termios.ECHO)
-    changed[6][termios.VMIN], changed[6][termios.VTIME] = 1, 0
-    # Ctrl-\ and ctrl-z as signals would end or stop "ros2 run" at once, and the shell would get
-    # the terminal before it is restored.
-    changed[6][termios.VQUIT] = changed[6][termios.VSUSP] = b'\0'
-    try:
-        termios.tcsetattr(descriptor, termios.TCSADRAIN, changed)
-        yield functools.partial(termios.tcsetattr, descriptor, termios.TCSANOW, before)
-    finally:
-        # With SIGTTOU blocked, the settings work after the shell has taken the terminal back.
-        mask = signal.pthread_sigmask(signal.SIG_BLOCK, [signal.SIGTTOU])
-        # The terminal may be closed.
-        with contextlib.suppress(termios.error):
-            termios.tcsetattr(descriptor, termios.TCSADRAIN, before)
-        signal.pthread_sigmask(signal.SIG_SETMASK, mask)
-
-
-@contextlib.contextmanager
-def suspended_by(on_stop: Callable[[], None]) -> Iterator[None]:
-    """Call ``on_stop()`` on SIGTSTP; the process stops only in :func:`suspend`."""
-    def handle(*_: object) -> None:
-        _request_stop()
-        on_stop()
-
-    before = signal.signal(signal.SIGTSTP, handle)
-    try:
-        yield
-    finally:
-        signal.signal(signal.SIGTSTP, before)
-
-
-def _request_stop() -> None:
+def request_stop() -> None:
     """
     Make this thread stop when it unblocks SIGTSTP, unless a SIGCONT comes before.
 
@@ -99,81 +67,34 @@ def _request_stop() -> None:
     signal.pthread_kill(threading.get_ident(), signal.SIGTSTP)
 
 
-def suspend(job: bool) -> None:
+def suspend() -> None:
     """
-    Stop until a shell continues the process; without such a shell nothing happens.
+    Stop until a shell continues the process in the foreground; without such a shell do nothing.
 
-    Nothing happens either if the shell has already continued it.
-
-    :param job: stop the whole job, including "ros2 run", as ctrl-z does.
+    A SIGTSTP of :class:`TerminalDriver` waits, or else the whole job stops, including "ros2 run".
     """
-    if job:
+    handler = signal.signal(signal.SIGTSTP, signal.SIG_DFL)
+    if signal.SIGTSTP not in signal.pthread_sigmask(signal.SIG_BLOCK, []):
         # Before the rest of the job stops: the shell can continue the job from then on.
-        _request_stop()
+        request_stop()
         os.kill(0, signal.SIGTSTP)
     signal.pthread_sigmask(signal.SIG_UNBLOCK, [signal.SIGTSTP])
+    signal.signal(signal.SIGTSTP, handler)
+    with contextlib.suppress(OSError):
+        # "bg" continues it without the terminal.
+        while os.tcgetpgrp(0) != os.getpgrp():
+            os.kill(os.getpid(), signal.SIGSTOP)
 
 
 @contextlib.contextmanager
 def quiet_errors() -> Iterator[None]:
     """Keep errors of the middleware off the screen, and write them afterwards."""
-    sys.stderr.flush()
-    kept = os.dup(2)
-    with _errors_file() as file:
-        os.dup2(file.fileno(), 2)
-        try:
-            yield
-        finally:
-            sys.stderr.flush()
-            os.dup2(kept, 2)
-            os.close(kept)
-            file.seek(0)
-            while chunk := file.read(1 << 16):
-                os.write(2, chunk)
-
-
-def _errors_file() -> IO[bytes]:
+    kept, file = os.dup(2), os.memfd_create('errors')
+    os.dup2(file, 2)
     try:
-        return tempfile.TemporaryFile()
-    except OSError:
-        # No directory can be written, as on a full disk: the errors are lost.
-        return open(os.devnull, 'r+b')
-
-
-class Keyboard:
-    """Reads keys; other threads can :meth:`wake` it."""
-
-    def __init__(self, descriptor: int) -> None:
-        self._descriptor = descriptor
-        self._woken, self._waker = os.pipe()
-        os.set_blocking(self._waker, False)
-
-    def close(self) -> None:
-        """Close its pipe."""
-        os.close(self._woken)
-        os.close(self._waker)
-
-    def wake(self) -> None:
-        """Let :meth:`read` return; callable from any thread."""
-        with contextlib.suppress(OSError):
-            os.write(self._waker, b'\0')
-
-    def read(self, timeout: float, on_end: Callable[[], None]) -> bytes:
-        """
-        Wait for keys and return their bytes, b'' if none was pressed.
-
-        :param timeout: s.
-        :param on_end: called if the terminal is closed.
-        """
-        ready, _, _ = select.select([self._descriptor, self._woken], [], [], timeout)
-        if self._woken in ready:
-            os.read(self._woken, 4096)
-        if self._descriptor not in ready:
-            return b''
-        try:
-            data = os.read(self._descriptor, 4096)
-        except OSError:
-            data = b''
-        if not data:
-            on_end()
-        return data
+        yield
+    finally:
+        os.dup2(kept, 2)
+        os.lseek(file, 0, os.SEEK_SET)
+        while chunk := os.read(file, 1 << 16):
+            os.write(2, chunk)

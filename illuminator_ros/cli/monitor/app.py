@@ -1,0 +1,291 @@
+# Copyright 2026 The illuminator_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""The screen: the list of devices, the details of one, and its keys as labels to click."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+import functools
+import os
+from typing import ClassVar
+
+from textual import events
+from textual.app import App, ComposeResult
+from textual.binding import Binding, BindingType
+from textual.content import Content
+from textual.driver import Driver
+from textual.style import Style
+from textual.widgets import Static
+
+from .ros_graph import Graph
+from .table import by_kind, columns, counts, findings, last
+from ...ros.monitor_view import age, Cell, Device, LEVELS, Line, Request, STALE_STATES
+
+# s between updates of the screen, and between looks for answers to requests.
+INTERVAL, ANSWER_INTERVAL = 0.25, 0.05
+# s without a key after which a question is dropped; characters that the operator may type.
+QUESTION_LIFETIME, MAX_TYPED = 15.0, 100
+NORMAL, HELP, STEERING = 'normal', 'help', 'steering'
+NO_DEVICES = 'no devices in this ROS graph yet; is a bridge running, with this ROS_DOMAIN_ID?'
+MOVES = {'up': -1, 'k': -1, 'down': 1, 'j': 1, 'pageup': -10, 'pagedown': 10,
+         'home': -10**6, 'end': 10**6}
+# Keys, text, label in the bar or '', and action, in the order of the help.
+COMMON_KEYS: tuple[tuple[tuple[str, ...], str, str, str], ...] = (
+    (tuple(MOVES), 'select a device, as a click on it does', '', 'move'),
+    (('m',), 'move a gimbal with the arrow keys; any other key ends that', '', 'steer'),
+    (('enter',), 'yes, where a request asks first; escape is no', '', ''),
+    (('a',), 'ALL lights off', 'ALL OFF', 'all off'),
+    (('c',), 'clear devices that are gone', '', 'clear'),
+    (('?', 'h'), 'this help', 'help', 'help'),
+    (('q', 'ctrl+c', 'ctrl+d', 'ctrl+backslash'), 'quit', 'quit', 'quit'),
+    (('ctrl+z',), 'stop; fg continues', '', 'stop'))
+ACTIONS = {key: action for keys, _, _, action in COMMON_KEYS for key in keys}
+# For terminals that show ASCII only; other characters become question marks.
+ASCII = str.maketrans('█░─┼…←→↑↓▁▂▃▄▅▆▇', '#--|~<>^v_.-=+*%')
+
+
+class MonitorApp(App[None], inherit_bindings=False):
+    """
+    The monitor on a terminal or in a browser.
+
+    :param stop: stops the process until a shell continues it; called while the terminal has its
+        former state.
+    :param is_alive: returns False if the terminal is closed.
+    """
+
+    CSS_PATH = 'monitor.tcss'
+    ENABLE_COMMAND_PALETTE = ALLOW_SELECT = False
+    # Textual has other uses for these.
+    BINDINGS: ClassVar[list[BindingType]] = [
+        Binding(key, f'press("{key}")', priority=True) for key in ('ctrl+c', 'escape', 'tab')]
+
+    def __init__(
+        self, graph: Graph, *, ascii_only: bool = False, stop: Callable[[], None] = lambda: None,
+        is_alive: Callable[[], bool] = lambda: True, driver_class: type[Driver] | None = None,
+    ) -> None:
+        # Without colours textual draws shades of grey, unless colours are those of the terminal.
+        super().__init__(driver_class, ansi_color=True if 'NO_COLOR' in os.environ else None)
+        self._graph = graph
+        self._ascii_only = ascii_only
+        self._stop = stop
+        self._is_alive = is_alive
+        self._selected: Device | None = None
+        self._mode = NORMAL
+        # The text, the request for the typed text, whether text is typed, and the deadline, s.
+        self._question: tuple[str, Callable[[str], Request | str], bool, float] | None = None
+        self._typed = ''
+        self._lines: list[Device | Cell] = []
+        self._shown: dict[str, Content] = {}
+
+    def compose(self) -> ComposeResult:
+        """See :meth:`App.compose`."""
+        yield from (Static(id=name) for name in ('devices', 'details', 'bar'))
+
+    def on_mount(self) -> None:
+        """Begin to poll."""
+        self.set_interval(INTERVAL, self.poll)
+        self.set_interval(ANSWER_INTERVAL, self._graph.poll_answers)
+        self.call_after_refresh(self.poll)
+
+    def poll(self) -> None:
+        """Take new values, and draw them."""
+        if not self._is_alive():
+            self.exit()
+            return
+        self._graph.poll()
+        if self._question is not None and self._graph.clock() > self._question[3]:
+            self._question = None
+        self.draw()
+
+    def on_key(self, event: events.Key) -> None:
+        """Act on a key."""
+        shown = event.character or ''
+        self.action_press(shown if shown.isprintable() and shown > ' ' else event.key)
+
+    def on_paste(self, event: events.Paste) -> None:
+        """Take text while the operator types."""
+        self._typed = (self._typed + event.text)[:MAX_TYPED]
+        self.draw()
+
+    def on_click(self, event: events.Click) -> None:
+        """Select the device of a line; the list begins at the top."""
+        for line in self._lines[event.screen_y:event.screen_y + 1]:
+            if isinstance(line, Device) and self._mode != HELP:
+                self._select(line)
+        self.draw()
+
+    def on_mouse_scroll_down(self) -> None:
+        """Select the next device."""
+        self.action_press('j')
+
+    def on_mouse_scroll_up(self) -> None:
+        """Select the device before."""
+        self.action_press('k')
+
+    def action_press(self, key: str) -> None:
+        """Act on a key, or on a click on its label."""
+        device, mode, action = self._selected, self._mode, ACTIONS.get(key)
+        question, self._question, self._mode = self._question, None, NORMAL
+        if action == 'quit':
+            self.exit()
+        elif action == 'all off':
+            # The help names this key, and it acts there and while the operator types, too.
+            self._graph.all_off()
+        elif question is not None and device is not None:
+            asked, answer, takes_text, _ = question
+            if key == 'enter':
+                self._request(device, asked, answer(self._typed), is_confirmed=True)
+            elif key != 'escape':
+                self._ask(asked, answer, takes_text)
+                self._typed = self._typed[:-1] if key == 'backspace' else (
+                    self._typed + (' ' if key == 'space' else key * (len(key) == 1)))[:MAX_TYPED]
+        elif action == 'help' and mode != HELP:
+            self._mode = HELP
+        elif action == 'stop' and self._driver is not None and self._driver.can_suspend:
+            with self.suspend():
+                self._stop()
+        elif mode != HELP and device is not None:
+            self._press(device, key, action, is_steering=mode == STEERING)
+        self.draw()
+
+    def _press(self, device: Device, key: str, action: str | None, is_steering: bool) -> None:
+        keys = device.view.keys
+        steering = [one for one in keys if one.is_steering]
+        chosen = next((one for one in steering * is_steering + [
+            one for one in keys if not one.is_steering] if key in one.keys), None)
+        if chosen is not None:
+            self._mode, self._typed = STEERING if chosen.is_steering else NORMAL, ''
+            make = functools.partial(chosen.request, device)
+            if chosen.prompt:
+                self._ask(chosen.prompt, make, takes_text=True)
+            else:
+                self._request(device, chosen.label, make(''))
+        elif action == 'steer' and steering:
+            self._mode = STEERING
+        elif action == 'clear':
+            self._graph.clear_gone()
+        elif action == 'move':
+            devices = self._graph.devices
+            at = min(max(devices.index(device) + MOVES[key], 0), len(devices) - 1)
+            self._select(devices[at])
+
+    def _ask(self, question: str, make: Callable[[str], Request | str], takes_text: bool) -> None:
+        self._question = question, make, takes_text, self._graph.clock() + QUESTION_LIFETIME
+
+    def _request(
+        self, device: Device, label: str, request: Request | str, is_confirmed: bool = False,
+    ) -> None:
+        if isinstance(request, str):
+            self._graph.refuse(device, label, request)
+        elif request.question and not is_confirmed:
+            self._ask(request.question, lambda _: request, takes_text=False)
+        else:
+            self._graph.submit(device, request)
+
+    def _select(self, device: Device | None) -> None:
+        if device is not self._selected:
+            # The question belongs to the other device.
+            self._selected, self._question = device, None
+            self._mode = HELP if self._mode == HELP else NORMAL
+
+    def draw(self) -> None:
+        """Draw what has changed."""
+        devices, device = self._graph.devices, self._selected
+        if device not in devices:
+            before = [one for one in devices if device is not None and one.name < device.name]
+            self._select(next(iter(before[-1:] or devices), None))
+        self.screen.set_class(self.size.height < 12, 'low')
+        self._show('devices', self._help() if self._mode == HELP else self._list())
+        self._show('details', Content('\n').join(
+            Content.assemble((f'{label:8}', 'bold'), *cells) for label, cells in (
+                () if self._selected is None or self._mode == HELP else
+                _details(self._selected, self._graph.clock()))))
+        self._show('bar', Content('  ').join(self._labels()))
+
+    def _show(self, name: str, content: Content) -> None:
+        if self._ascii_only:
+            shown = content.plain.translate(ASCII).encode('ascii', 'replace').decode()
+            content = Content(shown, [*content.spans])
+        if name not in self._shown or not content.is_same(self._shown[name]):
+            self._shown[name] = content
+            self.query_one(f'#{name}', Static).update(content, layout=name != 'devices')
+
+    def _list(self) -> Content:
+        width, height = self.query_one('#devices').size
+        lines: list[Device | Cell] = []
+        name_width = max((len(one.name) for one in self._graph.devices), default=0)
+        name_width = max(min(name_width, width // 3), 14)
+        for some in by_kind(self._graph.devices):
+            titles = [f'{one.title:{one.width}}' for one in columns(some[0].view, name_width)]
+            lines += [''] * bool(lines)
+            lines += [(counts(some), 'bold'), (' '.join(titles), 'bold dim'), *some]
+        at = lines.index(self._selected) if self._selected is not None else 0
+        first = max(0, min(at - height // 2, len(lines) - height))
+        self._lines = lines[first:first + height] or [NO_DEVICES]
+        return Content('\n').join(
+            self._row(one, name_width) if isinstance(one, Device) else _content(one)
+            for one in self._lines)
+
+    def _row(self, device: Device, name_width: int) -> Content:
+        row = Content(' ').join([
+            *(_content(one.cell(device)).truncate(one.width, ellipsis=True, pad=True)
+              for one in columns(device.view, name_width)),
+            Content.assemble(*(last(device) or [findings(device)]))])
+        styles = ['dim'] * (device.state in STALE_STATES) + ['reverse'] * (
+            device is self._selected)
+        return row.stylize(' '.join(styles))
+
+    def _labels(self) -> Iterable[Content]:
+        keys = () if self._selected is None else self._selected.view.keys
+        if self._question is not None:
+            yield _content((self._question[0], 'bold yellow'))
+            yield _content((f'{self._typed}_' if self._question[2] else '', 'reverse'))
+            yield from (_label('enter', 'yes'), _label('escape', 'no'))
+        elif self._mode == HELP:
+            yield _label('escape', 'or any other key goes back')
+        else:
+            yield from (_label(one.keys[0], one.label) for one in keys
+                        if one.label and one.is_steering is (self._mode == STEERING))
+            if any(one.is_steering for one in keys):
+                yield _label('m', 'move') if self._mode == NORMAL else _label('escape', 'ends')
+            yield from (_label(names[0], label) for names, _, label, _ in COMMON_KEYS if label)
+
+    def _help(self) -> Content:
+        views = {device.view.kind: device.view for device in self._graph.devices}
+        lines = [*((keys, text) for keys, text, _, _ in COMMON_KEYS), *(
+            (key.keys, f'{kind}: {key.text}') for kind, one in views.items() for key in one.keys)]
+        return Content('\n').join(Content.assemble(
+            (f'{"  ".join(keys):22}', 'bold'), f' {text}') for keys, text in lines)
+
+
+def _details(device: Device, now: float) -> Iterable[Line]:
+    yield device.name, []
+    if device.action is not None:
+        yield 'last', [*last(device), (f' ({age(now - device.action[3])} ago)', 'dim')]
+    for kind, one in device.diagnoses.items():
+        held = device.number(kind, 'held_s')
+        yield kind, [LEVELS[one.level], f': {one.message}', '' if held is None else (
+            f'; held by {device.diagnosed(kind, "holder")} for {age(held)}')]
+    yield from device.view.details(device)
+    if now - device.heard_at > 2:
+        yield 'silent', [f'nothing heard for {age(now - device.heard_at)}']
+
+
+def _content(cell: Cell) -> Content:
+    return Content(cell) if isinstance(cell, str) else Content.styled(*cell)
+
+
+def _label(key: str, text: str) -> Content:
+    return Content.styled(f'{key} {text}', Style.from_meta({'@click': f'app.press({key!r})'}))

@@ -1,0 +1,104 @@
+# Copyright 2026 The illuminator_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""The list of devices in columns, and the output for scripts. No terminal, no clock."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+import functools
+from itertools import groupby
+import json
+import math
+from typing import Any
+
+from ...ros.monitor_view import Cell, Column, Device, LEVELS, measured, STATE_STYLES, UNKNOWN, View
+
+
+def state(device: Device) -> Cell:
+    """Return the state of a device with its style."""
+    return device.state, {**STATE_STYLES, **device.view.states}.get(device.state, '')
+
+
+def link(device: Device, key: str) -> str:
+    """Return a value of the link with the unit of its key: ``_percent`` or ``_ms``."""
+    return measured(device.number('link', key), '%' if key.endswith('percent') else 'ms', '.2g')
+
+
+def last(device: Device) -> list[Cell]:
+    """Return the last request to a device, and its answer."""
+    if device.action is None:
+        return []
+    text, outcome, answer, _ = device.action
+    return [f'{text}: ', outcome, f': {answer}' if answer else '']
+
+
+def columns(view: View, name_width: int = 0) -> list[Column]:
+    """Return the columns of a kind of device, the most important first."""
+    return [
+        Column(view.kind.upper(), name_width, lambda device: device.name),
+        Column('STATE', 6, state),
+        *view.columns, Column('SOURCE', 8, lambda device: device.values.get('source', '')),
+        Column('LOSS', 6, functools.partial(link, key='loss_percent')),
+        Column('RTT', 7, functools.partial(link, key='round_trip_p50_ms'))]
+
+
+def by_kind(devices: Iterable[Device]) -> list[list[Device]]:
+    """Return devices, which are sorted by kind, as a list for each kind."""
+    return [list(some) for _, some in groupby(devices, key=lambda device: device.view.kind)]
+
+
+def counts(devices: Sequence[Device]) -> str:
+    """Return the number of devices of one kind in each state."""
+    view, states = devices[0].view, [device.state for device in devices]
+    found = (f'{states.count(word)} {word}' for word in (*view.states, *STATE_STYLES)
+             if word in states)
+    return f'{len(devices)} {view.kind}{"s" * (len(devices) > 1)}: {", ".join(found)}'
+
+
+def findings(device: Device) -> str:
+    """Return what the diagnostics of a device report."""
+    found = [f'{LEVELS[one.level][0]}: {one.message}' for _, one in sorted(
+        device.diagnoses.items(), key=lambda item: item[0] == 'link') if one.level]
+    return '; '.join(found) or ('OK' if device.diagnoses else UNKNOWN)
+
+
+def plain(devices: Sequence[Device]) -> list[str]:
+    """Return a table for each kind, without styles and limits, for a file or a pipe."""
+    lines: list[str] = []
+    for some in by_kind(devices):
+        shown = [*columns(some[0].view), Column('DIAGNOSTICS', 0, findings)]
+        cells = [[one.cell(device) for one in shown] for device in some]
+        rows = [[one.title for one in shown], *(
+            [(one if isinstance(one, str) else one[0]) or UNKNOWN for one in row]
+            for row in cells)]
+        widths = [max(map(len, cells)) for cells in zip(*rows, strict=True)]
+        lines += [''] * bool(lines) + [
+            '  '.join(map(str.ljust, row, widths)).rstrip() for row in rows]
+    return lines
+
+
+def as_json(devices: Sequence[Device]) -> str:
+    """Return all known values as JSON, with null for a number that is not finite."""
+    def finite(value: Any) -> Any:
+        if isinstance(value, tuple):
+            return [*map(finite, value)]
+        return None if isinstance(value, float) and not math.isfinite(value) else value
+
+    return json.dumps([{
+        'name': device.name, 'kind': device.view.kind, 'state': device.state,
+        'values': {name: finite(value) for name, value in device.values.items()},
+        'diagnostics': {
+            kind: {'level': LEVELS[one.level][0], 'message': one.message, 'values': one.values}
+            for kind, one in device.diagnoses.items()}} for device in devices], indent=2)

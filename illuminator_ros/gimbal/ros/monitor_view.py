@@ -1,0 +1,143 @@
+# Copyright 2026 The illuminator_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Gimbals in the monitor."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+import functools
+import math
+
+from geometry_msgs.msg import Vector3, Vector3Stamped
+from sensor_msgs.msg import NavSatFix
+from std_msgs.msg import Bool, Header, String
+
+from ...ros import monitor_view as shared
+from ...ros.monitor_view import Column, Device, Key, Request, Topic, UNKNOWN
+
+# Degrees for one press of an arrow key.
+STEP = 5.0
+DIAL_WIDTH = 31
+# The limit of ~/cmd/angles, and the directions of positive and negative angles in ROS.
+AXES = {'roll': (math.pi, 'right', 'left'), 'pitch': (math.pi / 2, 'down', 'up'),
+        'yaw': (math.pi, 'left', 'right')}
+
+
+def angle(device: Device, axis: str) -> float:
+    """Return the angle of an axis, rad, NaN if it is unknown."""
+    return float(device.values.get('angles', ('', *[math.nan] * 3))[1 + [*AXES].index(axis)])
+
+
+def described(device: Device, axis: str) -> str:
+    """Return the angle of an axis with its direction."""
+    degrees = round(math.degrees(angle(device, axis)), 1)
+    if not math.isfinite(degrees):
+        return UNKNOWN
+    return f'{abs(degrees):.1f} {AXES[axis][1 + (degrees < 0)] if degrees else ""}'.rstrip()
+
+
+def _refusal(device: Device) -> str:
+    """Return why the node would ignore a setpoint, '' if it would not."""
+    return '' if device.values.get('in_control') else (
+        f'not in control ({device.values.get("controller", "unknown")}): t takes control')
+
+
+def nudge(device: Device, typed: str, axis: str, step: float) -> Request | str:
+    """Turn one axis by a step, degrees, from its last target or its angle."""
+    start = device.wants(axis, angle(device, axis))
+    if refusal := _refusal(device) or ('' if math.isfinite(start) else 'its angles are unknown'):
+        return refusal
+    aim, limit = start + math.radians(step), AXES[axis][0]
+    # Yaw has no end: it goes on beyond half a turn.
+    aim = math.remainder(aim, math.tau) if axis == 'yaw' else min(max(aim, -limit), limit)
+    # NaN leaves an axis as it is.
+    vector = Vector3(**{name: aim if one == axis else math.nan
+                        for name, one in zip('xyz', AXES, strict=True)})
+    return Request(
+        f'{axis} to {math.degrees(aim):.1f} degrees', f'{device.prefix}cmd/angles', Vector3Stamped,
+        Vector3Stamped(header=Header(frame_id=device.values['angles'][0]), vector=vector),
+        {axis: aim})
+
+
+def point(device: Device, typed: str) -> Request | str:
+    """Point at a place."""
+    try:
+        place = [float(text) for text in typed.replace(',', ' ').split()]
+        latitude, longitude, altitude = place
+    except ValueError:
+        return f'{typed!r} is not latitude, longitude and altitude'
+    if not (abs(latitude) <= 90 and abs(longitude) <= 180 and math.isfinite(altitude)):
+        return f'{typed!r} is not a place'
+    return _refusal(device) or Request(
+        f'point at {typed}', f'{device.prefix}cmd/roi', NavSatFix,
+        NavSatFix(latitude=latitude, longitude=longitude, altitude=altitude))
+
+
+def take_control(device: Device, typed: str) -> Request:
+    """Take primary control; ask first unless no component has it."""
+    controller = device.values.get('controller', 'unknown')
+    is_free = device.values.get('in_control') or controller.startswith('primary none')
+    return shared.trigger('take control', 'take_control', '' if is_free else (
+        f'take control of {device.name}? In control now: {controller}.'))
+
+
+def _details(device: Device) -> Iterable[shared.Line]:
+    for axis, (limit, *_) in AXES.items():
+        # The range that the gimbal reports, and left and up at the left of the dial.
+        low, high = (device.number('device', f'{axis}_{end}_rad') for end in ('min', 'max'))
+        low, high = -limit if low is None else low, limit if high is None else high
+        if axis == 'yaw':
+            low, high = high, low
+        yield axis, [(shared.dial(angle(device, axis), low, high, DIAL_WIDTH), 'cyan'),
+                     f' {described(device, axis)}']
+    since = device.since('controller')
+    yield 'control', ['ours: ' if device.values.get('in_control') else '',
+                      device.values.get('controller', 'unknown'), since and f' for {since}']
+
+
+VIEW = shared.View(
+    'gimbal', {
+        'connected': Topic(Bool), 'in_control': Topic(Bool), 'controller': Topic(String),
+        'yaw_lock': Topic(Bool), 'source': Topic(String),
+        'angles': Topic(Vector3Stamped, lambda message: (
+            message.header.frame_id, message.vector.x, message.vector.y, message.vector.z),
+            is_state=False)},
+    ('in_control', 'controller', 'angles', 'connected'),
+    (*(Column(axis.upper(), 11, functools.partial(described, axis=axis))
+       for axis in ('pitch', 'yaw')),
+     Column('CONTROL', 30, lambda device: device.values.get('controller', UNKNOWN)),
+     Column('LOCK', 4, lambda device: {True: 'yaw', False: 'no', None: UNKNOWN}[
+         device.values.get('yaw_lock')]),
+     Column('FRAME', 20, lambda device: device.values.get('angles', (UNKNOWN,))[0]),
+     Column('ROLL', 11, functools.partial(described, axis='roll'))),
+    _details,
+    (Key(('t',), 'take control, which asks first if another component has it', 'take control',
+         take_control),
+     Key(('l',), 'release control', 'release',
+         lambda device, typed: shared.trigger('release control', 'release_control')),
+     *(Key((key,), f'after m: {key} by {STEP:g} degrees', label,
+           functools.partial(nudge, axis=axis, step=step), is_steering=True)
+       for key, label, axis, step in (
+           ('left', '←', 'yaw', STEP), ('right', '→', 'yaw', -STEP),
+           ('up', '↑', 'pitch', -STEP), ('down', '↓', 'pitch', STEP))),
+     Key(('n',), 'turn to the neutral position, which asks first', 'neutral',
+         lambda device, typed: shared.trigger(
+             'neutral', 'neutral', f'turn {device.name} to its neutral position?')),
+     Key(('p',), 'point at a place', 'point', point,
+         'latitude, longitude (degrees) and altitude (m above the ellipsoid)'),
+     shared.RELEASE_SOURCE),
+    {'ours': 'bold green', 'ok': 'green'},
+    lambda device: 'ours' if device.values.get('in_control') else (
+        'ok' if device.values else shared.NOT_KNOWN))

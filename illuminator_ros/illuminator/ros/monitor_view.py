@@ -1,0 +1,141 @@
+# Copyright 2026 The illuminator_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Lights in the monitor."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+import functools
+import re
+
+from rcl_interfaces.srv import SetParametersAtomically
+from rclpy.parameter import Parameter
+from sensor_msgs.msg import Temperature
+from std_msgs.msg import Bool, Float32, Float64, String, UInt32
+from std_srvs.srv import SetBool
+
+from ...ros import monitor_view as shared
+from ...ros.monitor_view import Column, Device, Key, measured, Request, Topic, UNKNOWN
+
+# Brightness steps, %; strobe for a light that has none, s and %.
+STEP, FINE_STEP = 10.0, 1.0
+STROBE_PERIOD, STROBE_DUTY_CYCLE = 1.0, 50.0
+# K; a smaller difference is drawn as a flat line.
+SMALLEST_SPAN = 4.0
+BAR_WIDTH = 10
+
+
+def switch(device: Device, typed: str = '', on: bool | None = None) -> Request:
+    """Switch a light on or off; None is the opposite of its state, on if that is unknown."""
+    if on is None:
+        on = not device.wants('enabled', device.values.get('enabled'))
+    return Request(
+        'on' if on else 'off', f'{device.prefix}enable', SetBool, SetBool.Request(data=on),
+        {'enabled': on}, f'switch {device.name} ON? It can dazzle.' if on else '', is_off=not on)
+
+
+switch_off = functools.partial(switch, on=False)
+
+
+def agreed(device: Device) -> float | None:
+    """Return the brightness that is agreed with a light, %; a hot light shines less."""
+    found = re.search(r'brightness ([0-9.]+) %', device.diagnosed('lamp', 'agreed'))
+    if found and device.values.get('error_flags'):
+        return float(found[1])
+    return device.values.get('brightness')
+
+
+def dim(device: Device, typed: str, step: float) -> Request | str:
+    """Change the brightness by a step, %, from the requested or agreed one."""
+    start = device.wants('brightness', agreed(device))
+    if start is None:
+        return 'its brightness is not known yet'
+    target = min(max(round(start + step, 1), 0.0), 100.0)
+    text = f'brightness {target:g} %'
+    if device.prefix:
+        return Request(text, f'{device.prefix}cmd/brightness', Float32, Float32(data=target),
+                       {'brightness': target})
+    return _set(text, '', brightness=target)
+
+
+def strobe(device: Device, typed: str) -> Request | str:
+    """Let a light strobe with its last duty cycle, or end its strobe."""
+    if device.prefix:
+        return f'the source {device.source} cannot: a strobe is set by parameters'
+    if device.wants('strobe_period', device.values.get('strobe_period')):
+        return _set('no strobe', '', strobe_period=0.0)
+    duty = round(device.values.get('strobe_duty_cycle') or STROBE_DUTY_CYCLE, 3)
+    return _set(f'strobe {STROBE_PERIOD:g} s, {duty:g} %',
+                f'let {device.name} strobe? Flashing light can cause seizures.',
+                strobe_period=STROBE_PERIOD, strobe_duty_cycle=duty)
+
+
+def _set(text: str, question: str, **values: float) -> Request:
+    return Request(
+        text, 'set_parameters_atomically', SetParametersAtomically,
+        SetParametersAtomically.Request(parameters=[
+            Parameter(name, value=value).to_parameter_msg() for name, value in values.items()]),
+        values, question)
+
+
+def _strobe(device: Device) -> str:
+    period, duty = device.values.get('strobe_period'), device.values.get('strobe_duty_cycle')
+    if not period:
+        return UNKNOWN if period is None else 'steady'
+    return f'{period:.3g} s' + (f' {duty:.3g} %' if duty else '')
+
+
+def _details(device: Device) -> Iterable[shared.Line]:
+    values, lamp = device.values, functools.partial(device.diagnosed, 'lamp')
+    limit, shines, serial = agreed(device), values.get('brightness'), lamp('serial_number')
+    yield 'light', [
+        ('' if shines is None else shared.bar(shines, BAR_WIDTH) + ' ', 'yellow'),
+        ', '.join(filter(None, (
+            measured(shines, '%') + ('' if limit == shines else f' (agreed: {limit:g} %)'),
+            _strobe(device), values.get('mode'),
+            f'{lamp("vendor")} {lamp("model")}'.strip(), serial and f'no. {serial}',
+            f'up {shared.age(values["uptime"])}' if 'uptime' in values else '')))]
+    if known := [value for value in device.trend if value is not None]:
+        yield 'temp', [measured(known[-1], 'C ', '.1f'),
+                       (shared.sparkline(device.trend, SMALLEST_SPAN).lstrip(), 'cyan'),
+                       f' {min(known):.1f} to {max(known):.1f} in 2 min']
+
+
+VIEW = shared.View(
+    'light', {
+        'connected': Topic(Bool), 'enabled': Topic(Bool), 'brightness': Topic(Float32),
+        'error_flags': Topic(UInt32), 'mode': Topic(String), 'strobe_period': Topic(Float32),
+        'strobe_duty_cycle': Topic(Float32), 'uptime': Topic(Float64), 'source': Topic(String),
+        'temperature': Topic(Temperature, lambda message: message.temperature, is_state=False)},
+    ('error_flags', 'brightness', 'enabled', 'connected'),
+    (Column('BRIGHT', 6, lambda device: measured(device.values.get('brightness'), '%')),
+     Column('TEMP', 8, lambda device: measured(device.values.get('temperature'), 'C', '.1f')),
+     Column('STROBE', 11, _strobe),
+     Column('MODE', 8, lambda device: device.values.get('mode', UNKNOWN).partition('_')[0])),
+    _details,
+    (Key(('space',), 'switch it on, which asks first, or off', 'on/off', switch),
+     Key(('0',), 'switch it off', 'off', switch_off),
+     Key(('+', '=', 'right'), 'brighter by 10 %', 'brighter', functools.partial(dim, step=STEP)),
+     Key(('-', '_', 'left'), 'darker by 10 %', 'darker', functools.partial(dim, step=-STEP)),
+     Key(('.', '>'), 'brighter by 1 %', '', functools.partial(dim, step=FINE_STEP)),
+     Key((',', '<'), 'darker by 1 %', '', functools.partial(dim, step=-FINE_STEP)),
+     Key(('s',), 'strobe, which asks first, or no strobe', 'strobe', strobe),
+     Key(('r',), 'ask for identity and status again', 'refresh',
+         lambda device, typed: shared.trigger('refresh', 'refresh')),
+     shared.RELEASE_SOURCE),
+    {'ON': 'bold green', 'off': ''},
+    lambda device: ('off', 'ON')[device.values['enabled']] if 'enabled' in device.values
+    else shared.NOT_KNOWN,
+    'temperature', switch_off)

@@ -1,0 +1,76 @@
+# Copyright 2026 The illuminator_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Cameras in the monitor."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+from sensor_msgs.msg import NavSatFix
+from std_msgs.msg import Bool, UInt32
+
+from ...ros import monitor_view as shared
+from ...ros.monitor_view import Column, Device, Key, Topic, UNKNOWN
+
+# The inputs, as /diagnostics names them, and their states.
+INPUTS = ('fix', 'velocity', 'satellites', 'imu', 'attitude', 'mount', 'time_reference')
+STYLES = {'ok': 'green', 'missing': 'dim', 'stale': 'yellow', 'refused': 'bold red'}
+
+
+def place(device: Device) -> str:
+    """Return the position of the last image."""
+    status, latitude, longitude, altitude = device.values.get('image/fix', (-1, 0, 0, 0))
+    return UNKNOWN if status < 0 else f'{latitude:.6f} {longitude:.6f} {altitude:.1f} m'
+
+
+def inputs(device: Device) -> Iterable[tuple[str, str, str]]:
+    """Return name, state and age of each input."""
+    for name in INPUTS:
+        seconds = device.number('camera', f'{name}_s_ago')
+        if state := device.diagnosed('camera', name):
+            yield name, state, '' if seconds is None else shared.age(seconds)
+
+
+def _image(device: Device) -> str:
+    index, since = device.values.get('image/index', UNKNOWN), device.since('image/index')
+    return f'{index}' + (since and f', {since} ago')
+
+
+def _details(device: Device) -> Iterable[shared.Line]:
+    yield 'image', [f'{_image(device)}, at {place(device)}']
+    yield 'inputs', [cell for name, state, seconds in inputs(device) for cell in (
+        f'{name} ', (state, STYLES.get(state, '')), f' {seconds}'.rstrip() + '   ')]
+
+
+VIEW = shared.View(
+    'camera', {
+        'connected': Topic(Bool), 'image/index': Topic(UInt32, is_state=False),
+        'image/fix': Topic(NavSatFix, lambda message: (
+            message.status.status, message.latitude, message.longitude, message.altitude),
+            is_state=False)},
+    ('image/index', 'image/fix', 'connected'),
+    (Column('IMAGE', 14, _image),
+     Column('PING', 8, lambda device: shared.measured(
+         device.number('camera', 'round_trip_ms'), 'ms')),
+     Column('INPUTS', 24, lambda device: ' '.join(
+         name for name, state, _ in inputs(device) if state == 'ok') or 'none'),
+     Column('POSITION', 30, place)),
+    _details,
+    (Key(('space',), 'take an image', 'capture',
+         lambda device, typed: shared.trigger('capture', 'capture')),
+     Key(('b',), 'take an image of the calibration panel', 'panel',
+         lambda device, typed: shared.trigger('panel', 'capture_panel')),
+     Key(('p',), 'measure the round trip through the camera', 'ping',
+         lambda device, typed: shared.trigger('ping', 'ping'))))

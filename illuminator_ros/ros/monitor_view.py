@@ -1,0 +1,272 @@
+# Copyright 2026 The illuminator_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+The view of a payload in the monitor: how its devices are found and shown, and what keys request.
+
+A payload defines one :class:`View`. No I/O, no clock, no screen: texts have styles by name.
+"""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
+import math
+from typing import Any, NamedTuple
+
+from std_srvs.srv import Trigger
+
+# s without topics and diagnostics of a device until its values are out of date: bridges request a
+# status after 2.5 s, and publish diagnostics once a second.
+SILENCE = 6.0
+# s between two values of a trend, and their number.
+TREND_STEP, TREND_SIZE = 2.0, 60
+UNKNOWN = '-'
+LEVELS = (('OK', 'green'), ('WARN', 'yellow'), ('ERROR', 'bold red'), ('STALE', 'dim'))
+# The states of any device with their styles, and those with values that may be out of date.
+LOST, SILENT, GONE, NOT_KNOWN = STATES = ('LOST', 'silent', 'gone', '?')
+STATE_STYLES = dict(zip(STATES, ('bold red', 'yellow', 'red', 'dim'), strict=True))
+STALE_STATES = (LOST, SILENT, GONE)
+# The outcomes of a request with their styles.
+PENDING, DONE, FAILED = ('...', 'dim'), ('done', 'green'), ('FAILED', 'bold red')
+
+# A text, or a text with its style.
+Cell = str | tuple[str, str]
+# A line of the details: a label, and its parts.
+Line = tuple[str, Sequence[Cell]]
+
+
+class Topic(NamedTuple):
+    """
+    A topic ``~/name`` that the monitor shows.
+
+    :param type: the message's class.
+    :param read: returns the value of a message: a scalar, a text, or a tuple of them.
+    :param is_state: whether its QoS is STATE_QOS, so that its last value is kept.
+    """
+
+    type: type[object]  # noqa: A003
+    read: Callable[[Any], Any] = lambda message: message.data
+    is_state: bool = True
+
+
+class Diagnosis(NamedTuple):
+    """A status on /diagnostics; the level is an index of :data:`LEVELS`."""
+
+    level: int
+    message: str
+    values: Mapping[str, str]
+
+
+class Request(NamedTuple):
+    """
+    A request to a device.
+
+    :param text: for the operator.
+    :param name: of the service or topic, below the node's name.
+    :param type: of the service or topic, untyped: they have no common base.
+    :param message: the request of the service, or the message, which has no answer.
+    :param values: the values that it requests, by name.
+    :param question: the question that the operator must confirm first, since it can hurt people.
+    :param is_off: whether it switches something off, and waits for no other request.
+    """
+
+    text: str
+    name: str
+    type: Any  # noqa: A003
+    message: Any
+    values: Mapping[str, Any] = {}
+    question: str = ''
+    is_off: bool = False
+
+
+@dataclass(eq=False)
+class Device:
+    """
+    The known state of a device.
+
+    :param name: of its node, with namespace.
+    :param now: when the values were taken, s.
+    :param source: of commands, which the operator has chosen; '' for the plain interface.
+    :ivar heard_at: when the device was last heard, s.
+    :ivar values: by topic.
+    :ivar changed_at: when each topic changed, s, absent before its first change.
+    :ivar wanted: values that were requested, and until when they count as such, s.
+    :ivar action: the last request, its outcome, the answer, and when that was noted, s.
+    """
+
+    name: str
+    view: View
+    now: float
+    source: str = ''
+    heard_at: float = -math.inf
+    gone_at: float | None = None
+    values: dict[str, Any] = field(default_factory=dict)
+    changed_at: dict[str, float] = field(default_factory=dict)
+    wanted: dict[str, tuple[Any, float]] = field(default_factory=dict)
+    trend: deque[float | None] = field(default_factory=lambda: deque(maxlen=TREND_SIZE))
+    diagnoses: dict[str, Diagnosis] = field(default_factory=dict)
+    action: tuple[str, tuple[str, str], str, float] | None = None
+
+    @property
+    def state(self) -> str:
+        """Return its state in a word."""
+        if self.gone_at is not None:
+            return GONE
+        if self.now - self.heard_at > SILENCE:
+            return SILENT
+        return LOST if self.values.get('connected') is False else self.view.state(self)
+
+    @property
+    def prefix(self) -> str:
+        """Return the prefix of the names of commands: the operator's source, if it has sources."""
+        return f'{self.source}/' if self.source and 'source' in self.values else ''
+
+    def wants(self, name: str, known: Any) -> Any:
+        """Return a value that was requested lately, else the known one."""
+        value, until = self.wanted.get(name, (None, -math.inf))
+        return value if self.now < until else known
+
+    def diagnosed(self, kind: str, key: str) -> str:
+        """Return a value of the diagnostics, '' if there is none."""
+        return self.diagnoses[kind].values.get(key, '') if kind in self.diagnoses else ''
+
+    def number(self, kind: str, key: str) -> float | None:
+        """Return a finite number of the diagnostics, None if there is none."""
+        try:
+            value = float(self.diagnosed(kind, key))
+        except ValueError:
+            return None
+        return value if math.isfinite(value) else None
+
+    def since(self, topic: str) -> str:
+        """Return for how long a topic has had its value, '' if that is not known."""
+        return age(self.now - self.changed_at[topic]) if topic in self.changed_at else ''
+
+
+class Column(NamedTuple):
+    """A column of the list, with its width in characters."""
+
+    title: str
+    width: int
+    cell: Callable[[Device], Cell]
+
+
+class Key(NamedTuple):
+    """
+    Keys with one meaning.
+
+    :param text: the meaning, for the help.
+    :param label: the same for the bar, '' for keys that it does not have.
+    :param request: returns the request for a device and the text that was typed, or why there is
+        none, for people.
+    :param prompt: what the operator types first, '' for nothing.
+    :param is_steering: whether the keys act only after the operator has begun to steer.
+    """
+
+    keys: tuple[str, ...]
+    text: str
+    label: str
+    request: Callable[[Device, str], Request | str]
+    prompt: str = ''
+    is_steering: bool = False
+
+
+def _ok(device: Device) -> str:
+    return 'ok' if device.values else NOT_KNOWN
+
+
+@dataclass(frozen=True)
+class View:
+    """
+    How the monitor shows the devices of one payload.
+
+    :param kind: of device, such as ``light``.
+    :param topics: by name; a node that publishes those of ``signature`` is such a device.
+    :param columns: the most important first: a narrow screen cuts off the others.
+    :param details: returns the lines below the list.
+    :param states: the words of :meth:`state` with their styles, in the order of the counts.
+    :param state: returns the state of a connected device.
+    :param trend: the topic whose last values are kept.
+    :param off: the request for "all off".
+    """
+
+    kind: str
+    topics: Mapping[str, Topic]
+    signature: Sequence[str]
+    columns: Sequence[Column]
+    details: Callable[[Device], Iterable[Line]]
+    keys: Sequence[Key]
+    states: Mapping[str, str] = field(default_factory=lambda: {'ok': 'green'})
+    state: Callable[[Device], str] = _ok
+    trend: str = ''
+    off: Callable[[Device], Request] | None = None
+
+
+def trigger(text: str, name: str, question: str = '') -> Request:
+    """Return a request to a service of std_srvs/Trigger."""
+    return Request(text, name, Trigger, Trigger.Request(), question=question)
+
+
+def release_source(device: Device, typed: str) -> Request | str:
+    """Give a device back to the other sources of commands."""
+    if 'source' not in device.values:
+        return 'it has no sources of commands'
+    return trigger('give back', f'{device.source or "default"}/release')
+
+
+RELEASE_SOURCE = Key(('u',), 'give it back to other sources of commands', 'give back',
+                     release_source)
+
+
+def bar(value: float, width: int) -> str:
+    """Return a bar for a share, %."""
+    # In this order 0 replaces NaN.
+    filled = max(round(min(max(0.0, value / 100), 1.0) * width), int(value > 0))
+    return '█' * filled + '░' * (width - filled)
+
+
+def sparkline(values: Iterable[float | None], smallest_span: float) -> str:
+    """Return a character for each value, a space for None."""
+    # Published values are not checked, and their difference must be finite.
+    drawn = [None if value is None or value != value else min(max(value, -1e6), 1e6)
+             for value in values]
+    known = [value for value in drawn if value is not None] or [0.0]
+    low, span = min(known), max(known) - min(known)
+    low, span = low - max(smallest_span - span, 0) / 2, max(span, smallest_span)
+    return ''.join(' ' if value is None else '▁▂▃▄▅▆▇█'[min(int((value - low) / span * 8), 7)]
+                   for value in drawn)
+
+
+def dial(value: float, low: float, high: float, width: int) -> str:
+    """Return a scale from ``low`` to ``high`` with a mark at a value, and one at 0."""
+    marks = ['─'] * width
+    for at, mark in ((0.0, '┼'), (value, '█')):
+        if low != high and math.isfinite(at):
+            marks[round(min(max((at - low) / (high - low), 0.0), 1.0) * (width - 1))] = mark
+    return ''.join(marks)
+
+
+def measured(value: float | None, unit: str, form: str = '.3g') -> str:
+    """Return a number with its unit."""
+    return UNKNOWN if value is None else f'{value:{form}} {unit}'
+
+
+def age(seconds: float) -> str:
+    """Return a length of time in one unit."""
+    for unit, size in (('d', 86400), ('h', 3600), ('min', 60)):
+        if seconds >= 2 * size:
+            return f'{seconds / size:.3g} {unit}'
+    return f'{max(seconds, 0):.0f} s'

@@ -1,0 +1,270 @@
+# Copyright 2026 The illuminator_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""The screen of the monitor, on terminals of every size and kind, its keys and its labels."""
+
+from illuminator_ros.cli.monitor.app import ACTIONS, COMMON_KEYS, QUESTION_LIFETIME
+from illuminator_ros.ros.monitor_view import DONE, FAILED
+import pytest
+from support.monitor import camera, gimbal, light, NOW, Screen, show
+from textual.color import Color
+from textual.events import Paste
+
+SIZES = [(500, 500), (200, 50), (80, 24), (40, 44), (20, 6), (12, 3), (5, 2), (1, 1)]
+
+
+@pytest.mark.parametrize('size', SIZES)
+@pytest.mark.parametrize('count', [0, 1, 40])
+def test_screen_fits_every_terminal_and_shows_the_selected_device(
+    size: tuple[int, int], count: int,
+) -> None:
+    width, height = size
+
+    async def test(screen: Screen) -> None:
+        for keys in (['end'], ['?'], ['escape', '+'], ['space']):
+            await screen.press(*keys)
+            await screen.wait()
+            assert sum(len(line) > width for line in screen.lines) == 0
+            assert len(screen.lines) <= height
+            if count and keys != ['?'] and width > 20:
+                assert f'/l{count - 1:02}' in screen.text
+
+    show(test, *(light(f'/l{number:02}') for number in range(count)), size=size)
+
+
+def test_screen_shows_each_kind_with_its_states_values_and_findings() -> None:
+    async def test(screen: Screen) -> None:
+        for text in ('2 lights: 1 ON, 1 off', '/bow off 40 % 41.5 C steady internal', '12 %',
+                     '1 camera: 1 ok', '/camera ok 7 12 ms fix 47.300000 8.500000 480.0 m',
+                     '1 gimbal: 1 ours', '/gimbal ours 28.6 down 14.3 right primary 1/194',
+                     'WARN: dimmed because it is hot', 'held by safety for 61 s'):
+            assert text in screen.text
+
+    show(test, light(), light('/stern', enabled=True), camera(), gimbal(), size=(200, 40))
+
+
+def test_state_is_a_word_and_not_only_a_colour() -> None:
+    gone = light('/gone')
+    gone.gone_at = NOW
+
+    async def test(screen: Screen) -> None:
+        assert '3 lights: 1 off, 1 LOST, 1 gone' in screen.text
+        await screen.wait(30.0)
+        assert '3 lights: 2 silent, 1 gone' in screen.text
+        assert 'nothing heard for 30 s' in screen.text
+
+    show(test, light(), gone, light('/lost', connected=False))
+
+
+def test_last_request_is_shown_with_its_answer_and_age() -> None:
+    one = light()
+    one.action = ('brightness 90 %', FAILED, 'refused: [red]MAV_RESULT_DENIED', NOW - 3)
+
+    async def test(screen: Screen) -> None:
+        assert ('last brightness 90 %: FAILED: refused: [red]MAV_RESULT_DENIED (3 s ago)'
+                in screen.text)
+
+    show(test, one)
+
+
+def test_no_devices_are_a_sentence_and_keys_do_nothing() -> None:
+    async def test(screen: Screen) -> None:
+        await screen.press('down', 'space', 'm', 'a', '+')
+        assert 'no devices in this ROS graph yet' in screen.text
+
+    assert show(test).requests == []
+
+
+@pytest.mark.parametrize('ascii_only', [False, True])
+def test_terminal_for_ascii_gets_ascii_only(ascii_only: bool) -> None:
+    async def test(screen: Screen) -> None:
+        shown = ''
+        for keys in ([], ['end'], ['m'], ['?']):
+            await screen.press(*keys)
+            shown += screen.text
+        assert shown.isascii() is ascii_only
+
+    show(test, light(mode='\u00dcn\u00ef'), light('/' + 'x' * 200), gimbal(),
+         ascii_only=ascii_only)
+
+
+def test_colours_are_left_out_where_they_are_not_wanted(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv('NO_COLOR', '1')
+
+    async def test(screen: Screen) -> None:
+        segments = [segment for y in range(screen.app.size.height)
+                    for segment in screen.app.query_one('#devices').render_line(y)]
+        filtered = [segment.style for one in screen.app.get_line_filters()
+                    for segment in one.apply(segments, Color(0, 0, 0))]
+        assert all(style is None or style.color is None or style.color.is_default
+                   for style in filtered)
+
+    show(test, light())
+
+
+@pytest.mark.parametrize(('keys', 'selected'), [
+    ([], '/a'), (['down'], '/b'), (['j', 'j'], '/c'), (['end'], '/c'), (['down'] * 9, '/c'),
+    (['up'], '/a'), (['end', 'k'], '/b'), (['end', 'home'], '/a'), (['pagedown'], '/c'),
+    (['end', 'pageup'], '/a')])
+def test_selection_moves_and_stops_at_the_ends(keys: list[str], selected: str) -> None:
+    async def test(screen: Screen) -> None:
+        await screen.press(*keys, 'r')
+
+    assert show(test, *map(light, ('/a', '/b', '/c'))).asked == [(selected, 'refresh')]
+
+
+def test_selection_follows_a_click_and_the_wheel() -> None:
+    async def test(screen: Screen) -> None:
+        await screen.click('/c')
+        await screen.press('r')
+        screen.app.on_mouse_scroll_up()
+        await screen.press('r')
+
+    assert show(test, *map(light, ('/a', '/b', '/c'))).asked == [
+        ('/c', 'refresh'), ('/b', 'refresh')]
+
+
+def test_selection_stays_with_its_device_and_moves_up_when_that_is_cleared() -> None:
+    async def test(screen: Screen) -> None:
+        await screen.press('end')
+        screen.graph.devices.insert(0, light('/0'))
+        await screen.wait()
+        await screen.press('r')
+        del screen.graph.devices[3]
+        await screen.wait()
+        await screen.press('r', 'c')
+
+    graph = show(test, *map(light, ('/a', '/b', '/c')))
+    assert graph.asked == [('/c', 'refresh'), ('/b', 'refresh')]
+    assert graph.cleared == 1
+
+
+def test_light_is_switched_on_only_after_a_second_key_within_the_time() -> None:
+    async def test(screen: Screen) -> None:
+        for other in ('space', 'escape', 'y', '+', 'down'):
+            await screen.press('space', other, 'escape')
+        await screen.press('space')
+        await screen.wait(QUESTION_LIFETIME + 1)
+        await screen.press('enter')
+        assert screen.graph.asked == []
+        await screen.press('space')
+        assert 'switch /bow ON? It can dazzle.' in screen.text
+        await screen.press('enter')
+
+    assert show(test, light()).asked == [('/bow', 'on')]
+
+
+def test_question_is_dropped_when_its_device_is_no_longer_selected() -> None:
+    async def test(screen: Screen) -> None:
+        await screen.press('space')
+        await screen.click('/stern')
+        await screen.press('enter')
+
+    assert show(test, light(), light('/stern')).asked == []
+
+
+def test_light_is_switched_on_and_off_by_clicks_on_labels() -> None:
+    async def test(screen: Screen) -> None:
+        await screen.click('on/off')
+        await screen.click('yes')
+        await screen.click('0 off')
+        await screen.click('ALL OFF')
+
+    assert show(test, light()).asked == [('/bow', 'on'), ('/bow', 'off'), ('/bow', 'off')]
+
+
+@pytest.mark.parametrize('before', [[], ['?'], ['space'], ['end', 'p', '4', '7'], ['end', 'm']])
+def test_all_off_acts_at_once_whatever_is_shown(before: list[str]) -> None:
+    gone = light('/gone')
+    gone.gone_at = NOW
+
+    async def test(screen: Screen) -> None:
+        await screen.press(*before, 'a')
+        assert 'ALL OFF' in screen.text
+
+    assert show(test, light(), gone, light('/stern', connected=False), gimbal()).asked == [
+        ('/bow', 'off'), ('/stern', 'off')]
+
+
+def test_arrows_move_a_gimbal_only_after_steering_has_begun() -> None:
+    async def test(screen: Screen) -> None:
+        await screen.press('end', 'up', 'end', 'm', 'up', 'left', 'escape', 'up', 'end', 'm', 'j')
+        assert screen.graph.asked == [
+            ('/gimbal', 'pitch to 23.6 degrees'), ('/gimbal', 'yaw to -9.3 degrees')]
+        await screen.press('up', 'm', 'up')
+
+    assert len(show(test, light(), gimbal()).asked) == 2
+
+
+def test_place_is_typed_or_pasted_corrected_and_sent_with_enter() -> None:
+    async def test(screen: Screen) -> None:
+        await screen.press('p', *'47.1', 'backspace', '3', 'space', *'8.5')
+        screen.app.post_message(Paste(' 480'))
+        await screen.pilot.pause()
+        assert '47.3 8.5 480_' in screen.text
+        await screen.press('enter', 'p', '1', 'escape', 'p', 'enter')
+
+    graph = show(test, gimbal())
+    assert graph.asked == [('/gimbal', 'point at 47.3 8.5 480')]
+    assert graph.devices[0].action is not None
+    assert graph.devices[0].action[2] == "'' is not latitude, longitude and altitude"
+
+
+def test_help_lists_each_key_and_any_key_goes_back() -> None:
+    async def test(screen: Screen) -> None:
+        await screen.press('?')
+        views = (screen.graph.devices[0].view, screen.graph.devices[1].view)
+        for keys in (*(one[0] for one in COMMON_KEYS),
+                     *(key.keys for view in views for key in view.keys)):
+            assert '  '.join(keys) in '\n'.join(screen.lines)
+        await screen.press('space')
+        assert '/bow' in screen.text
+
+    assert show(test, light(), gimbal(), size=(132, 60)).requests == []
+
+
+@pytest.mark.parametrize('key', [key for key, action in ACTIONS.items() if action == 'quit'])
+def test_each_key_to_quit_ends_the_monitor_even_from_the_help(key: str) -> None:
+    async def test(screen: Screen) -> None:
+        await screen.press('?', key)
+        assert not screen.app.is_running or screen.app._exit
+
+    show(test, light())
+
+
+def test_monitor_ends_when_its_terminal_is_closed() -> None:
+    async def test(screen: Screen) -> None:
+        assert screen.app._exit
+
+    show(test, light(), is_alive=lambda: False)
+
+
+def test_labels_of_keys_are_not_keys_of_others() -> None:
+    # A common key that a device has, too, would never reach the device.
+    for one in (light(), gimbal(), camera()):
+        own = {key for entry in one.view.keys if not entry.is_steering for key in entry.keys}
+        assert own & ACTIONS.keys() == set()
+
+
+def test_outcome_of_a_request_has_its_colour() -> None:
+    one = light()
+    one.action = ('on', DONE, 'confirmed', NOW)
+
+    async def test(screen: Screen) -> None:
+        styles = {segment.text: segment.style
+                  for segment in screen.app.query_one('#details').render_line(1)}
+        assert 'done' in styles
+        assert styles['done'] != styles[': confirmed']
+
+    show(test, one)

@@ -1,0 +1,241 @@
+# Copyright 2026 The illuminator_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""The order of the monitor's requests, with services that answer when a test lets them."""
+
+from types import SimpleNamespace
+from typing import Any, cast
+
+from illuminator_ros.cli.monitor.ros_graph import (
+    ANSWER_LIMIT,
+    DISCOVERY_LIMIT,
+    OFF_INTERVAL,
+    Requests,
+)
+from illuminator_ros.ros.monitor_view import Device, Request
+import pytest
+from rclpy.node import Node
+from std_srvs.srv import SetBool
+from support.monitor import gimbal, light
+
+
+class Endpoint:
+    """A client of a service and a publisher at once, with what was sent."""
+
+    def __init__(self) -> None:
+        self.ready = True
+        self.sent: list[Any] = []
+        self.answers: list[tuple[Any, Any]] = []
+        self.handle = self
+
+    def service_is_ready(self) -> bool:
+        return self.ready
+
+    def send_request(self, request: Any) -> int:
+        self.sent.append(request)
+        return len(self.sent)
+
+    def take_response(self, type_: Any) -> tuple[Any, Any]:
+        return self.answers.pop(0) if self.answers else (None, None)
+
+
+class Topic(Endpoint):
+    """A publisher."""
+
+    def get_subscription_count(self) -> int:
+        return int(self.ready)
+
+    def publish(self, message: Any) -> None:
+        self.sent.append(message)
+
+
+class Bench:
+    """The requests to a light that is off and steady, at 40 %."""
+
+    def __init__(self, of: Device | None = None) -> None:
+        self.now = 0.0
+        self.device = of or light()
+        self.endpoints: dict[str, Endpoint] = {}
+        self.requests = Requests(cast(Node, self), self.device, lambda: self.now)
+
+    def create_client(self, type_: Any, name: str) -> Endpoint:
+        return self.endpoints.setdefault(name, Endpoint())
+
+    def create_publisher(self, type_: Any, name: str, depth: int) -> Endpoint:
+        return self.endpoints.setdefault(name, Topic())
+
+    def press(self, *keys: str) -> None:
+        for key in keys:
+            [found] = [one for one in self.device.view.keys if key in one.keys]
+            self.device.now = self.now
+            request = found.request(self.device, '')
+            assert isinstance(request, Request)
+            self.requests.submit(request)
+
+    def sets(self) -> list[dict[str, float]]:
+        """Return the parameters of each set that was sent."""
+        sent = self.endpoints['/bow/set_parameters_atomically'].sent
+        return [{one.name: one.value.double_value for one in request.parameters}
+                for request in sent]
+
+    def switches(self) -> list[bool]:
+        """Return the values of the enable requests that were sent."""
+        return [request.data for request in self.endpoints['/bow/enable'].sent]
+
+    def answer(self, service: str, number: int, success: bool = True, text: str = 'fine') -> None:
+        """Answer a request, which is counted from 1."""
+        header = SimpleNamespace(request_id=SimpleNamespace(sequence_number=number))
+        answer = (SetBool.Response(success=success, message=text) if service == 'enable' else
+                  SimpleNamespace(result=SimpleNamespace(successful=success, reason=text)))
+        self.endpoints[f'/bow/{service}'].answers.append((header, answer))
+        self.requests.poll()
+
+    def outcome(self) -> tuple[str, str, str]:
+        """Return text, outcome and answer of the last request."""
+        assert self.device.action is not None
+        text, (outcome, _), answer, _ = self.device.action
+        return text, outcome, answer
+
+
+@pytest.fixture
+def bench() -> Bench:
+    return Bench()
+
+
+SET = 'set_parameters_atomically'
+
+
+def test_sets_during_another_go_out_as_one_and_start_from_the_requested_value(
+    bench: Bench,
+) -> None:
+    bench.press('-', '-', '-')
+    assert bench.sets() == [{'brightness': 30.0}]
+
+    bench.answer(SET, 1)
+    assert bench.sets()[1:] == [{'brightness': 10.0}]
+
+    bench.answer(SET, 2)
+    bench.press('+')
+    assert bench.sets()[2:] == [{'brightness': 20.0}]
+
+
+def test_refused_set_drops_those_behind_it_and_keeps_its_reason(bench: Bench) -> None:
+    bench.press('-', '-')
+
+    bench.answer(SET, 1, success=False, text='no\x1b[2J')
+
+    assert len(bench.sets()) == 1
+    assert bench.outcome() == ('brightness 30 %', 'FAILED', 'no [2J')
+    assert bench.device.wants('brightness', 40.0) == 40.0
+
+
+def test_strobe_and_switch_do_not_wait_for_a_set_of_the_brightness(bench: Bench) -> None:
+    bench.press('-', 's', 'space')
+
+    assert len(bench.sets()) == 2
+    assert bench.switches() == [True]
+    assert bench.device.wants('enabled', None) is True
+
+
+def test_newest_switch_is_sent_after_the_one_before(bench: Bench) -> None:
+    bench.device.values['enabled'] = True
+    bench.press('space', 'space')
+    assert bench.switches() == [False]
+
+    bench.answer('enable', 1)
+
+    assert bench.switches() == [False, True]
+
+
+def test_on_is_dropped_when_the_off_before_it_fails(bench: Bench) -> None:
+    bench.device.values['enabled'] = True
+    bench.press('space', 'space')
+
+    bench.answer('enable', 1, success=False, text='no')
+
+    assert bench.switches() == [False]
+    assert bench.outcome() == ('off', 'FAILED', 'no')
+
+
+def test_off_does_not_wait_for_an_on_whose_answer_is_then_ignored(bench: Bench) -> None:
+    bench.press('space', '0')
+
+    assert bench.switches() == [True, False]
+    bench.answer('enable', 1)
+    assert bench.outcome()[:2] == ('off', '...')
+    bench.answer('enable', 2)
+    assert bench.outcome() == ('off', 'done', 'fine')
+
+
+def test_off_is_sent_again_at_an_interval_while_it_is_unanswered(bench: Bench) -> None:
+    for number in range(11):
+        bench.now = OFF_INTERVAL / 5 * number
+        bench.press('0')
+
+    assert bench.switches() == [False] * 3
+
+
+@pytest.mark.parametrize('success', [True, False])
+def test_off_that_waits_is_sent_whatever_became_of_the_one_before(
+    bench: Bench, success: bool,
+) -> None:
+    bench.press('0', '0')
+
+    bench.answer('enable', 1, success=success)
+
+    assert bench.switches() == [False, False]
+
+
+def test_unanswered_request_is_given_up_and_its_late_answer_is_ignored(bench: Bench) -> None:
+    bench.press('space')
+
+    bench.now = ANSWER_LIMIT - 0.1
+    bench.requests.poll()
+    assert bench.outcome()[1] == '...'
+    bench.now = ANSWER_LIMIT
+    bench.requests.poll()
+    assert bench.outcome() == ('on', 'FAILED', 'no answer for 8 s')
+
+    bench.press('space')
+    bench.answer('enable', 1)
+    assert bench.outcome()[1] == '...'
+
+
+def test_on_is_not_sent_to_a_service_that_appears_late(bench: Bench) -> None:
+    bench.endpoints['/bow/enable'] = Endpoint()
+    bench.endpoints['/bow/enable'].ready = False
+    bench.press('space')
+
+    bench.now = DISCOVERY_LIMIT
+    bench.requests.poll()
+    bench.endpoints['/bow/enable'].ready = True
+    bench.requests.poll()
+
+    assert bench.switches() == []
+    assert bench.outcome() == ('on', 'FAILED', 'nothing takes /bow/enable')
+
+
+def test_message_on_a_topic_waits_for_a_subscriber_and_has_no_answer() -> None:
+    bench = Bench(gimbal())
+    topic = bench.endpoints['/gimbal/cmd/angles'] = Topic()
+    topic.ready = False
+    bench.press('up')
+    assert topic.sent == []
+
+    topic.ready = True
+    bench.requests.poll()
+    bench.press('up')
+
+    assert [round(message.vector.y, 3) for message in topic.sent] == [0.413, 0.325]
+    assert bench.outcome()[1:] == ('done', 'sent, which has no answer')

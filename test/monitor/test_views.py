@@ -1,0 +1,261 @@
+# Copyright 2026 The illuminator_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""The values that each kind of device shows, and the requests of its keys. No ROS graph."""
+
+import math
+from typing import Any
+
+from illuminator_ros.gimbal.ros import monitor_view as gimbal_view
+from illuminator_ros.illuminator.ros import monitor_view as light_view
+from illuminator_ros.ros import monitor_view as shared
+import pytest
+from support.monitor import camera, gimbal, light, NOW
+
+
+def request(of: shared.Device, key: str, typed: str = '') -> shared.Request:
+    """Return the request of a key."""
+    made = ask(of, key, typed)
+    assert isinstance(made, shared.Request), made
+    return made
+
+
+def ask(of: shared.Device, key: str, typed: str = '') -> shared.Request | str:
+    """Return the request of a key, or why there is none."""
+    [found] = [one for one in of.view.keys if key in one.keys]
+    return found.request(of, typed)
+
+
+def wanting(of: shared.Device, **wanted: Any) -> shared.Device:
+    """Return a device with requests under way."""
+    of.wanted = {name: (value, math.inf) for name, value in wanted.items()}
+    return of
+
+
+@pytest.mark.parametrize(('values', 'state'), [
+    ({}, 'off'), ({'enabled': True}, 'ON'), ({'connected': False}, 'LOST')])
+def test_state_follows_from_the_topics(values: dict[str, Any], state: str) -> None:
+    assert light(**values).state == state
+
+
+def test_device_that_has_published_nothing_is_unknown_then_silent_and_gone_if_it_left() -> None:
+    for one in (light(), gimbal(), camera()):
+        one.values.clear()
+        assert one.state == '?'
+        one.now = NOW + shared.SILENCE + 0.1
+        assert one.state == 'silent'
+        one.gone_at = NOW
+        assert one.state == 'gone'
+
+
+@pytest.mark.parametrize(('one', 'on'), [
+    (light(enabled=True), False), (light(), True), (wanting(light(), enabled=True), False)])
+def test_switch_reverses_the_requested_or_reported_state_and_asks_before_on(
+    one: shared.Device, on: bool,
+) -> None:
+    made = request(one, 'space')
+
+    assert (made.values, made.is_off, bool(made.question)) == ({'enabled': on}, not on, on)
+    off = request(one, '0')
+    assert (off.message.data, off.is_off, off.question) == (False, True, '')
+
+
+@pytest.mark.parametrize(('one', 'key', 'target'), [
+    (light(), '+', 50.0), (light(), '-', 30.0), (light(), '.', 41.0), (light(), ',', 39.0),
+    (light(brightness=95.0), 'right', 100.0), (light(brightness=5.0), 'left', 0.0),
+    # A hot light shines less than agreed; a request takes precedence.
+    (light(error_flags=1), '-', 80.0), (wanting(light(), brightness=60.0), '-', 50.0)])
+def test_dim_steps_from_the_newest_brightness_within_the_range(
+    one: shared.Device, key: str, target: float,
+) -> None:
+    made = request(one, key)
+
+    assert made.values == {'brightness': target}
+    assert [(parameter.name, parameter.value.double_value)
+            for parameter in made.message.parameters] == [('brightness', target)]
+
+
+def test_dim_is_refused_while_the_brightness_is_unknown() -> None:
+    one = light()
+    del one.values['brightness']
+
+    assert ask(one, '+') == 'its brightness is not known yet'
+
+
+@pytest.mark.parametrize(('one', 'values', 'asks'), [
+    (light(), {'strobe_period': 1.0, 'strobe_duty_cycle': 50.0}, True),
+    (light(strobe_duty_cycle=20.0), {'strobe_period': 1.0, 'strobe_duty_cycle': 20.0}, True),
+    (light(strobe_period=0.5), {'strobe_period': 0.0}, False),
+    (wanting(light(), strobe_period=1.0), {'strobe_period': 0.0}, False)])
+def test_strobe_asks_and_starts_with_the_last_duty_cycle_or_ends(
+    one: shared.Device, values: object, asks: bool,
+) -> None:
+    assert request(one, 's').values == values
+    assert bool(request(one, 's').question) is asks
+
+
+@pytest.mark.parametrize(('source', 'values', 'names'), [
+    ('autonomy', {'source': ''}, ['autonomy/enable', 'autonomy/cmd/brightness',
+                                  'autonomy/release']),
+    ('', {'source': 'safety'}, ['enable', 'set_parameters_atomically', 'default/release']),
+    # A light without sources has the plain interface only.
+    ('autonomy', {}, ['enable', 'set_parameters_atomically', ''])])
+def test_requests_of_a_source_have_its_names_where_the_device_has_sources(
+    source: str, values: dict[str, str], names: list[str],
+) -> None:
+    one = light(**values)
+    one.source = source
+
+    made = [ask(one, key) for key in ('0', '+', 'u')]
+
+    assert [one.name if isinstance(one, shared.Request) else '' for one in made] == names
+    assert isinstance(ask(one, 's'), str) is names[0].startswith('autonomy')
+
+
+@pytest.mark.parametrize(('key', 'axis', 'target'), [
+    ('left', 'z', -0.25 + math.radians(5)), ('right', 'z', -0.25 - math.radians(5)),
+    ('up', 'y', 0.5 - math.radians(5)), ('down', 'y', 0.5 + math.radians(5))])
+def test_arrow_turns_one_axis_in_the_frame_of_the_attitude(
+    key: str, axis: str, target: float,
+) -> None:
+    message = request(gimbal(), key).message
+
+    assert message.header.frame_id == 'base_link_stabilized'
+    assert getattr(message.vector, axis) == pytest.approx(target)
+    assert math.isnan(message.vector.x)
+
+
+@pytest.mark.parametrize(('one', 'key', 'target'), [
+    (wanting(gimbal(), yaw=1.0), 'left', 1.0 + math.radians(5)),
+    (gimbal(angles=('map', 0.0, 0.0, 3.13)), 'left', 3.13 + math.radians(5) - 2 * math.pi),
+    (gimbal(angles=('map', 0.0, 1.56, 0.0)), 'down', math.pi / 2)])
+def test_arrows_add_up_turn_on_beyond_half_a_turn_and_stop_straight_down(
+    one: shared.Device, key: str, target: float,
+) -> None:
+    assert [*request(one, key).values.values()] == pytest.approx([target])
+
+
+@pytest.mark.parametrize(('one', 'reason'), [
+    (gimbal(in_control=False), 'not in control (primary 1/194): t takes control'),
+    (gimbal(angles=('map', 0.0, math.nan, 0.0)), 'its angles are unknown')])
+def test_arrow_is_refused_where_the_node_would_ignore_it(one: shared.Device, reason: str) -> None:
+    assert ask(one, 'up') == reason
+
+
+@pytest.mark.parametrize(('typed', 'place'), [
+    ('47.3 8.5 480', (47.3, 8.5, 480.0)), ('-47.3,8.5, 0', (-47.3, 8.5, 0.0)), ('', None),
+    ('47.3 8.5', None), ('91 8.5 0', None), ('nan 0 0', None), ('0 0 inf', None)])
+def test_point_takes_a_place_and_nothing_else(
+    typed: str, place: tuple[float, ...] | None,
+) -> None:
+    made = ask(gimbal(), 'p', typed)
+
+    message = made.message if isinstance(made, shared.Request) else None
+    assert place == (message and (message.latitude, message.longitude, message.altitude))
+
+
+@pytest.mark.parametrize(('values', 'asks'), [
+    ({'in_control': True}, False),
+    ({'in_control': False, 'controller': 'primary none, secondary none'}, False),
+    ({'in_control': False}, True), ({'in_control': False, 'controller': 'unknown'}, True)])
+def test_control_that_another_component_may_have_is_taken_only_after_a_question(
+    values: dict[str, Any], asks: bool,
+) -> None:
+    assert bool(request(gimbal(**values), 't').question) is asks
+
+
+def test_gimbal_asks_before_it_turns_to_neutral_and_releases_at_once() -> None:
+    assert request(gimbal(), 'n').question == 'turn /gimbal to its neutral position?'
+    assert not request(gimbal(), 'l').question
+
+
+def test_keys_of_the_camera_are_its_services() -> None:
+    assert [request(camera(), key).name for key in ('space', 'b', 'p')] == [
+        'capture', 'capture_panel', 'ping']
+
+
+@pytest.mark.parametrize(('one', 'texts'), [
+    (light(error_flags=1), ['40 % (agreed: 90 %)', 'maker torch', 'no. T-1', 'up 5 min',
+                            '30.0 to 41.5 in 2 min']),
+    (light(strobe_period=0.5, strobe_duty_cycle=20.0), ['0.5 s 20 %']),
+    (gimbal(), ['28.6 down', '14.3 right', 'ours: primary 1/194']),
+    (camera(), ['7, at 47.300000 8.500000 480.0 m', 'fix ok 0 s', 'imu stale 9 s',
+                'mount missing']),
+    (camera(fix=(-1, 0.0, 0.0, 0.0)), ['7, at -'])])
+def test_details_have_what_is_known(one: shared.Device, texts: list[str]) -> None:
+    shown = '\n'.join(''.join(part if isinstance(part, str) else part[0] for part in parts)
+                      for _, parts in one.view.details(one))
+
+    assert [text for text in texts if text not in shown] == []
+
+
+def test_nothing_known_is_shown_as_unknown() -> None:
+    for one in (light(), gimbal(), camera()):
+        one.values.clear()
+        one.trend.clear()
+        one.diagnoses.clear()
+        cells = [column.cell(one) for column in one.view.columns]
+        assert {cell if isinstance(cell, str) else cell[0] for cell in cells} <= {
+            '-', 'none'}
+        assert [*one.view.details(one)]
+
+
+@pytest.mark.parametrize('value', [math.nan, math.inf, -1e308, 1e308])
+def test_numbers_that_cannot_be_are_shown(value: float) -> None:
+    one = light(brightness=value, strobe_period=value, strobe_duty_cycle=value, uptime=value,
+                temperature=value)
+    one.trend.append(value)
+    for of in (one, gimbal(angles=('map', value, value, value)),
+               camera(fix=(0, value, value, value))):
+        assert all(column.cell(of) for column in of.view.columns)
+        assert [*of.view.details(of)]
+    assert all(ask(one, key) for key in '0+-s')
+
+
+@pytest.mark.parametrize(('drawn', 'text'), [
+    (shared.bar(0.0, 4), '░░░░'), (shared.bar(0.1, 4), '█░░░'), (shared.bar(50.0, 4), '██░░'),
+    (shared.bar(900.0, 4), '████'), (shared.bar(math.nan, 4), '░░░░'),
+    (shared.sparkline([20.0, 25.0, 30.0, None, 40.0], 4.0), '▁▃▅ █'),
+    # A tenth of a degree is not a peak.
+    (shared.sparkline([25.0, 25.1, 25.0], 4.0), '▄▅▄'),
+    (shared.sparkline([None, math.nan], 4.0), '  '),
+    (shared.sparkline([-1.7e308, 1.7e308], 4.0), '▁█'),
+    (shared.dial(1.0, -2.0, 2.0, 5), '──┼█─'), (shared.dial(1.0, 2.0, -2.0, 5), '─█┼──'),
+    (shared.dial(9.0, -2.0, 2.0, 5), '──┼─█'), (shared.dial(math.nan, -2.0, 2.0, 5), '──┼──'),
+    (shared.age(59.6), '60 s'), (shared.age(150.0), '2.5 min'), (shared.age(1e6), '11.6 d')])
+def test_drawing_of_a_value(drawn: str, text: str) -> None:
+    assert drawn == text
+
+
+def test_target_of_the_last_request_counts_as_long_as_it_lasts() -> None:
+    one = light()
+    one.wanted = {'brightness': (60.0, NOW + 2.0)}
+
+    assert one.wants('brightness', 40.0) == 60.0
+    one.now = NOW + 2.0
+    assert one.wants('brightness', 40.0) == 40.0
+
+
+def test_keys_of_a_device_have_one_meaning() -> None:
+    for one in (light(), gimbal(), camera()):
+        keys = [key for key_ in one.view.keys for key in key_.keys]
+        assert len(keys) == len(set(keys))
+
+
+def test_steps_are_those_of_the_help() -> None:
+    texts = [key.text for key in (*light_view.VIEW.keys, *gimbal_view.VIEW.keys)]
+
+    assert f'brighter by {light_view.STEP:g} %' in texts
+    assert f'darker by {light_view.FINE_STEP:g} %' in texts
+    assert f'after m: left by {gimbal_view.STEP:g} degrees' in texts

@@ -1,0 +1,170 @@
+# Copyright 2026 The illuminator_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Chromium without a display, driven over WebDriver, with the screen of a terminal in a page."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+import contextlib
+import json
+import re
+import shutil
+import subprocess
+from typing import Any
+import urllib.error
+import urllib.request
+
+from support.ports import free_port
+from support.waiting import eventually, PATIENCE
+
+IS_INSTALLED = all(map(shutil.which, ('chromium', 'chromedriver')))
+ARGUMENTS = ('--headless', '--no-sandbox', '--disable-gpu', '--disable-quic', '--no-first-run',
+             '--disable-background-networking', '--disable-component-update', '--disable-sync',
+             '--disable-dev-shm-usage')
+# Records what the page receives over its WebSocket, since a canvas has no text.
+RECORDER = """
+window.received = ''; let last = Promise.resolve();
+window.WebSocket = class extends WebSocket {
+  constructor(url) {
+    super(url);
+    const size = new URL(url).searchParams;
+    window.size = {width: +size.get('width'), height: +size.get('height')};
+    this.addEventListener('message', event => { last = last.then(async () => {
+      if (typeof event.data !== 'string')
+        window.received += new TextDecoder().decode(
+          event.data instanceof Blob ? await event.data.arrayBuffer() : event.data);
+    }); });
+  }
+  send(data) {
+    if (data.startsWith('["resize"')) window.size = JSON.parse(data)[1];
+    super.send(data);
+  }
+};
+"""
+_TOKEN = re.compile('\x1b\\[(\\d*);?(\\d*)H|\x1b\\[[^@-~]*[@-~]|\x1b.|[^\x1b]', re.DOTALL)
+
+
+def screen(output: str) -> list[str]:
+    """Return the lines that a terminal shows after this output."""
+    cells: dict[tuple[int, int], str] = {}
+    row = column = 0
+    for token in _TOKEN.finditer(output):
+        if token[1] is not None:
+            row, column = int(token[1] or 1) - 1, int(token[2] or 1) - 1
+        elif token[0] == '\n':
+            row += 1
+        elif token[0] == '\r':
+            column = 0
+        elif len(token[0]) == 1:
+            cells[row, column] = token[0]
+            column += 1
+    ends: dict[int, int] = {}
+    for row, column in cells:
+        ends[row] = max(ends.get(row, 0), column + 1)
+    return [''.join(cells.get((row, column), ' ') for column in range(ends.get(row, 0)))
+            for row in range(max(ends, default=-1) + 1)]
+
+
+class Browser:
+    """A session with one browser, in which cookies last."""
+
+    def __init__(self, url: str) -> None:
+        self._url = url
+        session = self._call('POST', '/session', {'capabilities': {'alwaysMatch': {
+            'goog:chromeOptions': {'args': list(ARGUMENTS)}}}})
+        self._url += f'/session/{session["sessionId"]}'
+
+    def _call(self, method: str, path: str, body: object = None) -> Any:
+        request = urllib.request.Request(
+            self._url + path, None if body is None else json.dumps(body).encode(),
+            {'Content-Type': 'application/json'}, method=method)
+        try:
+            with urllib.request.urlopen(request, timeout=PATIENCE) as answer:
+                return json.load(answer)['value']
+        except urllib.error.HTTPError as error:
+            raise AssertionError(error.read().decode()[:1000]) from error
+
+    def cdp(self, command: str, **parameters: object) -> None:
+        """Execute a command of the DevTools protocol."""
+        self._call('POST', '/goog/cdp/execute', {'cmd': command, 'params': parameters})
+
+    def run(self, script: str) -> Any:
+        """Run a script in the page and return its value."""
+        return self._call('POST', '/execute/sync', {'script': script, 'args': []})
+
+    def open(self, url: str) -> None:  # noqa: A003
+        """Open a page in this tab."""
+        self.cdp('Page.addScriptToEvaluateOnNewDocument', source=RECORDER)
+        self._call('POST', '/url', {'url': url})
+
+    def new_tab(self) -> None:
+        """Open a tab, and use it."""
+        tab = self._call('POST', '/window/new', {'type': 'tab'})['handle']
+        self._call('POST', '/window', {'handle': tab})
+
+    @property
+    def text(self) -> str:
+        """Return what the terminal in the page shows, with single spaces."""
+        return ' '.join(' '.join(self.lines).split())
+
+    @property
+    def lines(self) -> list[str]:
+        """Return the lines of the terminal in the page."""
+        return screen(self.run('return window.received'))
+
+    def wait_for(self, text: str) -> None:
+        """Wait until the terminal shows a text."""
+        eventually(lambda: text in self.text, f'{text!r} on the page')
+
+    def click(self, label: str) -> None:
+        """Click a text in the terminal, as a finger or a mouse does."""
+        self.wait_for(label)
+        row, line = next((y, line) for y, line in enumerate(self.lines) if label in line)
+        left, top, width, height = self.run(
+            'const box = document.querySelector(".xterm-screen").getBoundingClientRect();'
+            'const {width, height} = window.size;'
+            'return [box.left, box.top, box.width / width, box.height / height]')
+        place = {'x': round(left + (line.index(label) + 1.5) * width),
+                 'y': round(top + (row + 0.5) * height)}
+        self._call('POST', '/actions', {'actions': [{
+            'type': 'pointer', 'id': 'mouse', 'actions': [
+                {'type': 'pointerMove', 'duration': 0, **place},
+                {'type': 'pointerDown', 'button': 0}, {'type': 'pointerUp', 'button': 0}]}]})
+
+    def close(self) -> None:
+        """End the session."""
+        self._call('DELETE', '')
+
+
+@contextlib.contextmanager
+def running_browser() -> Iterator[Browser]:
+    """Run Chromium."""
+    port = free_port()
+    with subprocess.Popen(['chromedriver', f'--port={port}'], stdout=subprocess.DEVNULL,
+                          stderr=subprocess.DEVNULL) as driver:
+        try:
+            url = f'http://127.0.0.1:{port}'
+
+            def answers() -> bool:
+                with contextlib.suppress(OSError):
+                    urllib.request.urlopen(f'{url}/status', timeout=PATIENCE).close()
+                    return True
+                return False
+
+            eventually(answers)
+            with contextlib.closing(Browser(url)) as browser:
+                yield browser
+        finally:
+            driver.terminate()

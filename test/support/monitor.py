@@ -1,0 +1,167 @@
+# Copyright 2026 The illuminator_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Devices of the monitor, and a graph without ROS that records the requests to them."""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import Awaitable, Callable
+from typing import Any, cast
+
+from illuminator_ros.cli.monitor.app import MonitorApp
+from illuminator_ros.cli.monitor.ros_graph import Graph
+from illuminator_ros.gimbal.ros.monitor_view import VIEW as GIMBAL
+from illuminator_ros.illuminator.ros.monitor_view import VIEW as LIGHT
+from illuminator_ros.rededge.ros.monitor_view import VIEW as CAMERA
+from illuminator_ros.ros.monitor_view import Device, Diagnosis, FAILED, Request, View
+from textual.pilot import Pilot
+from textual.widgets import Static
+
+NOW = 1000.0
+PRESENT: dict[str, dict[str, Any]] = {
+    'light': {'connected': True, 'enabled': False, 'brightness': 40.0, 'mode': 'internal_control',
+              'strobe_period': 0.0, 'strobe_duty_cycle': 0.0, 'error_flags': 0, 'uptime': 300.0,
+              'temperature': 41.5},
+    'gimbal': {'connected': True, 'in_control': True, 'controller': 'primary 1/194',
+               'yaw_lock': False, 'angles': ('base_link_stabilized', 0.0, 0.5, -0.25)},
+    'camera': {'connected': True, 'image/index': 7}}
+
+
+def device(view: View, name: str, **values: Any) -> Device:
+    """Return a device that has just published all its values, changed by those given."""
+    made = Device(name, view, NOW, heard_at=NOW)
+    made.values = PRESENT.get(view.kind, {}) | values
+    made.trend.extend([30.0, 35.0, None, 41.5] if view.trend else [])
+    made.diagnoses['link'] = Diagnosis(0, 'open', {
+        'loss_percent': '12.3', 'round_trip_p50_ms': '3.2'})
+    return made
+
+
+def light(name: str = '/bow', **values: Any) -> Device:
+    """Return a light that is off and steady, at 40 %."""
+    made = device(LIGHT, name, **values)
+    made.diagnoses['lamp'] = Diagnosis(1, 'dimmed because it is hot', {
+        'agreed': 'mode internal_control, brightness 90 %', 'vendor': 'maker', 'model': 'torch',
+        'serial_number': 'T-1', 'holder': 'safety', 'held_s': '61'})
+    return made
+
+
+def gimbal(name: str = '/gimbal', **values: Any) -> Device:
+    """Return a gimbal that the operator controls."""
+    return device(GIMBAL, name, **values)
+
+
+def camera(name: str = '/camera', fix: Any = (0, 47.3, 8.5, 480.0)) -> Device:
+    """Return a camera, with the position of its last image, which lacks an attitude."""
+    made = device(CAMERA, name, **{'image/fix': fix})
+    made.diagnoses['camera'] = Diagnosis(1, 'nothing received on ~/imu', {
+        'fix': 'ok', 'fix_s_ago': '0.2', 'imu': 'stale', 'imu_s_ago': '9', 'mount': 'missing',
+        'round_trip_ms': '12'})
+    return made
+
+
+class FakeGraph:
+    """A graph with given devices, whose time the test sets."""
+
+    def __init__(self, *devices: Device) -> None:
+        self.now = NOW
+        self.devices = list(devices)
+        self.requests: list[tuple[str, Request]] = []
+        self.cleared = 0
+
+    def clock(self) -> float:
+        """Return the time, s."""
+        return self.now
+
+    def submit(self, device: Device, request: Request) -> None:
+        """Record a request."""
+        self.requests.append((device.name, request))
+
+    def refuse(self, device: Device, text: str, reason: str) -> None:
+        """Note why a request is not sent."""
+        device.action = text, FAILED, reason, self.now
+
+    # Those of the monitor itself.
+    all_off = Graph.all_off
+
+    def clear_gone(self) -> None:
+        """Count the calls."""
+        self.cleared += 1
+
+    def poll(self) -> None:
+        """Take the time."""
+        for one in self.devices:
+            one.now = self.now
+
+    def poll_answers(self) -> None:
+        """Do nothing."""
+
+    @property
+    def asked(self) -> list[tuple[str, str]]:
+        """Return names and texts of the requests."""
+        return [(name, request.text) for name, request in self.requests]
+
+
+class Screen:
+    """The monitor on a terminal of the test's."""
+
+    def __init__(self, app: MonitorApp, pilot: Pilot[None], graph: FakeGraph) -> None:
+        self.app = app
+        self.pilot = pilot
+        self.graph = graph
+
+    @property
+    def lines(self) -> list[str]:
+        """Return the lines that are shown."""
+        shown = [one for one in self.app.query(Static) if one.display]
+        return [one.render_line(y).text for one in shown for y in range(one.size.height)]
+
+    @property
+    def text(self) -> str:
+        """Return the complete screen, with single spaces."""
+        return ' '.join(' '.join(self.lines).split())
+
+    async def press(self, *keys: str) -> None:
+        """Press keys."""
+        await self.pilot.press(*keys)
+
+    async def wait(self, seconds: float = 0.0) -> None:
+        """Let time pass for the monitor, and let it draw."""
+        self.graph.now += seconds
+        self.app.poll()
+        await self.pilot.pause()
+
+    async def click(self, label: str) -> None:
+        """Click a text."""
+        [(x, y)] = [(line.index(label), y) for y, line in enumerate(self.lines) if label in line]
+        await self.pilot.click(offset=(x + 1, y))
+
+
+def show(
+    test: Callable[[Screen], Awaitable[None]], *devices: Device, size: tuple[int, int] = (132, 40),
+    **how: Any,
+) -> FakeGraph:
+    """Show devices while a test runs; return the graph."""
+    graph = FakeGraph(*devices)
+    app = MonitorApp(cast(Graph, graph), **how)
+
+    async def run() -> None:
+        async with app.run_test(size=size) as pilot:
+            screen = Screen(app, pilot, graph)
+            await screen.wait()
+            await test(screen)
+
+    asyncio.run(run())
+    return graph

@@ -1,0 +1,129 @@
+# Copyright 2026 The illuminator_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""``monitor --web`` as a process, in a real browser."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+import contextlib
+import re
+import sys
+import urllib.error
+import urllib.request
+
+import pytest
+
+pytest.importorskip('textual_serve')
+
+from support.browser import Browser, IS_INSTALLED, running_browser  # noqa: E402
+from support.ports import free_port  # noqa: E402
+from support.processes import ended, Program, python, run  # noqa: E402
+from support.ros import own_domain  # noqa: E402
+from support.waiting import eventually  # noqa: E402
+
+MONITOR = 'illuminator_ros.monitor'
+TABS = 10
+
+
+@contextlib.contextmanager
+def served(*options: str) -> Iterator[tuple[Program, str]]:
+    """Serve browsers, beside a light; yield the server and its first URL."""
+    port, web = free_port(), free_port()
+    with own_domain() as domain, contextlib.ExitStack() as stack:
+        env = {'ROS_DOMAIN_ID': str(domain)}
+        for module, url in (('simulator', f'udpout://127.0.0.1:{port}'),
+                            ('bridge', f'udpin://127.0.0.1:{port}')):
+            stack.enter_context(ended(python(f'illuminator_ros.{module}', url, env=env)))
+        # Not of the fork server: the monitor starts its command line again.
+        server = stack.enter_context(ended(Program(
+            sys.executable, '-m', MONITOR, '--web', f'127.0.0.1:{web}', *options, env=env)))
+        yield server, urls(server, 1)[0]
+
+
+def urls(server: Program, count: int) -> list[str]:
+    """Wait until the server has printed so many URLs, and return them."""
+    eventually(lambda: len(re.findall('http://', server.log)) >= count)
+    return re.findall(r'http://\S+', server.log)
+
+
+def status(url: str, **headers: str) -> int:
+    """Return the status of the answer to a browser that has no cookies yet."""
+    opener = urllib.request.build_opener(urllib.request.HTTPCookieProcessor())
+    try:
+        with opener.open(urllib.request.Request(url, headers=headers)) as answer:
+            return int(answer.status)
+    except urllib.error.HTTPError as error:
+        return error.code
+
+
+@pytest.mark.skipif(not IS_INSTALLED, reason='chromium and chromium-driver are not installed')
+def test_page_operates_a_light_in_ten_tabs_and_on_a_phone_for_the_bearer_of_the_token() -> None:
+    with served('--token') as (server, url), running_browser() as browser:
+        site = url.partition('?')[0]
+        assert status(f'{site}?token=wrong') == 403
+        browser.open(url)
+        assert browser.run('return location.href') == site
+        assert_switches(browser, ['on/off', 'enter yes'], '1 light: 1 ON')
+        assert browser.run(
+            'return performance.getEntriesByType("resource").map(one => new URL(one.name).origin)'
+            '.filter(origin => origin != location.origin)') == []
+
+        # The token was used; the next one is for another browser.
+        assert status(url) == 403
+        _, following = urls(server, 2)
+        assert status(following) == 200
+
+        for _ in range(TABS - 1):
+            browser.new_tab()
+            browser.open(site)
+        browser.wait_for('1 light: 1 ON')
+        browser.cdp('Emulation.setDeviceMetricsOverride', width=390, height=844,
+                    deviceScaleFactor=1, mobile=True)
+        browser.open(site)
+        assert_switches(browser, ['0 off'], '1 light: 1 off')
+        assert browser.run('return document.documentElement.scrollWidth') <= 390
+        columns = browser.run('return window.size.width')
+        assert max(map(len, browser.lines)) <= columns
+
+
+def assert_switches(browser: Browser, labels: list[str], state: str) -> None:
+    browser.wait_for('/illuminator')
+    for label in labels:
+        browser.click(label)
+    browser.wait_for(state)
+
+
+def test_other_sites_and_names_are_refused() -> None:
+    with served() as (_, url):
+        assert status(url) == 200
+        assert status(f'{url}static/css/xterm.css') == 200
+        # A page of another site, a foreign name for this address, no page at all.
+        assert status(url, Origin='http://evil.example') == 403
+        assert status(url, Host='evil.example') == 403
+        assert status(f'{url}ws') == 403
+
+
+@pytest.mark.parametrize(('arguments', 'error', 'code'), [
+    (('0.0.0.0:0',), '0.0.0.0 can be reached from other machines: add --token', 2),
+    (('192.0.2.1:8000', '--token'),
+     'cannot serve 192.0.2.1:8000: ', 1),
+    (('8000',), 'argument --web: is not HOST:PORT; see monitor --help', 2)])
+def test_address_that_cannot_be_served_is_refused_in_one_line(
+    arguments: tuple[str, ...], error: str, code: int,
+) -> None:
+    outcome = run(MONITOR, '--web', *arguments)
+
+    assert (outcome.returncode, outcome.stdout) == (code, '')
+    assert outcome.stderr.splitlines()[-1].startswith(f'monitor: {error}')
