@@ -44,6 +44,8 @@ AT_LIMIT = (mavlink.GIMBAL_DEVICE_ERROR_FLAGS_AT_ROLL_LIMIT,
 LEVEL = mavlink.GIMBAL_DEVICE_FLAGS_ROLL_LOCK | mavlink.GIMBAL_DEVICE_FLAGS_PITCH_LOCK
 # rad; angles that differ by less are equal.
 RESOLUTION = 1e-6
+# rad/s above which an axis turns.
+TURNING = 0.01
 
 
 class Range(NamedTuple):

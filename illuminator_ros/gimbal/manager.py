@@ -27,7 +27,7 @@ import math
 import random
 from typing import TypeAlias
 
-from .axes import AT_LIMIT, LEVEL, range_fields, Ranges, UNLIMITED
+from .axes import AT_LIMIT, LEVEL, range_fields, Ranges, TURNING, UNLIMITED
 from .manager_control import ControlArbiter, ControlSettings, Role, RoleHolderChanged
 from .manager_setpoint import (
     AnySetpoint,
@@ -38,6 +38,7 @@ from .manager_setpoint import (
     GimbalModel,
     in_vehicle_frame,
     nudge,
+    POSES,
     read_demand,
     read_roi,
     resolve,
@@ -602,6 +603,15 @@ class GimbalManager(Payload):
             self.events.emit(ReferenceLost(name))
         self._lost = self._lost | {name} if is_lost else self._lost - {name}
 
+    def _end_of_motion(self, now: float) -> Setpoint | None:
+        """Return a rate of zero if the device turns, as a manager has left it that was killed."""
+        status = self._device_status(now)
+        if status is None or self._attitude is None or status.flags & POSES:
+            return None
+        rates = status.angular_velocity_x, status.angular_velocity_y, status.angular_velocity_z
+        turns = any(abs(rate) > TURNING for rate in rates)
+        return Setpoint(status.flags, self._attitude.frame, None, STILL) if turns else None
+
     # A region of interest
 
     def _set_roi(self, source: Address, command: AnyCommand, now: float) -> int:
@@ -712,6 +722,8 @@ class GimbalManager(Payload):
         active = change.after is ManagerState.ACTIVE
         self._status_due = now if active else math.inf
         self._send_due = now if active else math.inf
+        if active and self._setpoint is None:
+            self._setpoint = self._end_of_motion(now)
         if change.after in (ManagerState.INACTIVE, ManagerState.NO_DEVICE):
             # Another manager may have moved the device, or the next device may be another one. But
             # a device that turns at a rate continues until a manager stops it.

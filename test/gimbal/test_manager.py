@@ -207,6 +207,25 @@ def test_the_status_has_the_flags_of_the_setpoint() -> None:
         | mavlink.GIMBAL_DEVICE_FLAGS_ACCEPTS_YAW_IN_EARTH_FRAME)
 
 
+@pytest.mark.parametrize(('rate', 'flags', 'zeros'), [
+    (0.3, F.YAW_IN_VEHICLE_FRAME, True), (0.005, F.YAW_IN_VEHICLE_FRAME, False),
+    (NAN, F.YAW_IN_VEHICLE_FRAME, False), (0.3, F.YAW_IN_VEHICLE_FRAME | F.RETRACT, False)])
+def test_a_device_that_turns_when_the_manager_becomes_active_is_stopped(
+        rate: float, flags: F, zeros: bool) -> None:
+    rig = ManagerRig(active=False)
+    rig.turning, rig.flags = rate, flags
+
+    rig.run(6.0)
+
+    assert rig.manager.tracker.state is ManagerState.ACTIVE
+    sent = rig.messages(GimbalDeviceSetAttitude)
+    assert bool(sent) is zeros
+    for one in sent:
+        assert all(map(math.isnan, one.q))
+        assert (one.angular_velocity_x, one.angular_velocity_y, one.angular_velocity_z) == (
+            0.0, 0.0, 0.0)
+
+
 # GM-16, GM-17, GM-19: only the player in control reaches the device
 
 @pytest.mark.parametrize('holder', [None, PILOT])

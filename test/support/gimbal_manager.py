@@ -61,9 +61,11 @@ def information(capabilities: int = FULL, **ranges: Any) -> GimbalDeviceInformat
 def attitude_status(
     q: tuple[float, float, float, float] = (1.0, 0.0, 0.0, 0.0), *,
     flags: int = mavlink.GIMBAL_DEVICE_FLAGS_YAW_IN_VEHICLE_FRAME, heading: float = NAN,
+    turning: float = 0.0,
 ) -> GimbalDeviceAttitudeStatus:
-    """Return an attitude of the device."""
-    return GimbalDeviceAttitudeStatus(0, 0, 0, int(flags), q, 0.0, 0.0, 0.0, 0, heading, NAN, 0)
+    """Return an attitude of the device; ``turning`` is the rate of its yaw, rad/s."""
+    return GimbalDeviceAttitudeStatus(
+        0, 0, 0, int(flags), q, 0.0, 0.0, turning, 0, heading, NAN, 0)
 
 
 class ManagerRig:
@@ -76,6 +78,8 @@ class ManagerRig:
     :ivar device_information: the answer of the device; None for no device.
     :ivar lost: how many of its next answers are lost, and how many GIMBAL_DEVICE_INFORMATION.
     :ivar heading: of the vehicle, as the device reports it.
+    :ivar flags: as the device reports them.
+    :ivar turning: the rate of its yaw, as the device reports it, rad/s.
     """
 
     def __init__(
@@ -90,6 +94,7 @@ class ManagerRig:
         self.device_information = device or information()
         self.device_is_there = not 0 < device_id < 7
         self.heading = NAN
+        self.flags, self.turning = mavlink.GIMBAL_DEVICE_FLAGS_YAW_IN_VEHICLE_FRAME, 0.0
         self.lost = lost
         self.draw = itertools.chain(draws, itertools.repeat(draws[-1])).__next__
         self.manager, self.component = self.make(CommandSender(address), ManagerSettings(
@@ -128,10 +133,10 @@ class ManagerRig:
         """Let the device report its attitude, and whether it accepts a yaw from north."""
         north = (self.device_information.cap_flags
                  & mavlink.GIMBAL_DEVICE_CAP_FLAGS_SUPPORTS_YAW_IN_EARTH_FRAME)
-        flags = mavlink.GIMBAL_DEVICE_FLAGS_YAW_IN_VEHICLE_FRAME | (
+        flags = self.flags | (
             mavlink.GIMBAL_DEVICE_FLAGS_ACCEPTS_YAW_IN_EARTH_FRAME if north else 0)
-        self.component.receive(
-            DEVICE, attitude_status(q, flags=flags, heading=self.heading), self.now)
+        self.component.receive(DEVICE, attitude_status(
+            q, flags=flags, heading=self.heading, turning=self.turning), self.now)
 
     def give(self, source: mav.Address, *messages: mav.Message) -> list[Any]:
         """Return what the manager sends when it receives messages."""
