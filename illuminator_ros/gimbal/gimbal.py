@@ -22,7 +22,7 @@ import math
 from typing import Any, TypeVar
 
 from . import events
-from .axes import Ranges, read_ranges
+from .axes import Ranges, read_ranges, TURNING
 from .commands import Configure, Control, SetFlags, setpoint_flags
 from .messages import (
     DEVICE_ID_PARAM,
@@ -39,7 +39,7 @@ from ..mavlink.command_sender import (
     format_seconds,
     Position,
 )
-from ..mavlink.dialect import mavlink, short_names
+from ..mavlink.dialect import mavlink, replaced, short_names
 from ..mavlink.messages import Address
 from ..payload import request
 from ..payload.arbitration import HolderChanged
@@ -60,18 +60,20 @@ from ..payload.rotation import flu_frd, Quaternion, Vector
 SILENCE_LIMIT = 3.0
 # s; the limit of a request, including its confirmation.
 REQUEST_LIMIT = 5.0
+# s; the limit of the command that stops a gimbal before control is released.
+STOP_LIMIT = 0.3
 # s after which an attitude is sent again, since the message is not acknowledged.
 REPEATS = (0.2, 0.4, 0.8)
 # s after an attitude in which the device may still report the yaw lock that it had before.
 LOCK_DELAY = 1.0
-# rad/s above which a device turns, and the least s between two attitudes that show it: one may be
-# a copy of the other.
-TURNING, ATTITUDE_SPACING = 0.01, 0.1
+# s; the least time between two attitudes that show whether a device turns: one may be a copy of
+# the other.
+ATTITUDE_SPACING = 0.1
 # s since the last GIMBAL_MANAGER_STATUS after which it is requested (ArduPilot does not stream it,
 # PX4 does every 2 s), and after which control is unknown.
 STATUS_REQUEST_DELAY, STATUS_LIMIT = 3.0, 6.0
-# ms by which GIMBAL_MANAGER_STATUS may be older than the one before it; with a longer step back,
-# the manager has restarted.
+# ms by which a status may be older than the one before it; with a longer step back, its sender has
+# restarted.
 LATE_LIMIT = 1000
 # The most managers of one gimbal; further ones are ignored.
 MAX_MANAGERS = 4
@@ -162,6 +164,8 @@ class _Setpoint:
     message: GimbalManagerSetAttitude | None = None
     attitude: tuple[Quaternion, YawFrame] | None = None
     repeats: list[float] = field(default_factory=list)
+    # Whether it is an attitude that ends a rate, unless it is lost.
+    ends_rate: bool = False
     zero_at: float = math.inf
     # When a zero is sent again if the device still turns.
     zero_repeats: list[float] = field(default_factory=list)
@@ -172,9 +176,29 @@ class _Setpoint:
     after: int = 0
 
     @property
+    def flags(self) -> int:
+        """Return the flags of the message."""
+        return self.message.flags if self.message else 0
+
+    @property
     def moves(self) -> bool:
         """Whether the gimbal keeps turning: towards a place, or at a rate."""
         return self.message is None or self.zero_at < math.inf
+
+    @property
+    def may_have_rate(self) -> bool:
+        """Whether the gimbal may turn at a rate, since the message that ends it may be lost."""
+        return (self.zero_at < math.inf or bool(self.zero_repeats)
+                or self.ends_rate and bool(self.repeats))
+
+    def end_of_rate(self) -> _Setpoint | None:
+        """Return the zero for a gimbal that still turns when it is controlled again."""
+        if self.message is None or not self.may_have_rate:
+            return None
+        zero = replaced(self.message, q=UNSET_QUATERNION, angular_velocity_x=0.0,
+                        angular_velocity_y=0.0, angular_velocity_z=0.0)
+        return _Setpoint(self.manager, zero, zero_repeats=[-math.inf] * len(REPEATS),
+                         after=self.after)
 
     def suspend(self) -> None:
         """Do not send it again, since a request follows it."""
@@ -221,9 +245,10 @@ class Gimbal:
         self._control: Control | None = None
         self._last_control: Control | None = None
         self._may_take = settings.auto_take_control
-        # Whether a request for control was neither refused nor confirmed.
+        # Whether a request for control was neither refused nor confirmed, or is under way.
         self._may_have_control = False
-        self._releasing = False
+        # The releases of control that have not ended.
+        self._releases = 0
         self._identity: events.DeviceIdentity | None = None
         self._device_ranges: Ranges | None = None
         self._identity_query = Repetition()
@@ -231,6 +256,8 @@ class Gimbal:
             -math.inf if settings.attitude_interval else math.inf)
         self._attitude: MountAttitude | None = None
         self._attitude_at = -math.inf
+        # The time_boot_ms of the newest attitude.
+        self._attitude_time = 0
         self._problem = ''
         self._flags = 0
         self._errors = 0
@@ -312,6 +339,8 @@ class Gimbal:
         self.in_control = control is not None and control.primary == us
         if control is None:
             if (setpoint := self._setpoint) is not None:
+                if setpoint.may_have_rate:
+                    setpoint.zero_at = min(setpoint.zero_at, now)
                 setpoint.repeats.clear()
                 # The zero that ends a rate is sent now, or once the manager shows control again.
                 if (setpoint.zero_at < math.inf and self._manager_heard
@@ -320,11 +349,11 @@ class Gimbal:
         else:
             self._last_control = control
             if not self.in_control:
-                self._setpoint = None
+                self._setpoint = self._setpoint and self._setpoint.end_of_rate()
         self._emit(events.ControlChanged(
             self.key, before, control, self.in_control,
             was_lost=(before is not None and before.primary == us and control is not None
-                      and not self.in_control and not self._releasing)))
+                      and not self.in_control and not self._releases)))
 
     def _choose(self, now: float) -> None:
         heard = [address for address, one in self._managers.items() if one.is_heard(now)]
@@ -376,9 +405,7 @@ class Gimbal:
     def take_status(self, source: Address, status: GimbalManagerStatus, now: float) -> None:
         """Take GIMBAL_MANAGER_STATUS of the gimbal."""
         manager = self._manager_at(source, now)
-        # The counter wraps.
-        if manager is None or (
-                0 < (manager.status_time - status.time_boot_ms) % (1 << 32) < LATE_LIMIT):
+        if manager is None or _is_late(status.time_boot_ms, manager.status_time):
             return
         manager.status_time = status.time_boot_ms
         manager.status_at, manager.control = now, Control.of(status)
@@ -394,8 +421,11 @@ class Gimbal:
 
     def take_attitude(self, status: GimbalDeviceAttitudeStatus, now: float) -> None:
         """Take GIMBAL_DEVICE_ATTITUDE_STATUS of the device."""
-        self._device_heard_at = self._attitude_at = now
-        self._flags, self._errors = status.flags, status.failure_flags
+        self._device_heard_at = now
+        if _is_late(status.time_boot_ms, self._attitude_time):
+            return
+        self._attitude_time, self._attitude_at = status.time_boot_ms, now
+        self._flags, self._errors = int(status.flags), int(status.failure_flags)
         try:
             self._attitude, self._problem = MountAttitude.from_status(status), ''
         except ValueError as error:
@@ -423,7 +453,7 @@ class Gimbal:
         if self._control is None:
             return _no_status(self._manager, self._managers[self._manager].status_at, now)
         if self.in_control:
-            return ''
+            return f'control of gimbal {self.key} is being released' if self._releases else ''
         todo = '' if self._control.primary else '; take control first'
         return f'no control of gimbal {self.key}: {self._control}{todo}'
 
@@ -458,23 +488,49 @@ class Gimbal:
     def release_control(self, now: float, done: request.Done) -> None:
         """Release control; succeed only if GIMBAL_MANAGER_STATUS shows it."""
         def ended(result: request.Result, now: float) -> None:
-            self._releasing = False
+            self._releases -= 1
             done(result, now)
 
         self._begin(now)
-        self._cancel(_PLACES, now)
+        # Nothing that comes after the zero may turn the gimbal, as ArduPilot would let it.
+        self._releases += 1
+        if self._active is not None:
+            self._active.flag_requests.cancel('control was released before it was confirmed', now)
+        self._cancel(_MOVES, now)
+        setpoint = self._setpoint
+        may_turn = setpoint is not None and (setpoint.moves or setpoint.may_have_rate)
         self._end_motion(now)
-        if self._setpoint is not None and self._setpoint.moves and self._manager_heard:
-            self._send_rates(STILL, now)
-        self._releasing = True
-        self._configure(False, now, ended)
+        self._configure(False, now, ended, self._stop(now) if may_turn and self._manager_heard
+                        else request.at_any_time)
 
-    def _configure(self, take: bool, now: float, done: request.Done) -> None:
+    def _stop(self, now: float) -> Callable[[], float]:
+        """
+        Send a rate of zero, and a command of it, whose acknowledgement shows that it has arrived.
+
+        :return: a function that returns from when on the command has ended, s.
+        """
+        ended_at = math.inf
+
+        def ended(result: CommandResult, now: float) -> None:
+            nonlocal ended_at
+            ended_at = now
+            if result.accepted:
+                zero.zero_repeats.clear()
+
+        zero = self._send_rates(STILL, now)
+        self._commands.start(Command(
+            self._manager, mavlink.MAV_CMD_DO_GIMBAL_MANAGER_PITCHYAW,
+            (math.nan, math.nan, 0.0, 0.0, zero.flags, 0.0, self.key.device_id)),
+            now, ended, deadline=now + STOP_LIMIT)
+        return lambda: ended_at
+
+    def _configure(
+        self, take: bool, now: float, done: request.Done,
+        earliest_start: Callable[[], float] = request.at_any_time,
+    ) -> None:
         def ended(result: request.Result, now: float) -> None:
-            if result.success:
+            if result.success or take and result.refused:
                 self._may_have_control = False
-            elif take and not result.refused:
-                self._may_have_control = True
             if result.success and take and not self.enforces_control:
                 result = result._replace(
                     message=f'{result.message}; ArduPilot also obeys components without control')
@@ -488,10 +544,11 @@ class Gimbal:
             # PX4 would take the system id from another component of our system.
             ended(request.Result(True, f'not in control: {self._control}'), now)
         else:
+            self._may_have_control |= take
             change = Configure(self._commands.address, self.key.device_id, take)
             wish = 'take control' if take else 'release control'
             manager.requests.submit(_request(
-                manager.target, change, now, self._explained(wish, ended)), now)
+                manager.target, change, now, self._explained(wish, ended), earliest_start), now)
 
     def _explained(self, wish: str, done: request.Done) -> request.Done:
         """Return a callback that adds the manager, the wish and the control to a refusal."""
@@ -724,6 +781,7 @@ class Gimbal:
             message = self._message(frame, to_mavlink(rotation, frame), UNSET_VECTOR)
             self._setpoint = _Setpoint(
                 self._manager, message, (rotation, frame), [now + delay for delay in REPEATS],
+                self._setpoint is not None and self._setpoint.may_have_rate,
                 after=self._requests)
             self._frame, self._frame_until = frame, now + LOCK_DELAY
             self._send(message)
@@ -767,18 +825,19 @@ class Gimbal:
             self._send_rates(rates, now)
         return reason
 
-    def _send_rates(self, rates: Vector, now: float) -> None:
+    def _send_rates(self, rates: Vector, now: float) -> _Setpoint:
         frame = (YawFrame.EARTH if self._flags & mavlink.GIMBAL_DEVICE_FLAGS_YAW_LOCK
                  else YawFrame.VEHICLE)
         if now < self._frame_until:
             frame = self._frame
         message = self._message(frame, UNSET_QUATERNION, flu_frd(rates))
-        self._setpoint = _Setpoint(self._manager, message, after=self._requests)
+        setpoint = self._setpoint = _Setpoint(self._manager, message, after=self._requests)
         if rates == STILL:
-            self._setpoint.zero_repeats = [now + delay for delay in REPEATS]
+            setpoint.zero_repeats = [now + delay for delay in REPEATS]
         else:
-            self._setpoint.zero_at = now + self._settings.setpoint_timeout
+            setpoint.zero_at = now + self._settings.setpoint_timeout
         self._send(message)
+        return setpoint
 
     def _message(
         self, frame: YawFrame, q: tuple[float, float, float, float], rates: Vector,
@@ -815,13 +874,10 @@ class Gimbal:
             if now < at + ATTITUDE_SPACING:
                 return
             turns = before.rotation.angle_to(self._attitude.rotation) > TURNING * (now - at)
+        del setpoint.zero_repeats[0]
+        setpoint.seen = None
         if turns:
-            del setpoint.zero_repeats[0]
-            setpoint.seen = None
             self._send(setpoint.message)
-        else:
-            # It has stopped, or does not report whether it turns.
-            setpoint.zero_repeats.clear()
 
     # Time
 
@@ -907,10 +963,17 @@ class Gimbal:
 
 def _request(
     target: request.Target, change: request.Change[S], now: float, done: request.Done,
+    earliest_start: Callable[[], float] = request.at_any_time,
 ) -> request.Request[S]:
     return request.Request(
         target, lambda now: change, lambda result, change, status, now: done(result, now),
-        now=now, deadline=now + REQUEST_LIMIT, needs_status=True)
+        now=now, deadline=now + REQUEST_LIMIT, earliest_start=earliest_start, needs_status=True)
+
+
+def _is_late(time_boot_ms: int, newest: int) -> bool:
+    """Return whether a status is older than the newest one."""
+    # The counter wraps.
+    return 0 < (newest - time_boot_ms) % (1 << 32) < LATE_LIMIT
 
 
 def _no_status(manager: Address, status_at: float, now: float) -> str:

@@ -105,6 +105,17 @@ def test_a_refusal_that_may_answer_another_request_is_not_reported_as_a_refusal(
                               'belong to an earlier command (')
 
 
+def test_control_that_was_requested_may_be_there_until_the_manager_has_refused_it() -> None:
+    rig = Rig(FakeManager()).run(3.0)
+    rig.managers[0].results[CONFIGURE] = mavlink.MAV_RESULT_DENIED
+    rig.gimbal.take_control(rig.now, rig.done)
+
+    before = rig.gimbal.has_any_control
+    rig.run(1.0)
+
+    assert (before, rig.gimbal.has_any_control) == (True, False)
+
+
 def test_release_without_control_sends_nothing() -> None:
     rig = Rig(FakeManager(primary=OTHER)).run(3.0)
 

@@ -21,9 +21,11 @@ import math
 
 from illuminator_ros.gimbal.gimbal import REPEATS
 from illuminator_ros.gimbal.messages import (
+    DEVICE_ID_PARAM,
     GimbalManagerSetAttitude,
 )
-from illuminator_ros.mavlink.dialect import mavlink
+from illuminator_ros.mavlink.dialect import mavlink, replaced
+from illuminator_ros.mavlink.messages import CommandInt, CommandLong
 from illuminator_ros.payload.mount_attitude import from_mavlink, to_mavlink, YawFrame
 from illuminator_ros.payload.rotation import Quaternion, Vector
 import pytest
@@ -184,6 +186,64 @@ def test_zero_that_a_closed_link_has_held_back_is_sent_when_control_is_shown_aga
     assert [one.angular_velocity_y for _, one in setpoints(rig)[before:]] == [0.0]
 
 
+def test_a_late_attitude_is_ignored_unless_the_device_has_restarted() -> None:
+    rig = in_control()
+
+    def pitch_after(milliseconds: int, pitch: float) -> float:
+        status = replaced(rig.managers[0].attitude(), time_boot_ms=milliseconds,
+                          q=Quaternion.from_euler(0.0, pitch, 0.0))
+        rig.receive(rig.managers[0].device, status)
+        attitude = rig.gimbal.snapshot(rig.now).attitude
+        assert attitude is not None
+        return attitude.rotation.euler()[1]
+
+    assert pitch_after(90_000, -0.3) == approx(0.3)
+    assert pitch_after(89_100, -0.2) == approx(0.3)
+    assert pitch_after(90_000, -0.4) == approx(0.4)
+    assert pitch_after(100, -0.5) == approx(0.5)
+
+
+def test_zero_is_sent_again_if_a_late_rate_turns_the_device_after_it_has_stopped() -> None:
+    rig = in_control()
+    rig.gimbal.set_rates((0.0, 0.0, 0.2), rig.now)
+    rig.managers[0].rates = (0.0, 0.0, 0.0)
+    rig.run(1.1)
+    rig.managers[0].rates = (0.0, 0.0, -0.2)
+    rig.run(5.0)
+
+    assert [one.angular_velocity_z for _, one in setpoints(rig)][1:3] == [0.0, 0.0]
+
+
+def test_a_rate_ends_with_a_zero_if_the_link_is_lost_before_the_attitude_after_it_is_repeated(
+) -> None:
+    rig = in_control()
+    rig.gimbal.set_rates((0.0, 0.0, 0.2), rig.now)
+    rig.gimbal.set_attitude(Quaternion(), VEHICLE, rig.now)
+    rig.run(0.1)
+    rig.component.link_closed(rig.now, 'cable pulled')
+    before = len(setpoints(rig))
+    rig.component.link_opened(rig.now)
+    rig.run(2.0)
+
+    assert [one.angular_velocity_z for _, one in setpoints(rig)[before:]] == [0.0]
+
+
+@pytest.mark.parametrize(('turns', 'zeros'), [(True, len(REPEATS)), (False, 0)])
+def test_a_rate_that_another_player_has_ended_gets_its_zero_if_it_lasts_until_control_is_back(
+        turns: bool, zeros: int) -> None:
+    rig = in_control()
+    rig.gimbal.set_rates((0.0, 0.0, 0.2), rig.now)
+    rig.managers[0].primary = OTHER
+    rig.run(3.0)
+    assert len(setpoints(rig)) == 1
+
+    rig.managers[0].rates = (0.0, 0.0, -0.2 * turns)
+    rig.managers[0].primary = OURS
+    rig.run(3.0)
+
+    assert [one.angular_velocity_z for _, one in setpoints(rig)[1:]] == [0.0] * zeros
+
+
 @pytest.mark.parametrize(('rate', 'zeros'), [(0.2, 1 + len(REPEATS)), (0.001, 1), (NAN, 1)])
 def test_zero_is_sent_again_only_while_the_device_reports_that_it_turns(
         rate: float, zeros: int) -> None:
@@ -263,6 +323,65 @@ def test_release_stops_a_rate_first() -> None:
 
     assert [one.angular_velocity_y for _, one in setpoints(rig)] == [approx(-0.2), 0.0]
     assert rig.results[0].success
+
+
+@pytest.mark.parametrize(('result', 'most'), [
+    (mavlink.MAV_RESULT_ACCEPTED, 0.05), (mavlink.MAV_RESULT_IN_PROGRESS, 0.35)])
+def test_control_is_released_once_the_manager_has_acknowledged_the_zero_or_after_300_ms(
+        result: int, most: float) -> None:
+    rig = in_control()
+    rig.gimbal.set_rates((0.0, 0.2, 0.0), rig.now)
+    rig.run(0.1)
+    rig.managers[0].results[mavlink.MAV_CMD_DO_GIMBAL_MANAGER_PITCHYAW] = result
+    asked_at = rig.now
+
+    rig.gimbal.release_control(rig.now, rig.done)
+    rig.run(3.0)
+
+    assert rig.results[0].success
+    sent = [(at, one) for at, one in rig.sent if isinstance(one, CommandLong)
+            and one.command in DEVICE_ID_PARAM and at >= asked_at]
+    assert [one.command for _, one in sent] == [
+        mavlink.MAV_CMD_DO_GIMBAL_MANAGER_PITCHYAW, mavlink.MAV_CMD_DO_GIMBAL_MANAGER_CONFIGURE]
+    stop = sent[0][1]
+    assert (stop.param3, stop.param4, stop.param7) == (0.0, 0.0, 154)
+    assert math.isnan(stop.param1) and math.isnan(stop.param2)
+    assert sent[1][0] - asked_at <= most
+
+
+MOVES: list[Callable[[Rig], object]] = [
+    lambda rig: rig.gimbal.set_rates((0.0, 0.2, 0.0), rig.now),
+    lambda rig: rig.gimbal.set_attitude(Quaternion(), VEHICLE, rig.now),
+    lambda rig: rig.gimbal.set_angles((0.0, 0.2, 0.0), VEHICLE, rig.now),
+    lambda rig: rig.gimbal.set_neutral(rig.now, rig.done),
+    lambda rig: rig.gimbal.set_roi(47.0, 8.5, 500.0, rig.now, rig.done)]
+
+
+def test_nothing_moves_the_gimbal_while_its_control_is_released() -> None:
+    rig = in_control()
+    rig.managers[0].answers = False
+    rig.gimbal.set_neutral(rig.now, rig.done)
+    rig.gimbal.set_roi(47.0, 8.5, 500.0, rig.now, rig.done)
+    rig.run(0.1)
+    asked_at = rig.now
+
+    rig.gimbal.release_control(rig.now, rig.done)
+    rig.run(0.5)
+    refusals = [move(rig) for move in MOVES]
+    rig.run(8.0)
+
+    reason = 'control of gimbal 1/154 is being released'
+    assert refusals == [reason] * 3 + [None] * 2
+    assert [result.message for result in rig.results[2:4]] == [reason] * 2
+    assert not any(result.success for result in rig.results)
+    moves = [one for at, one in rig.sent if at >= asked_at and (
+        isinstance(one, GimbalManagerSetAttitude) and one.angular_velocity_y != 0
+        or isinstance(one, CommandLong | CommandInt) and (
+            one.command == mavlink.MAV_CMD_DO_SET_ROI_LOCATION
+            or one.command == mavlink.MAV_CMD_DO_GIMBAL_MANAGER_PITCHYAW and one.param3 != 0))]
+    assert moves == []
+    # Without an answer this node may still have control.
+    assert rig.gimbal.set_rates((0.0, 0.2, 0.0), rig.now) == ''
 
 
 @pytest.mark.parametrize(('primary', 'reports', 'reason'), [

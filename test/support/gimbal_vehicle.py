@@ -117,7 +117,7 @@ def managed_vehicle(
 ) -> tuple[GimbalManager, SimulatedGimbal, Vehicle]:
     """Return a vehicle with a gimbal and its manager; ``settings`` are of the manager."""
     commands = CommandSender(OURS)
-    manager = GimbalManager(commands, ManagerSettings(control, **settings))
+    manager = GimbalManager(commands, ManagerSettings(control, **settings), lambda: 0.25)
     device = SimulatedGimbal(GimbalProperties(DEVICE))
     devices = SimulatedComponents([Description(DEVICE, device)], now)
     return manager, device, Vehicle(Component(commands, [manager]), Autopilot(), devices)
