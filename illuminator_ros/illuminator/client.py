@@ -43,7 +43,7 @@ class IlluminatorClient(Payload):
     """
     Finds illuminators on a link by their messages, never by their ids.
 
-    A component is an illuminator if its HEARTBEAT has mavlink.MAV_TYPE_ILLUMINATOR or if it sends
+    A component is an illuminator if its HEARTBEAT has MAV_TYPE_ILLUMINATOR or if it sends
     ILLUMINATOR_STATUS; ArduSub's lights have no heartbeat of their own. It is announced once it
     has sent a status or an answer, and forgotten a minute after its loss if no user has ever
     commanded it.

@@ -207,11 +207,15 @@ def test_the_status_has_the_flags_of_the_setpoint() -> None:
         | mavlink.GIMBAL_DEVICE_FLAGS_ACCEPTS_YAW_IN_EARTH_FRAME)
 
 
+IN_VEHICLE_FRAME = mavlink.GIMBAL_DEVICE_FLAGS_YAW_IN_VEHICLE_FRAME
+
+
 @pytest.mark.parametrize(('rate', 'flags', 'zeros'), [
-    (0.3, F.YAW_IN_VEHICLE_FRAME, True), (0.005, F.YAW_IN_VEHICLE_FRAME, False),
-    (NAN, F.YAW_IN_VEHICLE_FRAME, False), (0.3, F.YAW_IN_VEHICLE_FRAME | F.RETRACT, False)])
+    (0.3, IN_VEHICLE_FRAME, True), (0.005, IN_VEHICLE_FRAME, False),
+    (NAN, IN_VEHICLE_FRAME, False),
+    (0.3, IN_VEHICLE_FRAME | mavlink.GIMBAL_DEVICE_FLAGS_RETRACT, False)])
 def test_a_device_that_turns_when_the_manager_becomes_active_is_stopped(
-        rate: float, flags: F, zeros: bool) -> None:
+        rate: float, flags: int, zeros: bool) -> None:
     rig = ManagerRig(active=False)
     rig.turning, rig.flags = rate, flags
 

@@ -319,7 +319,8 @@ def _newest(subscription: Subscription) -> bytes | None:
 def _decoded(data: bytes, type_: type[T]) -> T | None:
     """Return a message, None if it is broken."""
     with contextlib.suppress(Exception):
-        return deserialize_message(data, type_)
+        message: T = deserialize_message(data, type_)
+        return message
     return None
 
 

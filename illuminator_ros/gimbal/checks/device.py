@@ -321,7 +321,7 @@ def is_device(message: Message) -> bool:
 CHECKS: PayloadChecks[DeviceTester] = PayloadChecks(
     payload='gimbal', device='gimbal', messages=(INFORMATION, AttitudeStatus),
     is_device=is_device,
-    evidence='HEARTBEAT with mavlink.MAV_TYPE_GIMBAL, or GIMBAL_DEVICE_ATTITUDE_STATUS',
+    evidence='HEARTBEAT with MAV_TYPE_GIMBAL, or GIMBAL_DEVICE_ATTITUDE_STATUS',
     tester=DeviceTester, requirements=REQUIREMENTS,
     describe=describe,
     risk='turn to all sides and to the end of its range',

@@ -477,7 +477,7 @@ def describe(message: messages.Message) -> str:
 CHECKS: PayloadChecks[LightTester] = PayloadChecks(
     payload='illuminator', device='light', is_device=is_light,
     messages=(IlluminatorStatus, messages.ComponentInformationBasic),
-    evidence='HEARTBEAT with mavlink.MAV_TYPE_ILLUMINATOR or ILLUMINATOR_STATUS',
+    evidence='HEARTBEAT with MAV_TYPE_ILLUMINATOR or ILLUMINATOR_STATUS',
     describe=describe, tester=LightTester, requirements=REQUIREMENTS,
     risk='strobe, or shine at 100 %',
     question='Some checks make light {device} strobe, and shine at 100 % for {heat:g} s. '
