@@ -19,27 +19,22 @@ from __future__ import annotations
 import math
 from typing import NamedTuple, TypeAlias
 
-from .messages import (
-    GimbalDeviceInformation,
-    GimbalManagerInformation,
-)
+from .messages import GimbalDeviceInformation, GimbalManagerInformation
 from ..mavlink.dialect import mavlink
 from ..payload.mount_attitude import AXES
 
-HAS_AXIS = (mavlink.GIMBAL_DEVICE_CAP_FLAGS_HAS_ROLL_AXIS,
-            mavlink.GIMBAL_DEVICE_CAP_FLAGS_HAS_PITCH_AXIS,
-            mavlink.GIMBAL_DEVICE_CAP_FLAGS_HAS_YAW_AXIS)
-HAS_FOLLOW = (mavlink.GIMBAL_DEVICE_CAP_FLAGS_HAS_ROLL_FOLLOW,
-              mavlink.GIMBAL_DEVICE_CAP_FLAGS_HAS_PITCH_FOLLOW,
-              mavlink.GIMBAL_DEVICE_CAP_FLAGS_HAS_YAW_FOLLOW)
-HAS_LOCK = (mavlink.GIMBAL_DEVICE_CAP_FLAGS_HAS_ROLL_LOCK,
-            mavlink.GIMBAL_DEVICE_CAP_FLAGS_HAS_PITCH_LOCK,
-            mavlink.GIMBAL_DEVICE_CAP_FLAGS_HAS_YAW_LOCK)
-LOCKS = (mavlink.GIMBAL_DEVICE_FLAGS_ROLL_LOCK, mavlink.GIMBAL_DEVICE_FLAGS_PITCH_LOCK,
-         mavlink.GIMBAL_DEVICE_FLAGS_YAW_LOCK)
-AT_LIMIT = (mavlink.GIMBAL_DEVICE_ERROR_FLAGS_AT_ROLL_LIMIT,
-            mavlink.GIMBAL_DEVICE_ERROR_FLAGS_AT_PITCH_LIMIT,
-            mavlink.GIMBAL_DEVICE_ERROR_FLAGS_AT_YAW_LIMIT)
+
+def _flags(name: str) -> tuple[int, int, int]:
+    """Return the flag of each axis."""
+    roll, pitch, yaw = (getattr(mavlink, name.replace('AXIS', axis.upper(), 1)) for axis in AXES)
+    return roll, pitch, yaw
+
+
+HAS_AXIS = _flags('GIMBAL_DEVICE_CAP_FLAGS_HAS_AXIS_AXIS')
+HAS_FOLLOW = _flags('GIMBAL_DEVICE_CAP_FLAGS_HAS_AXIS_FOLLOW')
+HAS_LOCK = _flags('GIMBAL_DEVICE_CAP_FLAGS_HAS_AXIS_LOCK')
+LOCKS = _flags('GIMBAL_DEVICE_FLAGS_AXIS_LOCK')
+AT_LIMIT = _flags('GIMBAL_DEVICE_ERROR_FLAGS_AT_AXIS_LIMIT')
 # Roll and pitch are relative to the horizon.
 LEVEL = mavlink.GIMBAL_DEVICE_FLAGS_ROLL_LOCK | mavlink.GIMBAL_DEVICE_FLAGS_PITCH_LOCK
 # rad; angles that differ by less are equal.

@@ -21,7 +21,7 @@ from dataclasses import dataclass, field
 import math
 
 from .events import GimbalEvent, GimbalForgotten, GimbalFound, GimbalKey
-from .gimbal import Gimbal, GimbalSettings, Repetition
+from .gimbal import Gimbal, GimbalSettings
 from .messages import (
     GimbalDeviceInformation,
     GimbalManagerInformation,
@@ -30,6 +30,7 @@ from .messages import (
     NON_MAVLINK_IDS,
     REMOVE_SENDER,
 )
+from .remote_managers import Repetition
 from ..mavlink.command_sender import Command, CommandSender
 from ..mavlink.component import Payload
 from ..mavlink.deadline_queue import DeadlineQueue
@@ -132,7 +133,7 @@ class GimbalClient(Payload):
                 self.limit_reached = True
                 return None
             gimbal = self._gimbals[key] = Gimbal(
-                key, self._commands, self.settings, self.events.emit)
+                key, manager, self._commands, self.settings, self.events.emit)
             self.events.emit(GimbalFound(key))
         return gimbal
 

@@ -26,28 +26,13 @@ from dataclasses import dataclass
 import math
 from typing import NamedTuple
 
-from .axes import HAS_AXIS, LEVEL, Range, Ranges, read_ranges, UNLIMITED
-from .messages import (
-    ABSOLUTE_FRAMES,
-    GimbalDeviceInformation,
-    GimbalDeviceSetAttitude,
-    GimbalManagerSetAttitude,
-    GimbalManagerSetManualControl,
-    GimbalManagerSetPitchyaw,
-    RELATIVE_FRAMES,
-)
+from . import messages as gimbal
+from .axes import HAS_AXIS, HAS_LOCK, LEVEL, Range, Ranges, read_ranges, UNLIMITED
 from ..mavlink.command_sender import DEGREE_SCALE
 from ..mavlink.dialect import MAV_RESULT_COMMAND_UNSUPPORTED_MAV_FRAME, mavlink
 from ..mavlink.messages import AnyCommand, CommandInt, params_of
 from ..payload.messages import GeoPoint
-from ..payload.mount_attitude import (
-    AXES,
-    names_frame,
-    STILL,
-    UNSET_VECTOR,
-    yaw_frame,
-    YawFrame,
-)
+from ..payload.mount_attitude import AXES, names_frame, STILL, UNSET_VECTOR, yaw_frame, YawFrame
 from ..payload.rotation import Quaternion, Vector
 
 # Flags that alone set the attitude.
@@ -56,8 +41,6 @@ POSES = mavlink.GIMBAL_DEVICE_FLAGS_RETRACT | mavlink.GIMBAL_DEVICE_FLAGS_NEUTRA
 _PASSED_BITS = (POSES | LEVEL | mavlink.GIMBAL_DEVICE_FLAGS_YAW_LOCK
                 | mavlink.GIMBAL_DEVICE_FLAGS_RC_EXCLUSIVE
                 | mavlink.GIMBAL_DEVICE_FLAGS_RC_MIXED)
-_POSE_BITS = POSES
-_EARTH_BIT, _VEHICLE_BIT = YawFrame.EARTH.flag, YawFrame.VEHICLE.flag
 _RIGHT_ANGLE = math.pi / 2
 # rad that a clipped angle is beyond its range at least, and by which the other end of the range
 # must be nearer before an axis leaves the end where it is.
@@ -69,7 +52,6 @@ MANUAL_RATE = 0.5
 _NEEDED = {mavlink.GIMBAL_DEVICE_FLAGS_RETRACT: mavlink.GIMBAL_DEVICE_CAP_FLAGS_HAS_RETRACT,
            mavlink.GIMBAL_DEVICE_FLAGS_NEUTRAL: mavlink.GIMBAL_DEVICE_CAP_FLAGS_HAS_NEUTRAL,
            mavlink.GIMBAL_DEVICE_FLAGS_YAW_LOCK: mavlink.GIMBAL_DEVICE_CAP_FLAGS_HAS_YAW_LOCK}
-_NEEDING = sum(_NEEDED)
 # Equatorial radius, m, and squared eccentricity of WGS 84.
 _RADIUS, _ECCENTRICITY_2 = 6378137.0, 6.69437999014e-3
 
@@ -87,7 +69,7 @@ class GimbalModel:
     ranges: Ranges = UNLIMITED
 
     @classmethod
-    def from_information(cls, message: GimbalDeviceInformation) -> GimbalModel:
+    def from_information(cls, message: gimbal.GimbalDeviceInformation) -> GimbalModel:
         """
         Read the message of a device; an axis that it lacks stays at 0.
 
@@ -108,27 +90,17 @@ class GimbalModel:
     @classmethod
     def from_ranges(cls, ranges: Ranges) -> GimbalModel:
         """Return a gimbal that is stabilised and points to any attitude within the ranges."""
-        flags = (mavlink.GIMBAL_DEVICE_CAP_FLAGS_HAS_ROLL_AXIS
-                 | mavlink.GIMBAL_DEVICE_CAP_FLAGS_HAS_ROLL_LOCK,
-                 mavlink.GIMBAL_DEVICE_CAP_FLAGS_HAS_PITCH_AXIS
-                 | mavlink.GIMBAL_DEVICE_CAP_FLAGS_HAS_PITCH_LOCK,
-                 mavlink.GIMBAL_DEVICE_CAP_FLAGS_HAS_YAW_AXIS
-                 | mavlink.GIMBAL_DEVICE_CAP_FLAGS_HAS_YAW_FOLLOW
-                 | mavlink.GIMBAL_DEVICE_CAP_FLAGS_HAS_YAW_LOCK)
         capabilities = mavlink.GIMBAL_DEVICE_CAP_FLAGS_HAS_NEUTRAL
-        for range_, flag in zip(ranges, flags, strict=True):
-            capabilities |= 0 if range_.is_fixed else flag
+        if not ranges[2].is_fixed:
+            capabilities |= mavlink.GIMBAL_DEVICE_CAP_FLAGS_HAS_YAW_FOLLOW
+        for range_, *flags in zip(ranges, HAS_AXIS, HAS_LOCK, strict=True):
+            capabilities |= 0 if range_.is_fixed else sum(flags)
         return cls(capabilities, ranges)
 
     def lacks(self, flags: int) -> int:
         """Return the flags that the gimbal cannot follow."""
-        lacking = 0
-        if not flags & _NEEDING:
-            return lacking
-        for flag, needed in _NEEDED.items():
-            if flags & flag and self.capabilities and not self.capabilities & needed:
-                lacking |= flag
-        return lacking
+        return sum(flag for flag, needed in _NEEDED.items()
+                   if flags & flag and self.capabilities and not self.capabilities & needed)
 
     def accepts_earth_frame(self, reported: int | None) -> bool:
         """
@@ -162,7 +134,7 @@ class Demand(NamedTuple):
     @property
     def is_pose(self) -> bool:
         """Whether a flag alone sets the attitude."""
-        return bool(self.flags & _POSE_BITS)
+        return bool(self.flags & POSES)
 
     @property
     def has_rates_only(self) -> bool:
@@ -199,7 +171,7 @@ class Demand(NamedTuple):
 
     @classmethod
     def from_attitude(
-        cls, message: GimbalManagerSetAttitude | GimbalDeviceSetAttitude,
+        cls, message: gimbal.GimbalManagerSetAttitude | gimbal.GimbalDeviceSetAttitude,
         ranges: Ranges = UNLIMITED,
     ) -> Demand:
         """
@@ -228,7 +200,7 @@ class Demand(NamedTuple):
 
     @classmethod
     def from_manual_control(
-        cls, message: GimbalManagerSetManualControl, ranges: Ranges,
+        cls, message: gimbal.GimbalManagerSetManualControl, ranges: Ranges,
     ) -> Demand:
         """
         Read GIMBAL_MANAGER_SET_MANUAL_CONTROL: shares of the ranges, and of :data:`MANUAL_RATE`.
@@ -249,7 +221,8 @@ class Demand(NamedTuple):
 
 
 # A message that sets the attitude of a gimbal.
-AnySetpoint = GimbalManagerSetAttitude | GimbalManagerSetPitchyaw | GimbalManagerSetManualControl
+AnySetpoint = (gimbal.GimbalManagerSetAttitude | gimbal.GimbalManagerSetPitchyaw
+               | gimbal.GimbalManagerSetManualControl)
 
 
 def read_demand(message: AnySetpoint, ranges: Ranges) -> Demand:
@@ -258,9 +231,9 @@ def read_demand(message: AnySetpoint, ranges: Ranges) -> Demand:
 
     :raises ValueError: if it is not valid.
     """
-    if isinstance(message, GimbalManagerSetAttitude):
+    if isinstance(message, gimbal.GimbalManagerSetAttitude):
         return Demand.from_attitude(message, ranges)
-    if isinstance(message, GimbalManagerSetManualControl):
+    if isinstance(message, gimbal.GimbalManagerSetManualControl):
         return Demand.from_manual_control(message, ranges)
     return Demand.from_pitch_yaw(
         message.flags, message.pitch, message.yaw, message.pitch_rate, message.yaw_rate)
@@ -309,7 +282,7 @@ class Setpoint(NamedTuple):
     @property
     def is_pose(self) -> bool:
         """Whether a flag alone sets the attitude."""
-        return bool(self.flags & _POSE_BITS)
+        return bool(self.flags & POSES)
 
     @property
     def has_rates_only(self) -> bool:
@@ -332,8 +305,7 @@ class Setpoint(NamedTuple):
     @property
     def device_flags(self) -> int:
         """Return the flags for the device."""
-        return self.flags & _PASSED_BITS | (
-            _EARTH_BIT if self.frame is YawFrame.EARTH else _VEHICLE_BIT)
+        return self.operation | self.frame.flag
 
 
 def resolve(demand: Demand, current: Quaternion, now: float, *, turns: bool) -> Setpoint:
@@ -345,7 +317,7 @@ def resolve(demand: Demand, current: Quaternion, now: float, *, turns: bool) -> 
     :param turns: whether the manager must turn the gimbal where only rates are given.
     """
     flags, frame = demand.flags, demand.frame
-    if flags & _POSE_BITS:
+    if flags & POSES:
         return Setpoint(flags, frame, None, since=now)
     if demand.attitude is not None:
         return Setpoint(flags, frame, demand.attitude, demand.rates, STILL, now, demand.angles)
@@ -523,8 +495,8 @@ def read_roi(command: AnyCommand) -> tuple[GeoPoint, bool] | int:
     is_relative = False
     # A COMMAND_LONG has no frame; PX4, too, reads its altitude as above mean sea level.
     if isinstance(command, CommandInt):
-        is_relative = command.frame in RELATIVE_FRAMES
-        if not is_relative and command.frame not in ABSOLUTE_FRAMES:
+        is_relative = command.frame in gimbal.RELATIVE_FRAMES
+        if not is_relative and command.frame not in gimbal.ABSOLUTE_FRAMES:
             return MAV_RESULT_COMMAND_UNSUPPORTED_MAV_FRAME
         latitude, longitude = latitude / DEGREE_SCALE, longitude / DEGREE_SCALE
     if abs(latitude) <= 90 and abs(longitude) <= 180 and math.isfinite(altitude):

@@ -43,12 +43,7 @@ from .simulated_device import (
     SimulatedMount,
 )
 from ..mavlink.dialect import mavlink, replaced
-from ..mavlink.messages import (
-    Address,
-    AnyCommand,
-    Message,
-    params_of,
-)
+from ..mavlink.messages import Address, AnyCommand, Message, params_of
 from ..payload import simulated
 from ..payload.faults import Behaviour, Fault, FaultTable
 from ..payload.messages import (

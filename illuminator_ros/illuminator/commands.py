@@ -38,6 +38,7 @@ class Switch(NamedTuple):
 
     on: bool
     note: str = ''
+    position: None = None
     command: int = mavlink.MAV_CMD_ILLUMINATOR_ON_OFF
 
     @property
@@ -78,6 +79,7 @@ class Configure(NamedTuple):
     configuration: Configuration
     names: list[str]
     note: str = ''
+    position: None = None
     command: int = mavlink.MAV_CMD_DO_ILLUMINATOR_CONFIGURE
 
     @property

@@ -612,10 +612,16 @@ class CommandSender:
     def stop_resending(
         self, now: float, target: Address, which: Callable[[Command], bool],
     ) -> None:
-        """Resend no more of some commands to a target, which may still answer them."""
-        for pending in self._pending.get(target, ()):
+        """
+        Resend no more of some commands to a target, which may still answer them.
+
+        Those that wait for another command of their kind end with CANCELLED.
+        """
+        for pending in list(self._pending.get(target, ())):
             if which(pending.command):
                 pending.tries_end = min(pending.tries_end, now)
+                if pending.state is CommandState.WAITING:
+                    self._end(pending, CommandStatus.CANCELLED, now)
 
     def _begin(self, pending: _PendingCommand, now: float) -> None:
         pending.state = CommandState.SENT

@@ -63,7 +63,8 @@ class Target:
 
     :param ended: called with the result of each command, after its own ``done``.
     :param kind: a noun for it, such as ``light``.
-    :param status_id: the message id of its status.
+    :param status_id: the message id of its status, None if no status shows what the commands
+        change: then the acknowledgement decides.
     :param status_source: the component that sends the status, if another one executes commands.
     :param needs_status: whether only a status makes a change a success, even if none has ever
         come.
@@ -71,19 +72,26 @@ class Target:
 
     def __init__(
         self, address: Address, commands: command_sender.CommandSender,
-        ended: command_sender.Done = lambda result, now: None, *, kind: str, status_id: int,
-        status_name: str, status_source: Address | None = None, needs_status: bool = False,
+        ended: command_sender.Done = lambda result, now: None, *, kind: str,
+        status_id: int | None = None, status_name: str = '',
+        status_source: Address | None = None, needs_status: bool = False,
     ) -> None:
         self.address = address
         self.needs_status = needs_status
         self.commands = commands
         self.kind = kind
+        self.has_status = status_id is not None
         self.status_name = status_name
         self._status_source = status_source or address
         self._ended = ended
-        self._status_id = status_id
+        self._status_id = status_id or 0
         self._status_request: command_sender.Command | None = None
         self._delays: list[float] = []
+
+    def command(self, change: Change[S]) -> command_sender.Command:
+        """Return the command that makes a change of the device."""
+        return command_sender.Command(
+            self.address, change.command, change.params, position=change.position)
 
     def send(
         self, command: int, params: tuple[float, ...], now: float,
@@ -171,6 +179,10 @@ class Change(Protocol[S_contra]):
     @property
     def params(self) -> tuple[float, ...]:
         """Return the params of the command."""
+
+    @property
+    def position(self) -> command_sender.Position | None:
+        """Return the position of the command, which makes it a COMMAND_INT; None for none."""
 
     @property
     def goal(self) -> str:
@@ -328,7 +340,7 @@ class Attempt(Generic[S]):
         self._ended = ended
         self._wanted_at = wanted_at
         self._deadline = deadline
-        self._command = command_sender.Command(target.address, change.command, change.params)
+        self._command = target.command(change)
         self._evidence = Evidence(target, change, before)
         # How often it must be sent again, since acknowledgements of an earlier command may come.
         self._repeats: int | None = None
@@ -379,11 +391,13 @@ class Attempt(Generic[S]):
         elif accepted and self._must_repeat(outcome, now):
             self.phase = TRANSITIONS[self.phase, Step.SEND_AGAIN]
             self.send(now)
-        elif accepted or outcome.may_answer_earlier(now):
+        elif self._target.has_status and (accepted or outcome.may_answer_earlier(now)):
             self.phase = TRANSITIONS[self.phase, Step.ACKNOWLEDGED]
             self._acknowledged_at = now
             self._confirm_until = min(now + CONFIRMATION_TIMEOUT, self._deadline)
             self._ask_at = now + ASK_DELAY
+        elif accepted:
+            self._end(outcome.describe(), now, success=True)
         else:
             self._refused(now)
 
@@ -399,7 +413,7 @@ class Attempt(Generic[S]):
             earlier = outcome.earlier
             self._repeats = 0
             if (earlier is not None and earlier.result is None
-                    and earlier.command.params != self.change.params
+                    and earlier.command != self._command
                     and outcome.may_answer_earlier(now)):
                 self._repeats = earlier.tries
         self._repeats -= 1
@@ -450,7 +464,7 @@ class Attempt(Generic[S]):
         text, earlier = answer.describe_failure(), answer.earlier
         # No status has decided whose acknowledgement it is.
         if (self.phase is Phase.CONFIRMING and earlier and earlier.is_doubtful
-                and earlier.command.params != self.change.params):
+                and earlier.command != self._command):
             text = (f'{goal} not confirmed: {answer.describe()}, which may belong to an earlier '
                     'command')
         self._end(text, now, refused=answer.refused,

@@ -20,7 +20,7 @@ import math
 from typing import Generic, TypeVar
 
 from .attempt import Change, Done, PERMANENT_RESULTS, Result, StatusReport, Target
-from ..mavlink.command_sender import Command, CommandResult, format_seconds
+from ..mavlink.command_sender import CommandResult, format_seconds
 
 # s between commands that are not confirmed, and from a status that is too old to the request for
 # the next one.
@@ -99,8 +99,7 @@ class LastChange(Generic[S]):
                 self._is_under_way = True
                 self._again(self._reason, now)
                 self._target.start(
-                    Command(self._target.address, self._change.command, self._change.params),
-                    now, self._answered, overtake=True)
+                    self._target.command(self._change), now, self._answered, overtake=True)
         if now >= self._ask_due:
             self._ask_due = now + INTERVAL
             self._target.request_status(now)

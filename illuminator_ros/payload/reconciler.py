@@ -125,7 +125,8 @@ class Reconciler(Generic[S]):
     :param ended: called before the callers, with a desired value, its result, the status that
         shows it, and the time, when an attempt has ended or the value is wanted no longer.
     :param earliest: returns the time before which a change must not be sent, s.
-    :param overtakes: returns whether a change is sent although another one is not acknowledged.
+    :param overtakes: returns whether a change is sent although another one by the same command is
+        not acknowledged.
     :ivar desired: the value that is wanted and not yet reached or given up; None if there is none.
     :ivar last_sent: the change that was sent last, None before the first.
     """
@@ -253,7 +254,10 @@ class Reconciler(Generic[S]):
     def _ready_at(self, desired: Desired[S]) -> float:
         """Return when the desired value can be sent, s."""
         attempt = self._attempt
-        if attempt and attempt.phase is Phase.SENT and not self._overtakes(desired.change):
+        # An acknowledgement names the command, so that one of another command is no answer to it.
+        if (attempt and attempt.phase is Phase.SENT
+                and attempt.change.command == desired.change.command
+                and not self._overtakes(desired.change)):
             return math.inf
         return self._earliest(desired.change)
 
@@ -298,4 +302,5 @@ class Reconciler(Generic[S]):
 
 
 def _differ(one: Change[S], other: Change[S]) -> bool:
-    return (one.command, one.params) != (other.command, other.params)
+    return ((one.command, one.params, one.position)
+            != (other.command, other.params, other.position))

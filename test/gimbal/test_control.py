@@ -21,16 +21,17 @@ import math
 
 from illuminator_ros.gimbal.commands import Control
 from illuminator_ros.gimbal.events import AutomaticTakeFailed, ControlChanged, GimbalKey
-from illuminator_ros.gimbal.gimbal import Gimbal, REPEATS
+from illuminator_ros.gimbal.gimbal import Gimbal
 from illuminator_ros.gimbal.messages import (
     DEVICE_ID_PARAM,
     GimbalManagerSetAttitude,
     GimbalManagerStatus,
 )
+from illuminator_ros.gimbal.setpoint_stream import REPEATS
 from illuminator_ros.mavlink import messages as mav
 from illuminator_ros.mavlink.dialect import mavlink, short_names
+from illuminator_ros.payload.attempt import Done
 from illuminator_ros.payload.mount_attitude import YawFrame
-from illuminator_ros.payload.request import Done
 from illuminator_ros.payload.rotation import Quaternion
 import pytest
 from support.gimbals import ALL, AUTOPILOT, DEVICE, FakeManager, in_control, OTHER, OURS, Rig
@@ -160,8 +161,8 @@ def test_gm_16_control_that_an_earlier_status_showed_is_asked_of_the_manager_aga
 
 
 @pytest.mark.parametrize(('primary', 'asks', 'last'), [
-    (NONE, (Gimbal.take_control, Gimbal.release_control), 'control released, confirmed'),
-    (OURS, (Gimbal.release_control, Gimbal.take_control), 'control taken, confirmed')])
+    (NONE, (Gimbal.take_control, Gimbal.release_control), 'control released'),
+    (OURS, (Gimbal.release_control, Gimbal.take_control), 'control taken')])
 def test_gm_16_of_requests_for_control_that_overlap_the_last_one_decides(
         primary: mav.Address, asks: tuple[Ask, Ask], last: str) -> None:
     rig = Rig(FakeManager(primary=primary)).run(3.0)
@@ -169,8 +170,9 @@ def test_gm_16_of_requests_for_control_that_overlap_the_last_one_decides(
         ask(rig.gimbal, rig.now, rig.done)
     rig.run(3.0)
 
-    assert [one.success for one in rig.results] == [True, True]
-    assert rig.results[1].message.startswith(last)
+    assert [one.success for one in rig.results] == [False, True]
+    assert rig.results[0].message == f'superseded by {last}'
+    assert rig.results[1].message.startswith(f'{last}, confirmed')
     assert rig.gimbal.in_control is (asks[1] is Gimbal.take_control)
 
 
@@ -415,6 +417,33 @@ def test_gm_8_place_without_an_answer_is_not_sent_again_after_a_later_setpoint_o
 
     assert len(rig.messages(mav.CommandInt)) == 1
     assert (rig.results[0].success, rig.results[0].superseded) == (False, True)
+
+
+def test_of_requests_for_a_pose_that_overlap_the_last_one_decides() -> None:
+    rig = in_control()
+    rig.managers[0].applies = False
+    Gimbal.set_neutral(rig.gimbal, rig.now, rig.done)
+    rig.run(0.1)
+    Gimbal.retract(rig.gimbal, rig.now, rig.done)
+    rig.run(0.1)
+    rig.managers[0].flags |= mavlink.GIMBAL_DEVICE_FLAGS_RETRACT
+
+    rig.run(3.0)
+
+    assert [(one.success, one.message.partition(':')[0]) for one in rig.results] == [
+        (False, 'superseded by retracted'),
+        (True, 'retracted, confirmed by GIMBAL_DEVICE_ATTITUDE_STATUS')]
+
+
+def test_of_places_in_a_stream_the_newest_is_sent_once_the_one_before_is_acknowledged() -> None:
+    rig = in_control()
+    for number in range(5):
+        rig.gimbal.set_roi(47.0 + number, 8.5, 0.0, rig.now, rig.done, is_stream=True)
+    rig.run(1.0)
+
+    assert [one.x for one in rig.messages(mav.CommandInt)] == [470000000, 510000000]
+    assert [(one.success, one.superseded) for one in rig.results] == [(False, True)] * 4 + [
+        (True, False)]
 
 
 @pytest.mark.parametrize(('ask', 'command', 'wish'), [

@@ -31,8 +31,8 @@ from illuminator_ros.gimbal.messages import GimbalDeviceSetAttitude, GimbalManag
 from illuminator_ros.mavlink.command_sender import CommandSender
 from illuminator_ros.mavlink.component import Component
 from illuminator_ros.mavlink.dialect import mavlink
+from illuminator_ros.payload.attempt import Result
 from illuminator_ros.payload.mount_attitude import YawFrame
-from illuminator_ros.payload.request import Result
 from illuminator_ros.payload.rotation import Quaternion
 import pytest
 from support.gimbal_manager import (

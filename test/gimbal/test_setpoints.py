@@ -19,13 +19,10 @@ from __future__ import annotations
 from collections.abc import Callable
 import math
 
-from illuminator_ros.gimbal.gimbal import REPEATS
-from illuminator_ros.gimbal.messages import (
-    DEVICE_ID_PARAM,
-    GimbalManagerSetAttitude,
-)
+from illuminator_ros.gimbal.messages import DEVICE_ID_PARAM, GimbalManagerSetAttitude
+from illuminator_ros.gimbal.setpoint_stream import REPEATS
 from illuminator_ros.mavlink.dialect import mavlink, replaced
-from illuminator_ros.mavlink.messages import CommandInt, CommandLong
+from illuminator_ros.mavlink.messages import Address, CommandAck, CommandInt, CommandLong
 from illuminator_ros.payload.mount_attitude import from_mavlink, to_mavlink, YawFrame
 from illuminator_ros.payload.rotation import Quaternion, Vector
 import pytest
@@ -157,6 +154,35 @@ def test_gm_2_rate_leaves_a_yaw_lock_that_the_device_does_not_report_yet(
     assert has_lock is (lock is changes)
 
 
+@pytest.mark.parametrize('lock', [True, False])
+@pytest.mark.parametrize('changes', [
+    (request_lock, send_attitude), (send_attitude, request_lock)], ids=['attitude', 'request'])
+def test_gm_2_rate_leaves_the_yaw_lock_of_the_newer_of_a_request_and_an_attitude(
+        changes: tuple[Callable[[Rig, bool], None], ...], lock: bool) -> None:
+    rig = in_control()
+    rig.managers[0].answers = False
+    for number, change in enumerate(changes):
+        change(rig, lock is bool(number))
+        rig.run(0.02)
+
+    rig.gimbal.set_rates((0.0, 0.2, 0.0), rig.now)
+    rig.run(0.02)
+
+    has_lock = bool(setpoints(rig)[-1][1].flags & mavlink.GIMBAL_DEVICE_FLAGS_YAW_LOCK)
+    assert has_lock is lock
+
+
+def test_an_attitude_is_not_sent_again_after_a_request() -> None:
+    rig = in_control()
+    send_attitude(rig, False)
+    rig.run(0.1)
+
+    request_lock(rig, True)
+    rig.run(3.0)
+
+    assert len(setpoints(rig)) == 1
+
+
 def test_gm_17_setpoints_stop_when_control_is_lost() -> None:
     rig = in_control()
     rig.gimbal.set_rates((0.0, 0.2, 0.0), rig.now)
@@ -191,7 +217,7 @@ def test_a_late_attitude_is_ignored_unless_the_device_has_restarted() -> None:
 
     def pitch_after(milliseconds: int, pitch: float) -> float:
         status = replaced(rig.managers[0].attitude(), time_boot_ms=milliseconds,
-                          q=Quaternion.from_euler(0.0, pitch, 0.0))
+                         q=Quaternion.from_euler(0.0, pitch, 0.0))
         rig.receive(rig.managers[0].device, status)
         attitude = rig.gimbal.snapshot(rig.now).attitude
         assert attitude is not None
@@ -214,10 +240,12 @@ def test_zero_is_sent_again_if_a_late_rate_turns_the_device_after_it_has_stopped
     assert [one.angular_velocity_z for _, one in setpoints(rig)][1:3] == [0.0, 0.0]
 
 
-def test_a_rate_ends_with_a_zero_if_the_link_is_lost_before_the_attitude_after_it_is_repeated(
-) -> None:
+@pytest.mark.parametrize(('rate', 'sent'), [(0.2, [0.0]), (None, [])])
+def test_only_a_zero_of_a_rate_is_sent_if_the_link_is_lost_before_an_attitude_is_repeated(
+        rate: float | None, sent: list[float]) -> None:
     rig = in_control()
-    rig.gimbal.set_rates((0.0, 0.0, 0.2), rig.now)
+    if rate:
+        rig.gimbal.set_rates((0.0, 0.0, rate), rig.now)
     rig.gimbal.set_attitude(Quaternion(), VEHICLE, rig.now)
     rig.run(0.1)
     rig.component.link_closed(rig.now, 'cable pulled')
@@ -225,7 +253,7 @@ def test_a_rate_ends_with_a_zero_if_the_link_is_lost_before_the_attitude_after_i
     rig.component.link_opened(rig.now)
     rig.run(2.0)
 
-    assert [one.angular_velocity_z for _, one in setpoints(rig)[before:]] == [0.0]
+    assert [one.angular_velocity_z for _, one in setpoints(rig)[before:]] == sent
 
 
 @pytest.mark.parametrize(('turns', 'zeros'), [(True, len(REPEATS)), (False, 0)])
@@ -355,6 +383,50 @@ MOVES: list[Callable[[Rig], object]] = [
     lambda rig: rig.gimbal.set_angles((0.0, 0.2, 0.0), VEHICLE, rig.now),
     lambda rig: rig.gimbal.set_neutral(rig.now, rig.done),
     lambda rig: rig.gimbal.set_roi(47.0, 8.5, 500.0, rig.now, rig.done)]
+
+
+def test_at_the_end_of_the_process_only_a_zero_its_command_and_the_release_are_sent() -> None:
+    rig = in_control()
+    rig.gimbal.set_rates((0.0, 0.2, 0.0), rig.now)
+    rig.run(0.02)
+    begun = len(rig.sent)
+
+    rig.component.close(rig.now)
+    rig.gimbal.release_control(rig.now, rig.done)
+    for move in MOVES:
+        move(rig)
+    rig.run(1.0)
+
+    sent = [one for _, one in rig.sent[begun:]]
+    [zero] = [one for one in sent if isinstance(one, GimbalManagerSetAttitude)]
+    assert zero.angular_velocity_y == 0.0
+    [stop, release] = [one for one in sent if isinstance(one, CommandLong | CommandInt)
+                       and one.command in DEVICE_ID_PARAM]
+    assert (stop.command, stop.param3, stop.param4) == (
+        mavlink.MAV_CMD_DO_GIMBAL_MANAGER_PITCHYAW, 0.0, 0.0)
+    assert (release.command, release.param1) == (mavlink.MAV_CMD_DO_GIMBAL_MANAGER_CONFIGURE, -3)
+    assert rig.managers[0].primary == Address(0, 0)
+
+
+def test_the_acknowledgement_of_an_earlier_command_does_not_end_the_stop_before_a_release(
+) -> None:
+    rig = in_control()
+    command = mavlink.MAV_CMD_DO_GIMBAL_MANAGER_PITCHYAW
+    rig.managers[0].answers = False
+    rig.gimbal.set_neutral(rig.now, rig.done)
+    rig.gimbal.set_rates((0.0, 0.2, 0.0), rig.now)
+    rig.run(0.02)
+    asked_at = rig.now
+    rig.gimbal.release_control(rig.now, rig.done)
+    rig.run(0.02)
+
+    # The acknowledgement of the command for the neutral position.
+    rig.receive(rig.managers[0].address, CommandAck(
+        command, mavlink.MAV_RESULT_ACCEPTED, 0, 0, *OURS))
+    rig.run(0.02)
+
+    assert [one.command for at, one in rig.sent if at >= asked_at
+            and isinstance(one, CommandLong)] == [command, command]
 
 
 def test_nothing_moves_the_gimbal_while_its_control_is_released() -> None:

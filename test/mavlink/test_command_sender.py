@@ -385,6 +385,17 @@ def test_overtaking_command_is_sent_beside_one_in_progress(rejections: int) -> N
     assert (on.result, off.result, waiting.result) == (ACCEPTED, DENIED, FAILED)
 
 
+def test_command_that_is_not_resent_may_be_answered_and_one_that_waits_is_cancelled() -> None:
+    rig = Rig()
+    sent, waiting = rig.start(), rig.start()
+    rig.sender.stop_resending(rig.now, LIGHT, lambda command: True)
+    rig.run(0.3)
+    assert (sent.outcomes, waiting.status) == ([], STATUS.CANCELLED)
+    rig.ack(ACCEPTED)
+    rig.run(LONG)
+    assert (sent.result, len(sent.frames), len(waiting.frames)) == (ACCEPTED, 1, 0)
+
+
 @pytest.mark.parametrize('place', [0, 1])
 def test_cancelled_command_ends_and_the_other_is_sent(place: int) -> None:
     rig = Rig()

@@ -30,7 +30,7 @@ from illuminator_ros.payload.reconciler import decide, Desired, Reconciler
 import pytest
 
 US, DEVICE = Address(1, 194), Address(1, 7)
-SET_LEVEL, STATUS_ID = 31000, 40000
+SET_LEVEL, OTHER_COMMAND, STATUS_ID = 31000, 31001, 40000
 ACCEPTED, DENIED = mavlink.MAV_RESULT_ACCEPTED, mavlink.MAV_RESULT_DENIED
 
 
@@ -40,6 +40,7 @@ class Level:
 
     level: int
     note: str = ''
+    position: None = None
     command: int = SET_LEVEL
 
     @property
@@ -63,21 +64,24 @@ class Level:
 class Bench:
     """A reconciler, the device at the other end, and the time."""
 
-    def __init__(self) -> None:
+    def __init__(self, status_id: int | None = STATUS_ID) -> None:
         self.now = 100.0
         self.sender = CommandSender(US)
-        target = Target(DEVICE, self.sender, kind='device', status_id=STATUS_ID,
+        target = Target(DEVICE, self.sender, kind='device', status_id=status_id,
                         status_name='STATUS')
         self.ready_at = -math.inf
         self.reconciler: Reconciler[int] = Reconciler(
             target, earliest=lambda change: self.ready_at,
             overtakes=lambda change: change.params == (0.0,))
 
-    def want(self, level: int, *, is_stream: bool = False, limit: float = 30.0) -> list[Result]:
+    def want(
+        self, level: int, *, is_stream: bool = False, limit: float = 30.0,
+        command: int = SET_LEVEL,
+    ) -> list[Result]:
         """Want a level, and return the list that gets its results."""
         results: list[Result] = []
         self.reconciler.want(
-            Desired(Level(level), since=self.now, limit=limit), self.now,
+            Desired(Level(level, command=command), since=self.now, limit=limit), self.now,
             lambda result, now: results.append(result), is_stream=is_stream)
         return results
 
@@ -85,8 +89,8 @@ class Bench:
         self.reconciler.reported(StatusReport(
             level, self.now if sent_by is None else sent_by, shared_address=shared), self.now)
 
-    def acknowledge(self, result: int = ACCEPTED) -> None:
-        self.sender.acknowledge(DEVICE, CommandAck(SET_LEVEL, result, 0, 0, *US), self.now)
+    def acknowledge(self, result: int = ACCEPTED, command: int = SET_LEVEL) -> None:
+        self.sender.acknowledge(DEVICE, CommandAck(command, result, 0, 0, *US), self.now)
 
     def run(self, seconds: float) -> None:
         """Let time pass."""
@@ -101,7 +105,8 @@ class Bench:
     def sent(self) -> list[float]:
         """Return the levels that were sent, tries included."""
         messages: list[Any] = [message for _, message in self.sender.outgoing]
-        return [message.param1 for message in messages if message.command == SET_LEVEL]
+        return [message.param1 for message in messages
+                if message.command in (SET_LEVEL, OTHER_COMMAND)]
 
 
 @pytest.fixture
@@ -160,6 +165,29 @@ def test_a_device_that_never_sends_a_status_succeeds_as_not_confirmed() -> None:
     bench.run(1.0)
     assert messages(answer) == ['level 1, accepted, not confirmed']
     assert answer[0].success
+
+
+@pytest.mark.parametrize(('result', 'message', 'success'), [
+    (ACCEPTED, 'MAV_RESULT_ACCEPTED', True), (DENIED, 'refused: MAV_RESULT_DENIED', False)])
+def test_the_acknowledgement_decides_where_no_status_shows_the_property(
+    result: int, message: str, success: bool,
+) -> None:
+    bench = Bench(status_id=None)
+    for level in (1, 2):
+        answer = bench.want(level)
+        bench.acknowledge(result)
+        assert messages(answer) == [message]
+        assert answer[0].success is success
+
+
+def test_a_newer_value_by_another_command_need_not_wait_for_the_acknowledgement() -> None:
+    bench = Bench(status_id=None)
+    older, answer = bench.want(1), bench.want(2, command=OTHER_COMMAND)
+    bench.run(0.1)
+    assert messages(older) == ['superseded by level 2']
+    bench.acknowledge(command=OTHER_COMMAND)
+    bench.run(10.0)
+    assert (messages(answer), bench.sent) == (['MAV_RESULT_ACCEPTED'], [1.0, 2.0])
 
 
 def test_equal_values_share_a_command_and_its_outcome(bench: Bench) -> None:

@@ -26,7 +26,7 @@ from illuminator_ros.illuminator.light import Settings
 from illuminator_ros.mavlink.command_sender import CommandSender
 from illuminator_ros.mavlink.component import Component, Endpoint
 from illuminator_ros.mavlink.messages import Address, Heartbeat, Message
-from illuminator_ros.payload.request import Result
+from illuminator_ros.payload.attempt import Result
 from illuminator_ros.payload.simulated import SimulatedComponents
 from payloads.winch import WINCH, WinchClient, WinchReport
 import pytest
@@ -94,9 +94,9 @@ def test_one_component_with_one_heartbeat_finds_both(vehicle: Vehicle) -> None:
 def test_each_payload_gets_the_result_of_its_own_request(vehicle: Vehicle) -> None:
     lit: list[Result] = []
     vehicle.lights.lights[LIGHT].enable(True, vehicle.now, lambda result, now: lit.append(result))
-    vehicle.release(5.0)
-    vehicle.release(-9.0)
-    vehicle.run(1.0)
+    for length in (5.0, -9.0):
+        vehicle.release(length)
+        vehicle.run(1.0)
     assert [one.success for one in lit] == [True]
     assert [one.message.partition(' (')[0] for one in vehicle.results] == [
         '5 m released, confirmed by WINCH_STATUS: MAV_RESULT_ACCEPTED',

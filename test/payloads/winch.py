@@ -27,15 +27,18 @@ from functools import partial
 import math
 
 from illuminator_ros.mavlink import messages as mav
-from illuminator_ros.mavlink.command_sender import CommandSender, Done
+from illuminator_ros.mavlink.command_sender import CommandSender
+from illuminator_ros.mavlink.command_sender import Done as CommandDone
 from illuminator_ros.mavlink.component import Payload
 from illuminator_ros.mavlink.dialect import mavlink
 from illuminator_ros.mavlink.messages import AnyCommand
-from illuminator_ros.payload import request, simulated
+from illuminator_ros.payload import simulated
+from illuminator_ros.payload.attempt import Done, StatusReport, Target
 from illuminator_ros.payload.discovery import Discovery
 from illuminator_ros.payload.faults import Behaviour
 from illuminator_ros.payload.listeners import Listeners
 from illuminator_ros.payload.payload_type import PayloadType
+from illuminator_ros.payload.reconciler import Desired, Reconciler
 
 WINCH = PayloadType('winch', ros='payloads.winch_ros:WINCH',
                     simulated='payloads.winch:SIMULATED', checks='payloads.winch_checks:CHECKS',
@@ -65,6 +68,7 @@ class Release:
     length: float
     line_length: float
     note: str = ''
+    position: None = None
     command: int = mavlink.MAV_CMD_DO_WINCH
 
     @property
@@ -94,16 +98,15 @@ class Winch:
     """One winch: a :class:`Device` of the discovery."""
 
     def __init__(
-        self, address: mav.Address, commands: CommandSender, ended: Done,
+        self, address: mav.Address, commands: CommandSender, ended: CommandDone,
     ) -> None:
         self.address = address
         self.lost_at = math.inf
         self.was_commanded = False
         self._heard_at = self._line_length = 0.0
-        self._target = request.Target(
+        self._length: Reconciler[WinchStatus] = Reconciler(Target(
             address, commands, ended, kind='winch', status_id=WinchStatus.id,
-            status_name='WINCH_STATUS')
-        self._requests = request.RequestQueue[WinchStatus](self._target)
+            status_name='WINCH_STATUS'))
 
     def heard(self, now: float) -> None:
         """Note that the winch is alive."""
@@ -113,26 +116,28 @@ class Winch:
         """Take a status."""
         self.heard(now)
         self._line_length = status.line_length
-        self._requests.take(request.StatusReport(status, sent_by=now, has_clock=False), now)
+        self._length.reported(StatusReport(status, sent_by=now, has_clock=False), now)
 
-    def release(self, length: float, now: float, done: request.Done) -> None:
-        """Release line, m, or wind it in if negative; ``done`` gets the confirmed result."""
+    def release(self, length: float, now: float, done: Done) -> None:
+        """
+        Release line, m, or wind it in if negative; ``done`` gets the confirmed result.
+
+        A newer release replaces one that is not confirmed.
+        """
         self.was_commanded = True
-        self._requests.submit(request.Request(
-            self._target, lambda now: Release(length, self._line_length + length),
-            lambda result, change, status, now: done(result, now), now=now,
-            deadline=now + 30.0), now)
+        self._length.want(
+            Desired(Release(length, self._line_length + length), since=now), now, done)
 
     def poll(self, now: float) -> None:
         """See :class:`Device`."""
         if now >= self._heard_at + TIMEOUT:
             self.lost_at = min(self.lost_at, now)
-        self._requests.poll(now)
+        self._length.poll(now)
 
     def next_deadline(self) -> float:
         """See :class:`Device`."""
         lost = math.inf if self.lost_at < math.inf else self._heard_at + TIMEOUT
-        return min(lost, self._requests.next_deadline())
+        return min(lost, self._length.next_deadline())
 
 
 class WinchClient(Payload):

@@ -23,17 +23,7 @@ from itertools import pairwise
 import math
 from typing import TypeAlias, TypeVar
 
-from .tester import (
-    GimbalTester,
-    Information,
-    Limits,
-    NAN,
-    Pose,
-    PROPOSAL,
-    RATE,
-    STEP,
-    TOLERANCE,
-)
+from .tester import GimbalTester, Information, Limits, NAN, Pose, PROPOSAL, RATE, STEP, TOLERANCE
 from ..axes import AT_LIMIT, LEVEL
 from ...mavlink.dialect import flag_names, mavlink, short_names
 from ...mavlink.messages import Message

@@ -43,14 +43,7 @@ from .tester import (
 from .. import messages as gimbal
 from ..axes import LEVEL
 from ...mavlink.dialect import mavlink
-from ...mavlink.messages import (
-    Address,
-    CommandLong,
-    Heartbeat,
-    heartbeat,
-    Message,
-    target_of,
-)
+from ...mavlink.messages import Address, CommandLong, Heartbeat, heartbeat, Message, target_of
 from ...payload.checks import component_requirements as component
 from ...payload.checks.outcomes import Failed, Skipped
 from ...payload.checks.requirement import (
@@ -69,7 +62,7 @@ from ...payload.rotation import Quaternion
 
 # s
 ANNOUNCE_INTERVAL = 0.4
-# MAV_COMP_ID_ONBOARD_COMPUTER
+# mavlink.MAV_COMP_ID_ONBOARD_COMPUTER
 MANAGER_ID = 191
 VEHICLE_FRAME = mavlink.GIMBAL_DEVICE_FLAGS_YAW_IN_VEHICLE_FRAME
 # ESTIMATOR_STATUS_FLAGS: only the attitude of the vehicle is valid.

@@ -47,11 +47,7 @@ from .. import messages as gimbal
 from ..axes import LEVEL
 from ..messages import NO_COMPONENT
 from ...mavlink.dialect import mavlink
-from ...mavlink.messages import (
-    Address,
-    Message,
-    time_boot_ms,
-)
+from ...mavlink.messages import Address, Message, time_boot_ms
 from ...payload.checks import component_requirements as component
 from ...payload.checks.outcomes import fail_if, Failed, Skipped
 from ...payload.checks.requirement import (

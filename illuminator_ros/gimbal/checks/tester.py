@@ -31,12 +31,7 @@ from ...payload.checks.outcomes import Failed, Skipped
 from ...payload.checks.requirement import Conditions, Specification
 from ...payload.checks.session import Session
 from ...payload.messages import GimbalDeviceAttitudeStatus as AttitudeStatus
-from ...payload.mount_attitude import (
-    names_frame,
-    UNSET_VECTOR,
-    yaw_frame,
-    YawFrame,
-)
+from ...payload.mount_attitude import names_frame, UNSET_VECTOR, yaw_frame, YawFrame
 from ...payload.rotation import Quaternion
 
 GIMBAL = Specification('gimbal protocol v2', 'https://mavlink.io/en/services/gimbal_v2.html')

@@ -34,7 +34,7 @@ from ..client import GimbalClient
 from ..commands import Control
 from ..gimbal import Gimbal
 from ...mavlink.dialect import flag_names, mavlink
-from ...payload import request
+from ...payload.attempt import Done, Result
 from ...payload.command_sources import DEFAULT, describe
 from ...payload.messages import GeoPoint
 from ...ros import node as ros_node
@@ -58,7 +58,7 @@ PUBLICATIONS = (
     ros_node.Publication('controller', String),
 )
 # Requests without an argument, by service.
-REQUESTS: dict[str, Callable[[Gimbal, float, request.Done], None]] = {
+REQUESTS: dict[str, Callable[[Gimbal, float, Done], None]] = {
     'take_control': Gimbal.take_control,
     'release_control': Gimbal.release_control,
     'neutral': Gimbal.set_neutral,
@@ -247,10 +247,13 @@ class GimbalNode:
             return ros_node.CommandTopic(f'{prefix}{name}', type_, take, read, qos)
 
         def point(gimbal: Gimbal, place: GeoPoint, now: float) -> str:
-            pointing.offer(place, now)
+            gimbal.set_roi(*place, now, pointed, is_stream=True)
             return ''
 
-        pointing = _LatestPlace(functools.partial(self._point, source, f'{prefix}cmd/roi'))
+        def pointed(result: Result, now: float) -> None:
+            if not (result.success or result.superseded):
+                self._refused(f'{prefix}cmd/roi', result.message)
+
         return (
             topic('cmd/attitude', QuaternionStamped,
                   lambda gimbal, value, now: gimbal.set_attitude(*value, now),
@@ -262,23 +265,6 @@ class GimbalNode:
                   ros_node.COMMAND_QOS),
             topic('cmd/roi', NavSatFix, point,
                   lambda message: conversions.read_place(message, self._separation)))
-
-    def _point(
-        self, source: str, topic: str, place: GeoPoint, now: float,
-        ended: Callable[[float, bool], None],
-    ) -> None:
-        def done(result: request.Result, now: float) -> None:
-            if not result.success:
-                self._refused(topic, result.message)
-            ended(now, result.superseded)
-
-        gimbal = self._gimbal()
-        # The source may have lost the gimbal while the previous place was sent.
-        refusal = gimbal.refusal(source) if gimbal else self.absence(now)
-        if refusal or gimbal is None:
-            done(request.Result(False, refusal), now)
-        else:
-            gimbal.set_roi(*place, now, done)
 
     def _refused(self, topic: str, reason: str) -> None:
         if reason:
@@ -303,36 +289,3 @@ def _refusal(gimbal: Gimbal, name: str, now: float) -> str:
     # A refused request leaves no claim behind.
     refusal = gimbal.refusal_of_claim(DEFAULT)
     return refusal if refusal or name == 'release_control' else gimbal.claim(DEFAULT, now)
-
-
-class _LatestPlace:
-    """
-    Sends one place after the other; of those that come meanwhile only the newest.
-
-    :param send: starts to send a place, given the time (s), and the function to call when it has
-        ended: with the time, and whether a place that waits is outdated, too.
-    """
-
-    def __init__(
-        self, send: Callable[[GeoPoint, float, Callable[[float, bool], None]], None],
-    ) -> None:
-        self._send = send
-        self._waiting: GeoPoint | None = None
-        self._is_sending = False
-
-    def offer(self, place: GeoPoint, now: float) -> None:
-        """Send a place, unless a newer one comes before it is sent."""
-        self._waiting = place
-        if not self._is_sending:
-            self._send_next(now, False)
-
-    def _send_next(self, now: float, is_outdated: bool) -> None:
-        place, self._waiting = None if is_outdated else self._waiting, None
-        self._is_sending = place is not None
-        if place is None:
-            return
-        try:
-            self._send(place, now, self._send_next)
-        except Exception:
-            self._is_sending = False
-            raise

@@ -26,7 +26,7 @@ from .gimbal_node import GimbalNode
 from ..client import GimbalClient
 from ..events import GimbalConnected, GimbalEvent, GimbalForgotten, GimbalKey
 from ..gimbal import GimbalSettings
-from ...payload.request import Result
+from ...payload.attempt import Result
 from ...ros.command_sources import SOURCE_PARAMETERS, source_settings
 from ...ros.conversions import GEOID_SEPARATION
 from ...ros.device_nodes import DeviceNodes

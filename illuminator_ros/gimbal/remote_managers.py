@@ -1,0 +1,264 @@
+# Copyright 2026 The illuminator_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""The managers that announce a gimbal, as a client hears them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+import math
+from typing import Any
+
+from . import events
+from .commands import Configure, Control, SetFlag, Stop
+from .messages import GimbalManagerInformation, GimbalManagerStatus
+from ..mavlink.command_sender import CommandSender, format_seconds
+from ..mavlink.dialect import mavlink
+from ..mavlink.messages import Address
+from ..payload.attempt import Result, StatusReport, Target
+from ..payload.messages import GimbalDeviceAttitudeStatus
+from ..payload.mount_attitude import YawFrame
+from ..payload.reconciler import Desired, Reconciler
+
+# s of silence after which a manager or a device is lost.
+SILENCE_LIMIT = 3.0
+# s since the last GIMBAL_MANAGER_STATUS after which it is requested (ArduPilot does not stream it,
+# PX4 does every 2 s), and after which control is unknown.
+STATUS_REQUEST_DELAY, STATUS_LIMIT = 3.0, 6.0
+# s; the limit of the command that stops a gimbal before control is released.
+STOP_LIMIT = 0.3
+# ms by which a status may be older than the one before it; with a longer step back, its sender has
+# restarted.
+LATE_LIMIT = 1000
+# The most managers of one gimbal; further ones are ignored.
+MAX_MANAGERS = 4
+
+
+@dataclass
+class Repetition:
+    """The times of the requests for a message, at growing intervals until it comes; s."""
+
+    due: float = -math.inf
+    _interval: float = 1.0
+
+    def take(self, now: float) -> bool:
+        """Return whether the message must be requested now."""
+        if now < self.due:
+            return False
+        self.due = now + self._interval
+        self._interval = min(2 * self._interval, 60.0)
+        return True
+
+    def finish(self) -> None:
+        """End the requests: the message has come."""
+        self.due = math.inf
+
+
+def is_late(time_boot_ms: int, newest: int) -> bool:
+    """Return whether a status is older than the newest one."""
+    # The counter wraps.
+    return 0 < (newest - time_boot_ms) % (1 << 32) < LATE_LIMIT
+
+
+def silence(what: str, heard_at: float, now: float) -> str:
+    """Return that something is silent, for people."""
+    if heard_at == -math.inf:
+        return f'{what} has not been heard'
+    return f'nothing from {what} for {format_seconds(now - heard_at)}'
+
+
+class RemoteManager:
+    """
+    One manager of a gimbal: its messages, and the changes that are requested of it. Times are s.
+
+    :ivar autopilot: MAV_AUTOPILOT, None while unknown; likewise ``information``.
+    :ivar control: the components in control in its last status.
+    :ivar control_changes: confirmed by its status.
+    :ivar pose_changes: of the flags, confirmed by the status of the device: ArduPilot's manager
+        does not report them.
+    :ivar place_changes: of the region of interest, which no status shows.
+    """
+
+    def __init__(self, address: Address, commands: CommandSender, key: events.GimbalKey) -> None:
+        self.address = address
+        self.heard_at = self.status_at = -math.inf
+        self.autopilot: int | None = None
+        self.information: GimbalManagerInformation | None = None
+        self.control: Control | None = None
+        self.status_query = Repetition()
+        self._status_time = 0
+        self.target = Target(
+            address, commands, kind='gimbal manager', status_id=GimbalManagerStatus.id,
+            status_name='GIMBAL_MANAGER_STATUS', needs_status=True)
+        # Control is changed after the gimbal has stopped.
+        self.control_changes: Reconciler[GimbalManagerStatus] = Reconciler(
+            self.target,
+            earliest=lambda change: math.inf if self._stops.is_busy else -math.inf)
+        self.pose_changes: Reconciler[GimbalDeviceAttitudeStatus] = Reconciler(Target(
+            address, commands, kind='gimbal device', status_id=GimbalDeviceAttitudeStatus.id,
+            status_name='GIMBAL_DEVICE_ATTITUDE_STATUS', status_source=key.address,
+            needs_status=True))
+        unconfirmed = Target(address, commands, kind='gimbal manager')
+        self.place_changes: Reconciler[None] = Reconciler(unconfirmed)
+        self._stops: Reconciler[None] = Reconciler(unconfirmed)
+
+    @property
+    def reconcilers(self) -> tuple[Reconciler[Any], ...]:
+        """Return the reconcilers of all properties."""
+        return self._stops, self.control_changes, self.pose_changes, self.place_changes
+
+    def pose_frame(self) -> tuple[YawFrame | None, float]:
+        """Return the yaw frame of the request for a pose, None for none; since when, s."""
+        desired = self.pose_changes.desired
+        if desired is None or not isinstance(desired.change, SetFlag):
+            return None, -math.inf
+        return desired.change.frame, desired.since
+
+    @property
+    def enforces_control(self) -> bool:
+        """Whether it refuses components without control, as far as it is known."""
+        return self.autopilot != mavlink.MAV_AUTOPILOT_ARDUPILOTMEGA
+
+    def is_heard(self, now: float) -> bool:
+        """Return whether it is not lost."""
+        return now < self.heard_at + SILENCE_LIMIT
+
+    def known_control(self, now: float) -> Control | None:
+        """Return the components in control, None if they are not known."""
+        is_known = self.is_heard(now) and now < self.status_at + STATUS_LIMIT
+        return self.control if is_known else None
+
+    def control_deadline(self) -> float:
+        """Return when :meth:`known_control` returns None without another message, s."""
+        return min(self.heard_at + SILENCE_LIMIT, self.status_at + STATUS_LIMIT)
+
+    def lack_of_status(self, now: float) -> str:
+        """Return that its status is missing, for people."""
+        text = f'manager {self.address} has sent no GIMBAL_MANAGER_STATUS'
+        age = now - self.status_at
+        return f'{text} for {format_seconds(age)}' if math.isfinite(age) else text
+
+    def take_status(self, status: GimbalManagerStatus, now: float) -> bool:
+        """Take a status; return whether it counts: late ones do not."""
+        if is_late(status.time_boot_ms, self._status_time):
+            return False
+        self._status_time = status.time_boot_ms
+        self.status_at, self.control = now, Control.of(status)
+        self.status_query = Repetition(now + STATUS_REQUEST_DELAY)
+        return True
+
+    def confirm_control(self, status: GimbalManagerStatus, now: float) -> None:
+        """Compare a status that counts with the requests for control."""
+        self.control_changes.reported(StatusReport(status, now, has_clock=False), now)
+
+    def confirm_pose(self, status: GimbalDeviceAttitudeStatus, now: float) -> None:
+        """Compare a status of the device with the requests for a pose."""
+        self.pose_changes.reported(StatusReport(status, now, has_clock=False), now)
+
+    @property
+    def is_releasing(self) -> bool:
+        """Whether a release of control is under way."""
+        return self.control_changes.may_set(
+            lambda change: isinstance(change, Configure) and not change.take)
+
+    def stop(self, flags: int, device_id: int, now: float, stopped: Callable[[], None]) -> None:
+        """
+        Stop the gimbal; control is not changed before that has ended.
+
+        :param stopped: called when the manager has accepted it.
+        """
+        def ended(result: Result, now: float) -> None:
+            if result.success:
+                stopped()
+
+        self._stops.want(
+            Desired(Stop(flags, device_id), since=now, limit=STOP_LIMIT), now, ended)
+
+    def cancel_moves(self, message: str, now: float, *, superseded: bool = False) -> None:
+        """End the requests that may turn the gimbal."""
+        for one in (self.pose_changes, self.place_changes):
+            one.cancel(message, now, superseded=superseded)
+
+    def cancel(self, message: str, now: float, *, superseded: bool = False) -> None:
+        """End all requests."""
+        for one in self.reconcilers:
+            one.cancel(message, now, superseded=superseded)
+
+
+class RemoteManagers:
+    """
+    The managers that announce one gimbal: the first one that is heard is used until it is lost.
+
+    :param first: the manager that has announced the gimbal.
+    :param emit: takes the events.
+    :ivar used: the manager that is used.
+    :ivar announced_at: when a manager last announced the gimbal, s.
+    """
+
+    def __init__(
+        self, key: events.GimbalKey, first: Address, commands: CommandSender,
+        emit: Callable[[events.GimbalEvent], None],
+    ) -> None:
+        self.announced_at = -math.inf
+        self._key = key
+        self._commands = commands
+        self._emit = emit
+        self.used = RemoteManager(first, commands, key)
+        self._all = {first: self.used}
+        self._others: set[Address] = set()
+
+    @property
+    def addresses(self) -> tuple[Address, ...]:
+        """Return the manager that is used, and the others that are heard."""
+        return self.used.address, *sorted(self._others)
+
+    def get(self, address: Address) -> RemoteManager | None:
+        """Return a manager that announces the gimbal."""
+        return self._all.get(address)
+
+    def announce(self, address: Address, now: float) -> RemoteManager | None:
+        """Note an announcement; return the manager, None if there are too many."""
+        self.announced_at = now
+        if address not in self._all and len(self._all) < MAX_MANAGERS:
+            self._all[address] = RemoteManager(address, self._commands, self._key)
+        if manager := self._all.get(address):
+            manager.heard_at = now
+        return manager
+
+    def choose(self, now: float) -> None:
+        """Use another manager if the used one is lost, and report further ones."""
+        heard = [one for one in self._all.values() if one.is_heard(now)]
+        if not heard:
+            return
+        if self.used not in heard:
+            before, self.used = self.used, heard[0]
+            before.cancel('the manager was lost', now)
+            self._emit(events.ManagerChanged(self._key, before.address, self.used.address))
+        others = {one.address for one in heard} - {self.used.address}
+        for other in others - self._others:
+            self._emit(events.SecondManager(self._key, self.used.address, other))
+        self._others = others
+
+    def link_closed(self, now: float, reason: str) -> None:
+        """Lose all managers at once."""
+        for manager in self._all.values():
+            manager.heard_at = min(manager.heard_at, now - SILENCE_LIMIT)
+            for one in manager.reconcilers:
+                one.lost(reason, now)
+
+    def close(self, message: str, now: float) -> None:
+        """End all requests: the process ends."""
+        for manager in self._all.values():
+            manager.cancel(message, now, superseded=True)

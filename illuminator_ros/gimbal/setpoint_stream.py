@@ -1,0 +1,281 @@
+# Copyright 2026 The illuminator_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""The setpoints of a client: attitudes, and rates that end with a zero."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from enum import Enum
+import math
+
+from .axes import TURNING
+from .messages import GimbalManagerSetAttitude
+from ..mavlink.dialect import mavlink
+from ..payload.attempt import Done, Result
+from ..payload.messages import GimbalDeviceAttitudeStatus
+from ..payload.mount_attitude import (
+    Components,
+    MountAttitude,
+    STILL,
+    to_mavlink,
+    UNSET_QUATERNION,
+    UNSET_VECTOR,
+    YawFrame,
+)
+from ..payload.rotation import flu_frd, Quaternion, Vector
+
+# s after which a setpoint is sent again, since the message is not acknowledged.
+REPEATS = (0.2, 0.4, 0.8)
+# s after an attitude in which the device may still report the yaw lock that it had before.
+LOCK_DELAY = 1.0
+# s; the least time between two attitudes that show whether a device turns: one may be a copy of
+# the other.
+ATTITUDE_SPACING = 0.1
+
+
+class Kind(Enum):
+    """The kinds of setpoints: an ATTITUDE is repeated, and a ZERO if the device still turns."""
+
+    ATTITUDE = 'attitude'
+    RATE = 'rate'
+    ZERO = 'rate of zero'
+    PLACE = 'place, which a command sets'
+
+
+@dataclass(eq=False)
+class _Setpoint:
+    """
+    A setpoint that the gimbal may follow.
+
+    :param message: None for a place.
+    :param due: when it is sent again, s; of a rate or a place, when it ends with a zero.
+    :param ends_rate: whether it is an attitude that ends a rate, unless it is lost.
+    :param is_over: whether the gimbal follows a later request.
+    """
+
+    kind: Kind
+    message: GimbalManagerSetAttitude | None = None
+    attitude: tuple[Quaternion, YawFrame] | None = None
+    due: list[float] = field(default_factory=list)
+    ends_rate: bool = False
+    is_over: bool = False
+
+    @property
+    def moves(self) -> bool:
+        """Whether the gimbal turns until it gets another setpoint."""
+        return self.kind in (Kind.RATE, Kind.PLACE)
+
+    @property
+    def may_have_rate(self) -> bool:
+        """Whether the gimbal may turn at a rate, since the message that ends it may be lost."""
+        return bool(self.due) and (self.kind is not Kind.ATTITUDE or self.ends_rate)
+
+
+class SetpointStream:
+    """
+    Sends setpoints to one gimbal, and repeats the last one. No I/O; times are s.
+
+    A :class:`~..payload.reconciler.Reconciler` cannot do this: GIMBAL_MANAGER_SET_ATTITUDE is not
+    acknowledged, and the status of a device shows where it points, not what it was given, since
+    it turns slowly, within its ranges, and with the offsets of other players.
+
+    :param make: returns the message of a setpoint.
+    :param send: sends a message.
+    :param timeout: from the last rate until a rate of zero is sent.
+    :param requested_frame: returns the yaw frame of a request that is under way, and since when.
+    :ivar sent: the number of messages.
+    """
+
+    def __init__(
+        self, make: Callable[[YawFrame, Components, Vector], GimbalManagerSetAttitude],
+        send: Callable[[GimbalManagerSetAttitude], None], timeout: float,
+        requested_frame: Callable[[], tuple[YawFrame | None, float]],
+    ) -> None:
+        self.sent = 0
+        self._make = make
+        self._send_message = send
+        self._timeout = timeout
+        self._requested_frame = requested_frame
+        self._last: _Setpoint | None = None
+        self._reported_frame = YawFrame.VEHICLE
+        self._attitude_frame, self._attitude_at = YawFrame.VEHICLE, -math.inf
+        # An attitude of a device that reports no rates, and its time; a later one is compared.
+        self._seen: tuple[MountAttitude, float] | None = None
+
+    @property
+    def may_turn(self) -> bool:
+        """Whether the gimbal may turn at a rate, or towards a place."""
+        return self._last is not None and (self._last.moves or self._last.may_have_rate)
+
+    def attitude(self, frame: YawFrame) -> Quaternion | None:
+        """Return the last attitude, None if its yaw has another frame or it counts no longer."""
+        attitude = self._last and self._last.attitude
+        return attitude[0] if attitude and attitude[1] is frame else None
+
+    def set_attitude(self, rotation: Quaternion, frame: YawFrame, now: float) -> None:
+        """Send an attitude, and send it again after :data:`REPEATS`."""
+        self._attitude_frame, self._attitude_at = frame, now
+        self._set(_Setpoint(
+            Kind.ATTITUDE, self._make(frame, to_mavlink(rotation, frame), UNSET_VECTOR),
+            (rotation, frame), [now + delay for delay in REPEATS],
+            ends_rate=self._last is not None and self._last.may_have_rate))
+
+    def set_rates(self, rates: Vector, now: float) -> None:
+        """Send rates, which leave the yaw lock as it is; a zero follows after the time-out."""
+        message = self._make(self._yaw_frame(now), UNSET_QUATERNION, flu_frd(rates))
+        if rates == STILL:
+            self._set(_Setpoint(Kind.ZERO, message, due=[now + delay for delay in REPEATS]))
+        else:
+            self._set(_Setpoint(Kind.RATE, message, due=[now + self._timeout]))
+
+    def _yaw_frame(self, now: float) -> YawFrame:
+        """Return the yaw frame that rates keep, which implies the yaw lock."""
+        requested, since = self._requested_frame()
+        if since <= self._attitude_at > now - LOCK_DELAY:
+            return self._attitude_frame
+        return requested or self._reported_frame
+
+    def suspend(self, now: float, done: Done, *, is_place: bool = False) -> Done:
+        """
+        End a rate with a zero, and send no attitude again: a request follows.
+
+        :param done: takes the result of the request.
+        :param is_place: whether the request points the gimbal at a place.
+        :return: takes the result first: the setpoint counts again if the request was refused.
+        """
+        before, place = self._last, _Setpoint(Kind.PLACE)
+        if before is not None and before.kind is Kind.RATE:
+            self.set_rates(STILL, now)
+            before = self._last
+        elif before is not None and before.kind is Kind.ATTITUDE:
+            before.due.clear()
+        if is_place:
+            self._last = place
+
+        def ended(result: Result, now: float) -> None:
+            if result.success and before is not None:
+                before.is_over = True
+            # Without an answer the gimbal may follow the place.
+            if result.refused and self._last is place:
+                self._last = before
+            if self._last is not None and self._last.is_over:
+                self._last = None
+            done(result, now)
+
+        return ended
+
+    def stop(self, now: float) -> int:
+        """Send a zero; return the flags of its message."""
+        self.set_rates(STILL, now)
+        assert self._last is not None and self._last.message is not None
+        return self._last.message.flags
+
+    def has_stopped(self) -> None:
+        """Note that the last zero has arrived."""
+        if self._last is not None and self._last.kind is Kind.ZERO:
+            self._last.due.clear()
+
+    def end(self, now: float) -> None:
+        """Repeat no attitude, and end a rate or a place with a zero once it can be sent."""
+        if self._last is not None and self._last.kind is not Kind.ZERO:
+            self._last.due = [now] if self._last.moves else []
+
+    def control_lost(self, now: float) -> None:
+        """
+        Send nothing any more: another component has control.
+
+        If a rate lasts until this component has control again, it ends with a zero.
+        """
+        last = self._last
+        self._last = _Setpoint(
+            Kind.ZERO, self._make(self._yaw_frame(now), UNSET_QUATERNION, STILL),
+            due=[-math.inf] * len(REPEATS),
+        ) if last and last.may_have_rate else None
+
+    def control_unknown(self, now: float, *, can_send: bool) -> None:
+        """Repeat no attitude, and end a rate with a zero, now or when control is known again."""
+        last = self._last
+        if last is not None and last.may_have_rate:
+            last.kind, last.due = Kind.RATE, [now]
+            if can_send:
+                self.set_rates(STILL, now)
+        elif last is not None:
+            last.due.clear()
+
+    def reported(
+        self, status: GimbalDeviceAttitudeStatus, attitude: MountAttitude | None, now: float, *,
+        may_send: bool,
+    ) -> None:
+        """
+        Take a status of the device, and send a zero again if the device still turns.
+
+        :param attitude: in the status, None if it has none.
+        :param may_send: whether this component has control, and no request is under way, which may
+            turn the gimbal.
+        """
+        is_locked = status.flags & mavlink.GIMBAL_DEVICE_FLAGS_YAW_LOCK
+        self._reported_frame = YawFrame.EARTH if is_locked else YawFrame.VEHICLE
+        zero = self._last
+        if (not may_send or zero is None or zero.kind is not Kind.ZERO or not zero.due
+                or now < zero.due[0]):
+            return
+        turns = self._turns(status, attitude, now)
+        if turns is not None:
+            del zero.due[0]
+            self._seen = None
+        if turns:
+            self._send(zero)
+
+    def _turns(
+        self, status: GimbalDeviceAttitudeStatus, attitude: MountAttitude | None, now: float,
+    ) -> bool | None:
+        """Return whether the device turns, None if its next attitude will show that."""
+        rates = status.angular_velocity_x, status.angular_velocity_y, status.angular_velocity_z
+        if any(abs(rate) > TURNING for rate in rates):
+            return True
+        if attitude is None or all(map(math.isfinite, rates)):
+            return False
+        if self._seen is None or self._seen[0].frame is not attitude.frame:
+            self._seen = attitude, now
+        before, at = self._seen
+        if now < at + ATTITUDE_SPACING:
+            return None
+        return before.rotation.angle_to(attitude.rotation) > TURNING * (now - at)
+
+    def poll(self, now: float) -> None:
+        """Send what is due; this component must have control."""
+        last = self._last
+        if last is not None and now >= self.next_deadline():
+            if last.moves:
+                self.set_rates(STILL, now)
+            else:
+                del last.due[0]
+                self._send(last)
+
+    def next_deadline(self) -> float:
+        """Return when :meth:`poll` is due, infinity if never."""
+        last = self._last
+        # A zero is sent again only when a status comes.
+        return last.due[0] if last and last.due and last.kind is not Kind.ZERO else math.inf
+
+    def _set(self, setpoint: _Setpoint) -> None:
+        self._last, self._seen = setpoint, None
+        self._send(setpoint)
+
+    def _send(self, setpoint: _Setpoint) -> None:
+        assert setpoint.message is not None
+        self.sent += 1
+        self._send_message(setpoint.message)
