@@ -28,6 +28,10 @@ T = TypeVar('T')
 
 # s after which a value is out of date.
 MAX_AGE = 1.0
+# s for which AUTOPILOT_STATE_FOR_GIMBAL_DEVICE is not sent after an autopilot has sent it, and the
+# shortest time between two that are sent.
+AUTOPILOT_SILENCE = 2.0
+AUTOPILOT_INTERVAL = 0.02
 # ESTIMATOR_STATUS_FLAGS: attitude, and horizontal and vertical velocity.
 ESTIMATES_ATTITUDE, ESTIMATES_VELOCITY = 1, 2 | 4
 
@@ -63,6 +67,7 @@ class VehicleState:
         self._velocity: _Latest[Vector] = _Latest()
         self._position: _Latest[GeoPoint] = _Latest()
         self._home_altitude: float | None = None
+        self._autopilot_at = self._sent_at = -math.inf
 
     def take(self, message: Attitude | GlobalPositionInt, now: float) -> None:
         """Take a message of the autopilot; ignore values that are not finite, or no position."""
@@ -107,11 +112,21 @@ class VehicleState:
         """Return the altitude of the home position, m above mean sea level, None if unknown."""
         return self._home_altitude
 
+    def autopilot_sent(self, now: float) -> None:
+        """Note that an autopilot has sent AUTOPILOT_STATE_FOR_GIMBAL_DEVICE."""
+        self._autopilot_at = now
+
     def for_device(self, device: Address, now: float) -> AutopilotStateForGimbalDevice | None:
-        """Return the message for a gimbal device, None if the attitude is unknown."""
+        """
+        Return the message to be sent to a gimbal device.
+
+        :return: None if an autopilot sends it, it was just sent, or the attitude is unknown.
+        """
         attitude, velocity = self._attitude.get(now), self._velocity.get(now)
-        if attitude is None:
+        if (attitude is None or now < self._autopilot_at + AUTOPILOT_SILENCE
+                or now < self._sent_at + AUTOPILOT_INTERVAL):
             return None
+        self._sent_at = now
         yaw_rate = self._yaw_rate.get(now)
         return AutopilotStateForGimbalDevice(
             *device, int(now * 1e6), attitude, 0, *(velocity or (math.nan,) * 3), 0, math.nan,

@@ -21,7 +21,7 @@ import math
 from pathlib import Path
 import re
 
-from illuminator_ros.gimbal.manager import DemandRefused
+from illuminator_ros.gimbal.manager_events import DemandRefused
 from illuminator_ros.gimbal.manager_state import (
     MANAGER_TIMEOUT,
     ManagerInput,

@@ -26,8 +26,9 @@ from std_msgs.msg import Header
 
 from .conversions import Frames, read_place
 from .gimbals import GIMBAL_PARAMETERS, Gimbals, settings
-from .. import manager as gimbal_manager
+from .. import manager_events
 from ..axes import other_signs, Range
+from ..manager import GimbalManager, ManagerSettings
 from ..manager_control import ControlSettings, Role, RoleHolderChanged
 from ..manager_state import ManagerState, StateChanged
 from ..manager_with_client import ManagerWithClient
@@ -86,7 +87,7 @@ def _players(values: Values, name: str, ros: Address) -> tuple[Address, ...]:
     return tuple(players)
 
 
-def manager_settings(values: Values, ros: Address) -> gimbal_manager.ManagerSettings:
+def manager_settings(values: Values, ros: Address) -> ManagerSettings:
     """
     Return the settings of the manager.
 
@@ -101,7 +102,7 @@ def manager_settings(values: Values, ros: Address) -> gimbal_manager.ManagerSett
             raise ParameterError(f'{axis}_min: {low} rad is above {axis}_max: {high} rad')
         ranges.append(other_signs(axis, Range(low, high)))
     roll, pitch, yaw = ranges
-    return gimbal_manager.ManagerSettings(
+    return ManagerSettings(
         ControlSettings(
             Policy(values['policy']), _players(values, 'priority', ros),
             frozenset(_players(values, 'overruling', ros)), values['lease']),
@@ -169,29 +170,29 @@ class ManagerNode(ServedPayload):
 
     # Events
 
-    def _take(self, event: gimbal_manager.ManagerEvent) -> None:
-        if isinstance(event, gimbal_manager.SetpointSent):
+    def _take(self, event: manager_events.ManagerEvent) -> None:
+        if isinstance(event, manager_events.SetpointSent):
             self._publish(event)
         elif isinstance(event, StateChanged):
             self._state_changed(event)
         elif isinstance(event, RoleHolderChanged):
             self._log.info(_control_text(event, self._manager.settings.control.lease), 'control')
-        elif isinstance(event, gimbal_manager.DemandRefused):
+        elif isinstance(event, manager_events.DemandRefused):
             self._log.warning(f'a setpoint of {event.player} is refused: {event.reason}',
                               'refused')
-        elif isinstance(event, gimbal_manager.SetpointClipped):
+        elif isinstance(event, manager_events.SetpointClipped):
             for one in event.clipped:
                 self._log.warning(
                     f'the setpoint is clipped: {one.axis} {one.requested:.3f} rad in MAVLink is '
                     f'beyond the limit {one.limit:.3f} rad', f'clipped {one.axis}')
-        elif isinstance(event, gimbal_manager.AddressShared):
+        elif isinstance(event, manager_events.AddressShared):
             self._log.error(f'{event.player} has control, and two different senders use that '
                             'address: require signing, or give one another address', 'shared')
-        elif isinstance(event, gimbal_manager.ReferenceLost):
+        elif isinstance(event, manager_events.ReferenceLost):
             self._log.warning(f'the {event.unknown} of the vehicle is unknown: the gimbal does '
                               'not follow its setpoint', f'lost {event.unknown}')
 
-    def _publish(self, event: gimbal_manager.SetpointSent) -> None:
+    def _publish(self, event: manager_events.SetpointSent) -> None:
         setpoint = event.setpoint
         # A setpoint without an attitude is the neutral position: level and ahead.
         attitude = from_mavlink(setpoint.attitude or Quaternion(), setpoint.frame)
@@ -229,7 +230,7 @@ class ManagerNode(ServedPayload):
             self._manager, now))
 
 
-def findings(manager: gimbal_manager.GimbalManager, peers: int) -> list[Finding]:
+def findings(manager: GimbalManager, peers: int) -> list[Finding]:
     """
     Return the findings on a manager.
 
@@ -253,7 +254,7 @@ def _reports(
                    lambda: values)]
 
 
-def _values(manager: gimbal_manager.GimbalManager, now: float) -> dict[str, Value]:
+def _values(manager: GimbalManager, now: float) -> dict[str, Value]:
     control, settings = manager.control, manager.settings.control
     since = control.since(Role.PRIMARY)
     return {

@@ -1,0 +1,281 @@
+# Copyright 2026 The illuminator_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""The setpoint of a gimbal: the requests of the players, mixed, clipped and sent to the device."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+import math
+
+from . import manager_events as events
+from .axes import LEVEL
+from .managed_device import HEADING_UNKNOWN, ManagedDevice
+from .manager_setpoint import (
+    clip,
+    Clipped,
+    Demand,
+    direction,
+    in_vehicle_frame,
+    nudge,
+    POSES,
+    resolve,
+    Setpoint,
+    stopped,
+    turned,
+    turned_by,
+)
+from .manager_state import ManagerState, StateTracker
+from .messages import GimbalDeviceSetAttitude
+from .vehicle_state import VehicleState
+from ..mavlink.command_sender import CommandSender
+from ..mavlink.dialect import mavlink, short_names
+from ..payload.messages import GeoPoint
+from ..payload.mount_attitude import AXES, STILL, UNSET_QUATERNION, YawFrame
+from ..payload.rotation import Quaternion, Vector
+
+# s between repetitions of a constant setpoint, at most 1 s by the specification; and between
+# setpoints that follow a place, the vehicle or a rate.
+HOLD_INTERVAL = 0.9
+FOLLOW_INTERVAL = 0.05
+
+
+class SetpointMixer:
+    """
+    Gives the device of an active manager its setpoints. No I/O; times are s.
+
+    :param emit: takes the events.
+    :ivar current: the setpoint without the offsets of secondary control, None before the first.
+    :ivar sent: as the device got it.
+    :ivar clipped: its angles that were clipped.
+    :ivar due: when :meth:`poll` is due.
+    """
+
+    def __init__(
+        self, device: ManagedDevice, vehicle: VehicleState, tracker: StateTracker,
+        commands: CommandSender, emit: Callable[[events.ManagerEvent], None],
+    ) -> None:
+        self.current: Setpoint | None = None
+        self.sent: Setpoint | None = None
+        self.clipped: tuple[Clipped, ...] = ()
+        self.due = math.inf
+        self._device = device
+        self._vehicle = vehicle
+        self._tracker = tracker
+        self._commands = commands
+        self._emit = emit
+        self._offsets = STILL
+        self._roi: GeoPoint | None = None
+        # By axis, the demand whose clipped angle was reported.
+        self._reported: dict[str, object] = {}
+        self._lost: set[str] = set()
+
+    # The state of the manager
+
+    def activate(self, now: float) -> None:
+        """Send setpoints from now on; end a motion that an earlier manager has left."""
+        self.due = now
+        if self.current is None:
+            self.current = self._device.end_of_motion(now)
+
+    def deactivate(self, *, forget: bool) -> None:
+        """
+        Send no setpoints.
+
+        :param forget: whether another manager may move the device, or the next device may be
+            another one. But a device that turns at a rate continues until a manager stops it.
+        """
+        self.due = math.inf
+        if forget:
+            self.current = (stopped(self.current) if self.current and self.current.has_rates_only
+                            else None)
+            self._roi, self._offsets = None, STILL
+            self.clipped, self._reported = (), {}
+
+    # Players
+
+    def set(self, demand: Demand, now: float) -> str:  # noqa: A003
+        """Follow a demand of the player in primary control; return why it is refused, or ''."""
+        if lacking := self._device.model.lacks(demand.flags):
+            names = (name for flag, name in short_names('GIMBAL_DEVICE_FLAGS').items()
+                     if flag & lacking)
+            return f'the gimbal does not have {", ".join(names)}'
+        self._turn(now)
+        start = self._start(demand, now)
+        if isinstance(start, str):
+            return start
+        self._roi = None
+        self.current = resolve(demand, start, now, turns=not self._tracker.has_mavlink)
+        self._send(now)
+        return ''
+
+    def add(self, demand: Demand, limit: float, now: float) -> str:
+        """
+        Add the angles of the player in secondary control; return why that is refused, or ''.
+
+        :param limit: of each angle, rad.
+        """
+        if demand.flags & POSES or not (
+                demand.attitude or any(map(math.isfinite, demand.angles))):
+            return 'secondary control adds angles only'
+        self._offsets = nudge(demand, limit)
+        self._send(now)
+        return ''
+
+    def end_offsets(self, now: float, *, keep: bool) -> None:
+        """
+        End the offsets.
+
+        :param keep: whether they become part of the setpoint: the gimbal stays where it points.
+        """
+        offsets, self._offsets = self._offsets, STILL
+        if keep:
+            self._turn(now, offsets)
+
+    def stop(self, now: float) -> None:
+        """End rates and the region of interest: the gimbal stays where it points."""
+        self._roi = None
+        self._turn(now)
+        self.current = self.current and stopped(self.current)
+        self._send(now)
+
+    def close(self, now: float) -> None:
+        """Stop, and send nothing more."""
+        self.stop(now)
+        self.current, self.due = None, math.inf
+
+    def point(self, place: GeoPoint, now: float, *, is_relative: bool) -> bool:
+        """
+        Follow a place; return whether position and heading of the vehicle are known.
+
+        :param is_relative: whether its altitude is relative to the home position.
+        """
+        above = self._vehicle.home_altitude if is_relative else 0.0
+        if above is None or self._vehicle.position(now) is None or (
+                self._device.heading(now) is None
+                and not self._device.accepts_earth_frame(now)):
+            return False
+        self._roi = place._replace(altitude=place.altitude + above)
+        self.poll(now)
+        return True
+
+    def end_place(self, now: float) -> None:
+        """Follow no place any more."""
+        self._roi = None
+        self._send(now)
+
+    def poll(self, now: float) -> None:
+        """Send the setpoint, which follows the region of interest if there is one."""
+        if self._roi is not None:
+            position = self._vehicle.position(now)
+            self._note_lost('position', is_lost=position is None)
+            if position and (angles := direction(position, self._roi)) is not None:
+                lock = mavlink.GIMBAL_DEVICE_FLAGS_YAW_LOCK
+                self.current = Setpoint(
+                    LEVEL | (lock & ~self._device.model.lacks(lock)), YawFrame.EARTH,
+                    Quaternion.from_euler(0.0, *angles), since=now)
+        self._send(now)
+
+    # The path to the device
+
+    def _start(self, demand: Demand, now: float) -> Quaternion | str:
+        """Return the attitude that a demand changes, or what is unknown of it."""
+        if demand.is_pose or (demand.has_rates_only and self._tracker.has_mavlink):
+            # Such a setpoint does not depend on the attitude.
+            return Quaternion()
+        if (demand.frame is YawFrame.EARTH and not self._device.accepts_earth_frame(now)
+                and self._device.heading(now) is None):
+            return HEADING_UNKNOWN
+        return demand.attitude or self._pointing(demand.frame, now)
+
+    def _pointing(self, frame: YawFrame, now: float) -> Quaternion | str:
+        """Return the attitude of the setpoint, or else of the device, with a yaw in a frame."""
+        heading = self._device.heading(now)
+        if self.current is not None and self.current.attitude is not None:
+            attitude, known = self.current.attitude, self.current.frame
+        elif (reported := self._device.reported(frame, now)) is not None:
+            return reported
+        elif self.sent is not None:
+            return 'the attitude of the gimbal is unknown'
+        else:
+            # A device that has neither reported an attitude nor got a setpoint starts at 0.
+            attitude, known = Quaternion(), YawFrame.VEHICLE
+        if known is frame:
+            return attitude
+        return HEADING_UNKNOWN if heading is None else turned_by(
+            attitude, heading if frame is YawFrame.EARTH else -heading)
+
+    def _ahead(self, setpoint: Setpoint, now: float) -> float | None:
+        """Return the direction from which the range of the yaw counts, None if unknown."""
+        # A pose and rates have no attitude that is converted.
+        is_relative = setpoint.frame is YawFrame.VEHICLE or setpoint.attitude is None
+        return 0.0 if is_relative else self._device.heading(now)
+
+    def _turn(self, now: float, offsets: Vector = STILL) -> None:
+        """Turn the setpoint by the rates that the device does not follow, and by offsets."""
+        self.current = self.current and turned(
+            self.current, now, self._device.model.ranges, self._ahead(self.current, now), offsets,
+            self.clipped)
+
+    def _send(self, now: float) -> None:
+        """Give the device the setpoint, with everything mixed and clipped."""
+        self._turn(now)
+        setpoint = self.current
+        if setpoint is None or self._tracker.state is not ManagerState.ACTIVE:
+            self.due = math.inf
+            return
+        converts = (setpoint.frame is YawFrame.EARTH
+                    and not self._device.accepts_earth_frame(now))
+        ahead = self._ahead(setpoint, now)
+        self.due = now + (
+            FOLLOW_INTERVAL if setpoint.turning != STILL or converts or self._roi is not None
+            else HOLD_INTERVAL)
+        attitude, self.clipped = clip(
+            setpoint, self._device.model.ranges, ahead, self._offsets, self.clipped)
+        if self.clipped or self._reported:
+            self._report_clipped(setpoint)
+        sent = setpoint
+        if attitude is not setpoint.attitude:
+            sent = setpoint._replace(attitude=attitude)
+        self._note_lost('heading', is_lost=converts and ahead is None)
+        if converts:
+            if ahead is None:
+                return
+            sent = in_vehicle_frame(sent, ahead)
+        self.sent = sent
+        if self._tracker.device is None:
+            self._emit(events.SetpointSent(sent))
+        else:
+            self._commands.send(GimbalDeviceSetAttitude(
+                *self._tracker.device, sent.device_flags, sent.attitude or UNSET_QUATERNION,
+                *sent.rates))
+
+    def _report_clipped(self, setpoint: Setpoint) -> None:
+        """Report a clipped angle once, although it changes while the vehicle turns or moves."""
+        demands: dict[str, object] = {
+            axis: (setpoint.frame, self._roi or (
+                math.copysign(1.0, rate) if rate else round(angle + offset, 6)))
+            for axis, angle, offset, rate in zip(
+                AXES, setpoint.target, self._offsets, setpoint.turning, strict=True)}
+        self._reported = {axis: demand for axis, demand in self._reported.items()
+                          if demand == demands[axis]}
+        if new := tuple(one for one in self.clipped if one.axis not in self._reported):
+            self._reported |= {one.axis: demands[one.axis] for one in new}
+            self._emit(events.SetpointClipped(new))
+
+    def _note_lost(self, name: str, *, is_lost: bool) -> None:
+        """Report once that a value of the vehicle, which the setpoint needs, is unknown."""
+        if is_lost and name not in self._lost:
+            self._emit(events.ReferenceLost(name))
+        self._lost = self._lost | {name} if is_lost else self._lost - {name}
