@@ -510,7 +510,7 @@ def _documented(one: Requirement[Tester], title: str = '') -> Requirement[Tester
 REQUIREMENTS: tuple[Requirement[CameraTester], ...] = (
     _documented(component.heartbeat,
                 f'sends HEARTBEAT from component {mavlink.MAV_COMP_ID_CAMERA} '
-                '(mavlink.MAV_COMP_ID_CAMERA)'),
+                '(MAV_COMP_ID_CAMERA)'),
     ping, ping_sequence, ping_once, ping_target, system_id,
     capture_status, capture_feedback, capture_panel, shot_values,
     other_component, all_components, any_system,

@@ -91,7 +91,7 @@ def heartbeat_type(mav_type: int, name: str, device: str) -> Requirement[Tester]
     return check
 
 
-@requirement('heartbeat-autopilot', 'sets autopilot to mavlink.MAV_AUTOPILOT_INVALID (8)',
+@requirement('heartbeat-autopilot', 'sets autopilot to MAV_AUTOPILOT_INVALID (8)',
              HEARTBEAT, 'Component Identity')
 async def heartbeat_autopilot(tester: Tester) -> None:
     """Read the latest HEARTBEAT."""
