@@ -63,7 +63,13 @@ class MinimalDevice(Endpoint):
         self._due: list[tuple[float, Callable[[], object]]] = []
 
     def link_opened(self, now: float) -> None:
-        self.now = self._booted = now
+        # A link repeats the call while it hears no peer.
+        if not self._due:
+            self.now = self._booted = now
+            self.start()
+
+    def start(self) -> None:
+        """Begin to send."""
         self._repeat(1.0, lambda: self.heartbeat)
         for cls, interval in self.intervals.items():
             self._repeat(interval, lambda cls=cls: self.message(cls.id))  # type: ignore[misc]
@@ -258,8 +264,8 @@ class MovingDevice(MinimalDevice):
 
     axes: MinimalAxes
 
-    def link_opened(self, now: float) -> None:
-        super().link_opened(now)
+    def start(self) -> None:
+        super().start()
         self._move()
 
     def _move(self) -> None:
