@@ -178,6 +178,13 @@ def test_a_light_that_receives_nothing_fails_within_five_minutes(
     assert run.result('on').detail == 'MAV_CMD_ILLUMINATOR_ON_OFF 1: no acknowledgement'
 
 
+def test_a_light_that_is_busy_for_ever_fails_within_five_minutes() -> None:
+    run = Run(faults=('busy=1000000',))
+    begun = run.link.now
+    run.finish()
+    assert run.link.now - begun < 300.0
+
+
 def test_a_light_that_has_acknowledged_a_command_is_sent_each_attempt(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:

@@ -28,7 +28,7 @@ from illuminator_ros.mavlink.dialect import mavlink, replaced
 from illuminator_ros.mavlink.messages import Address, Message
 from illuminator_ros.payload.checks.requirement import PayloadChecks, Verdict
 from illuminator_ros.rededge import checks as rededge
-from illuminator_ros.rededge.messages import Ping
+from illuminator_ros.rededge.messages import DigicamControl, Ping
 import pytest
 from support.checks_run import ChecksRun
 from support.minimal_devices import (
@@ -100,6 +100,17 @@ class HighGimbal(MinimalGimbal):
     ranges = (-0.1, 0.7), MinimalGimbal.ranges[1]
 
 
+class MissingCamera(MinimalCapturingCamera):
+    """A camera that misses the first two requests for an image."""
+
+    missed = 0
+
+    def capture(self, source: Address, message: DigicamControl) -> None:
+        self.missed += 1
+        if self.missed > 2:
+            super().capture(source, message)
+
+
 RIGHT: dict[str, tuple[PayloadChecks[Any], Callable[[], MinimalDevice]]] = {
     'light': (LIGHT, MinimalLight),
     'light with steps of 10 %': (LIGHT, lambda: MinimalLight(step=10.0)),
@@ -117,6 +128,7 @@ RIGHT: dict[str, tuple[PayloadChecks[Any], Callable[[], MinimalDevice]]] = {
     'manager': (MANAGER, MinimalManager),
     'camera': (CAMERA, MinimalCamera),
     'camera with captures': (CAMERA, lambda: MinimalCapturingCamera(UTC)),
+    'camera that misses two requests': (CAMERA, lambda: MissingCamera(UTC)),
 }
 
 
@@ -126,6 +138,10 @@ def test_a_device_that_does_what_its_protocol_demands_passes(name: str) -> None:
     done = run(checks, make())
     assert shown(done) == {}
     assert done.runner.passed
+
+
+def test_a_camera_has_captures_if_one_of_three_requests_is_confirmed() -> None:
+    assert run(CAMERA, MissingCamera(UTC)).result('capture-status').verdict is Verdict.PASS
 
 
 def test_checks_of_a_camera_without_captures_end_within_20_s() -> None:
@@ -142,6 +158,13 @@ class FractionLight(MinimalLight):
         status = super().message(message_id)
         return replaced(status, brightness=status.brightness / 100) if isinstance(
             status, IlluminatorStatus) else status
+
+
+class DimLight(MinimalLight):
+    """Is dimmer by 8 % than commanded."""
+
+    def configure(self, brightness: float, period: float, duty: float) -> None:
+        super().configure(max(0.0, brightness - 8.0), period, duty)
 
 
 class ObedientGimbal(MinimalGimbal):
@@ -207,6 +230,13 @@ class DegreeLimitsGimbal(MinimalGimbal):
         return low, high, left, right
 
 
+class DegreeYawGimbal(DegreeLimitsGimbal):
+    """Does not know the range of its pitch."""
+
+    def reported_limits(self) -> Q:
+        return math.nan, math.nan, *super().reported_limits()[2:]
+
+
 class DegreePitchGimbal(MinimalGimbal):
     """A gimbal whose pitch turns little: its limits could be rad, were it not for its motion."""
 
@@ -233,6 +263,7 @@ class StaleCamera(MinimalCamera):
 
 WRONG: dict[type[MinimalDevice], tuple[PayloadChecks[Any], set[str]]] = {
     FractionLight: (LIGHT, {'brightness', 'status-agrees'}),
+    DimLight: (LIGHT, {'brightness', 'status-agrees'}),
     ObedientGimbal: (GIMBAL, {'only-manager', 'one-manager'}),
     CameraGimbal: (GIMBAL, {'heartbeat-type'}),
     DegreeRateGimbal: (GIMBAL, {'rate'}),
@@ -243,6 +274,7 @@ WRONG: dict[type[MinimalDevice], tuple[PayloadChecks[Any], set[str]]] = {
     SwappedLimitsGimbal: (GIMBAL, {'limits'}),
     BothFramesGimbal: (GIMBAL, {'yaw-frame'}),
     DegreeLimitsGimbal: (GIMBAL, {'limits', 'range'}),
+    DegreeYawGimbal: (GIMBAL, {'limits'}),
     DegreePitchGimbal: (GIMBAL, {'range'}),
     ObedientManager: (MANAGER, {'no-control-command', 'no-control-messages', 'one-player'}),
     StaleCamera: (CAMERA, {'ping-sequence'}),

@@ -182,7 +182,7 @@ class MinimalLight(MinimalDevice):
             low, high = self.limits
             valid = (p1 == 1 and 0 <= p2 <= 100 and 0 <= p4 <= 100
                      and (p3 == 0 or low <= p3 <= high and high > 0))
-            change = lambda: self._configure(p2, p3, p4)  # noqa: E731
+            change = lambda: self.configure(p2, p3, p4)  # noqa: E731
         else:
             super().execute(source, command)
             return
@@ -200,7 +200,8 @@ class MinimalLight(MinimalDevice):
             if valid:
                 change()
 
-    def _configure(self, brightness: float, period: float, duty: float) -> None:
+    def configure(self, brightness: float, period: float, duty: float) -> None:
+        """Apply a configuration."""
         self.strobe = (period, duty) if period and 0 < duty < 100 else (0.0, 0.0)
         end = round(brightness / self.step) * self.step
         if self.fade:
