@@ -222,14 +222,16 @@ class Gimbal:
         control = self._manager.known_control(now)
         if control == self._control.known:
             return
-        self._control.update(control, self._manager)
+        is_first = self._control.update(control, self._manager)
         if control is None:
             # The manager that had shown this component in control takes the zero.
             last = self._manager.control if self._manager.is_heard(now) else None
             self._setpoints.control_unknown(now, can_send=(
                 last is not None and last.primary == self._commands.address))
         elif not self.in_control:
-            self._setpoints.control_lost(now)
+            self._setpoints.control_lost()
+        elif is_first:
+            self._setpoints.control_found()
 
     # Messages
 

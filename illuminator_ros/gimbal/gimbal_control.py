@@ -61,14 +61,15 @@ class GimbalControl:
         """Whether this component has primary or secondary control, as far as it is known."""
         return self._may_have_it or (self.known is not None and self.known.includes(self._us))
 
-    def update(self, control: Control | None, manager: RemoteManager) -> None:
-        """Take a change of the known control."""
+    def update(self, control: Control | None, manager: RemoteManager) -> bool:
+        """Take a change of the known control; return whether it was never known before."""
         before, self.known = self._last, control
         self._last = control or before
         self._emit(events.ControlChanged(
             self._key, before, control, self.is_ours,
             was_lost=(before is not None and before.primary == self._us and control is not None
                       and not self.is_ours and not manager.is_releasing)))
+        return before is None
 
     def lack(self, manager: RemoteManager) -> str:
         """Return why the known control does not permit a change, for people; '' if it does."""

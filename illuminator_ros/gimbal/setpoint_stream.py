@@ -60,7 +60,7 @@ class _Setpoint:
     """
     A setpoint that the gimbal may follow.
 
-    :param message: None for a place.
+    :param message: None for a place, and for a zero that was not sent.
     :param due: when it is sent again, s; of a rate or a place, when it ends with a zero.
     :param ends_rate: whether it is an attitude that ends a rate, unless it is lost.
     :param is_over: whether the gimbal follows a later request.
@@ -193,17 +193,29 @@ class SetpointStream:
         if self._last is not None and self._last.kind is not Kind.ZERO:
             self._last.due = [now] if self._last.moves else []
 
-    def control_lost(self, now: float) -> None:
+    def control_lost(self) -> None:
         """
         Send nothing any more: another component has control.
 
         If a rate lasts until this component has control again, it ends with a zero.
         """
-        last = self._last
-        self._last = _Setpoint(
-            Kind.ZERO, self._make(self._yaw_frame(now), UNSET_QUATERNION, STILL),
-            due=[-math.inf] * len(REPEATS),
-        ) if last and last.may_have_rate else None
+        if self._last and self._last.may_have_rate:
+            self._owe_zero()
+        else:
+            self._last = None
+
+    def control_found(self) -> None:
+        """
+        End a rate that lasts: a process before this one, with its address, had control.
+
+        It was killed, or it would have released control.
+        """
+        if self._last is None:
+            self._owe_zero()
+
+    def _owe_zero(self) -> None:
+        """Send a zero once this component has control, if the device then turns."""
+        self._last = _Setpoint(Kind.ZERO, due=[-math.inf] * len(REPEATS))
 
     def control_unknown(self, now: float, *, can_send: bool) -> None:
         """Repeat no attitude, and end a rate with a zero, now or when control is known again."""
@@ -237,6 +249,8 @@ class SetpointStream:
             del zero.due[0]
             self._seen = None
         if turns:
+            # The yaw lock may have changed since.
+            zero.message = self._make(self._yaw_frame(now), UNSET_QUATERNION, STILL)
             self._send(zero)
 
     def _turns(

@@ -272,6 +272,18 @@ def test_a_rate_that_another_player_has_ended_gets_its_zero_if_it_lasts_until_co
     assert [one.angular_velocity_z for _, one in setpoints(rig)[1:]] == [0.0] * zeros
 
 
+@pytest.mark.parametrize(('turns', 'zeros'), [(True, len(REPEATS)), (False, 0)])
+def test_a_gimbal_that_a_killed_process_with_our_address_has_left_turning_is_stopped(
+        turns: bool, zeros: int) -> None:
+    locked = mavlink.GIMBAL_DEVICE_FLAGS_YAW_LOCK
+    manager = FakeManager(primary=OURS, flags=locked, rates=(0.0, 0.0, 0.2 * turns))
+
+    sent = setpoints(Rig(manager).run(5.0))
+
+    assert [one.angular_velocity_z for _, one in sent] == [0.0] * zeros
+    assert all(one.flags & locked for _, one in sent)
+
+
 @pytest.mark.parametrize(('rate', 'zeros'), [(0.2, 1 + len(REPEATS)), (0.001, 1), (NAN, 1)])
 def test_zero_is_sent_again_only_while_the_device_reports_that_it_turns(
         rate: float, zeros: int) -> None:
