@@ -200,9 +200,9 @@ class GimbalClient(Payload):
         self._queries.set(address, component.query.due)
         self._next_query = now + REQUEST_SPACING
         if now < component.heard_at + FORGET_AFTER:
-            self._commands.start(Command(
-                address, mavlink.MAV_CMD_REQUEST_MESSAGE, (float(GimbalManagerInformation.id),)),
-                                 now)
+            message_id = float(GimbalManagerInformation.id)
+            self._commands.start(
+                Command(address, mavlink.MAV_CMD_REQUEST_MESSAGE, (message_id,)), now)
 
     # The end
 

@@ -12,7 +12,6 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-
 """
 The gimbal protocol v2: messages, and numbers that the specification describes in words.
 

@@ -326,8 +326,8 @@ class SimulatedManager(simulated.SimulatedDevice):
             effect = partial(
                 self._set_roi, place._replace(altitude=place.altitude + above), now)
         allowed = not self.behaviour.enforces_roi or source == self.primary
-        return simulated.CommandReply(mavlink.MAV_RESULT_ACCEPTED if allowed
-                                      else mavlink.MAV_RESULT_DENIED, effect)
+        return simulated.CommandReply(
+            mavlink.MAV_RESULT_ACCEPTED if allowed else mavlink.MAV_RESULT_DENIED, effect)
 
     def _pitchyaw(
         self, source: Address, values: Sequence[float], flags: float, now: float,

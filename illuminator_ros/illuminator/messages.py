@@ -12,7 +12,6 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-
 """The message of illuminators."""
 
 from ..mavlink.dialect import MAVLink_illuminator_status_message

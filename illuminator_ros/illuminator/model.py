@@ -274,7 +274,7 @@ class Status:
 
     :param uptime_ms: ms since the light started, wrapping at 2**32.
     :param mode_bitmask: as sent; its meaning differs between lights.
-    :param error_flags: as sent; see :class:`int`.
+    :param error_flags: as sent: ILLUMINATOR_ERROR_FLAGS.
     :param brightness: %, 0..100.
     :param strobe_period: s, 0..:data:`MAX_STROBE_PERIOD`.
     :param strobe_duty_cycle: %, 0..100.

@@ -12,7 +12,6 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-
 """
 The MAVLink dialect: pymavlink's ardupilotmega, with the messages that no wheel of pymavlink has.
 
@@ -30,6 +29,7 @@ from typing import Any, cast, TypeVar
 
 from pymavlink.dialects.v20 import ardupilotmega
 
+# The name of a dialect in pymavlink's examples.
 mavlink = ardupilotmega
 M = TypeVar('M', bound=mavlink.MAVLink_message)
 
@@ -42,16 +42,17 @@ CRC_EXTRA: dict[int, int] = {
     **{id_: cls.crc_extra for id_, cls in mavlink.mavlink_map.items()},
 }
 
-
 # Results of common.xml that the dialect lacks.
 MAV_RESULT_CANCELLED = 6
 MAV_RESULT_COMMAND_UNSUPPORTED_MAV_FRAME = 9
 MAV_RESULT_NOT_IN_CONTROL = 10
-for _name in ('CANCELLED', 'COMMAND_UNSUPPORTED_MAV_FRAME', 'NOT_IN_CONTROL'):
-    _name = f'MAV_RESULT_{_name}'
+for _value, _name in (
+        (MAV_RESULT_CANCELLED, 'MAV_RESULT_CANCELLED'),
+        (MAV_RESULT_COMMAND_UNSUPPORTED_MAV_FRAME, 'MAV_RESULT_COMMAND_UNSUPPORTED_MAV_FRAME'),
+        (MAV_RESULT_NOT_IN_CONTROL, 'MAV_RESULT_NOT_IN_CONTROL')):
     if not hasattr(mavlink, _name):
-        setattr(mavlink, _name, globals()[_name])
-        mavlink.enums['MAV_RESULT'][globals()[_name]] = mavlink.EnumEntry(_name, '')
+        setattr(mavlink, _name, _value)
+        mavlink.enums['MAV_RESULT'][_value] = mavlink.EnumEntry(_name, '')
 
 
 def register(cls: type[M]) -> type[M]:
@@ -130,9 +131,9 @@ def base_size(cls: type[mavlink.MAVLink_message]) -> int:
     A registered class with extension fields has it in ``mavlink_1_size``.
     """
     # Only where MAVLink 1 is spoken: the import takes 11 MB.
-    from pymavlink.dialects.v10 import ardupilotmega
+    from pymavlink.dialects.v10 import ardupilotmega as mavlink_1
 
-    size = ardupilotmega.mavlink_map.get(cls.id, cls).unpacker.size
+    size = mavlink_1.mavlink_map.get(cls.id, cls).unpacker.size
     return int(getattr(cls, 'mavlink_1_size', size))
 
 
@@ -145,7 +146,7 @@ def entry_names(enum: str) -> Mapping[int, str]:
 
 @cache
 def short_names(enum: str) -> Mapping[int, str]:
-    """Return the same names without that of the enum, such as ``DENIED``."""
+    """Return the same names without the enum's name, such as ``DENIED``."""
     return {value: name.removeprefix(f'{enum}_') for value, name in entry_names(enum).items()}
 
 

@@ -12,7 +12,6 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-
 """
 The messages that every component has: short names of pymavlink's classes, and their contents.
 

@@ -12,7 +12,6 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-
 """Messages that describe the state of a vehicle or of a mount, for several payloads."""
 
 from __future__ import annotations

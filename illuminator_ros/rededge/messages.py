@@ -12,7 +12,6 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-
 """
 The messages of the camera; MAVLink 1 carries them without extension fields.
 

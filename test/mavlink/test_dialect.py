@@ -12,7 +12,6 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-
 """The dialect: what is added to pymavlink's, and payloads of messages."""
 
 from __future__ import annotations

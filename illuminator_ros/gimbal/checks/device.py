@@ -254,12 +254,11 @@ async def yaw_lock(tester: DeviceTester) -> str:
     await tester.requires(mavlink.GIMBAL_DEVICE_CAP_FLAGS_HAS_YAW_LOCK)
     async with _heading(tester, 40.0):
         start, target = await tester.target(-STEP, 0.0), await tester.target(-STEP, -STEP)
-        await tester.point(start, flags=LEVEL | mavlink.GIMBAL_DEVICE_FLAGS_YAW_LOCK
-                           | VEHICLE_FRAME)
+        lock = mavlink.GIMBAL_DEVICE_FLAGS_YAW_LOCK
+        await tester.point(start, flags=LEVEL | lock | VEHICLE_FRAME)
         await tester.pause(0.5)
-        pose = await tester.until(lambda pose: bool(pose.flags
-                                                    & mavlink.GIMBAL_DEVICE_FLAGS_YAW_LOCK), 1.5)
-        if not pose.flags & mavlink.GIMBAL_DEVICE_FLAGS_YAW_LOCK:
+        pose = await tester.until(lambda pose: bool(pose.flags & lock), 1.5)
+        if not pose.flags & lock:
             raise Failed(f'flags 0x{pose.flags:x} without YAW_LOCK')
         tester.heading = 40.0 + STEP
         pose = await tester.settle(target)

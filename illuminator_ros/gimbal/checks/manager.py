@@ -370,8 +370,8 @@ async def earth_frame(tester: ManagerTester) -> str:
                       'the vehicle heads north, where both frames are the same')
     target = await tester.target(-STEP, STEP)
     (yaw,) = earth_yaw([Pose(0.0, target.pitch, target.yaw, heading=start.heading)])
-    await tester.point(Pose(0.0, target.pitch, yaw), flags=LEVEL
-                       | mavlink.GIMBAL_DEVICE_FLAGS_YAW_IN_EARTH_FRAME)
+    await tester.point(Pose(0.0, target.pitch, yaw),
+                       flags=LEVEL | mavlink.GIMBAL_DEVICE_FLAGS_YAW_IN_EARTH_FRAME)
     pose = await tester.settle(target)
     if not pose.near(target):
         raise Failed(f'commanded {yaw:.1f} deg from north at a heading of '

@@ -225,8 +225,8 @@ class GimbalTester(ABC):
 
     @abstractmethod
     async def point(
-        self, pose: Pose | None, *, flags: int = LEVEL
-        | mavlink.GIMBAL_DEVICE_FLAGS_YAW_IN_VEHICLE_FRAME,
+        self, pose: Pose | None, *,
+        flags: int = LEVEL | mavlink.GIMBAL_DEVICE_FLAGS_YAW_IN_VEHICLE_FRAME,
         rates: tuple[float, float, float] = UNSET_VECTOR,
     ) -> None:
         """Send a setpoint: an attitude if there is one, and rates, deg/s."""
@@ -362,8 +362,8 @@ class GimbalTester(ABC):
     async def _turn_back(self, before: Pose) -> None:
         frames = (mavlink.GIMBAL_DEVICE_FLAGS_YAW_IN_EARTH_FRAME
                   | mavlink.GIMBAL_DEVICE_FLAGS_ACCEPTS_YAW_IN_EARTH_FRAME)
-        await self.point(before, flags=before.flags & ~frames
-                         | mavlink.GIMBAL_DEVICE_FLAGS_YAW_IN_VEHICLE_FRAME)
+        flags = before.flags & ~frames | mavlink.GIMBAL_DEVICE_FLAGS_YAW_IN_VEHICLE_FRAME
+        await self.point(before, flags=flags)
         await self.until(lambda pose: pose.near(before, 1.0))
         # Wait until the gimbal stands still.
         await self.pause(0.5)

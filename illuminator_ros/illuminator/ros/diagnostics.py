@@ -34,12 +34,12 @@ FLAG_PAUSE = 5.0
 
 # The consequence of each flag for the user of the light.
 FLAG_LEVELS: dict[int, tuple[bytes, str]] = {
-    mavlink.ILLUMINATOR_ERROR_FLAGS_THERMAL_THROTTLING: (diagnostics.WARN,
-                                                         'dimmed because it is hot'),
+    mavlink.ILLUMINATOR_ERROR_FLAGS_THERMAL_THROTTLING: (
+        diagnostics.WARN, 'dimmed because it is hot'),
     mavlink.ILLUMINATOR_ERROR_FLAGS_OVER_TEMPERATURE_SHUTDOWN: (
         diagnostics.ERROR, 'switched off because it is too hot'),
-    mavlink.ILLUMINATOR_ERROR_FLAGS_THERMISTOR_FAILURE: (diagnostics.WARN,
-                                                         'temperature sensor failed'),
+    mavlink.ILLUMINATOR_ERROR_FLAGS_THERMISTOR_FAILURE: (
+        diagnostics.WARN, 'temperature sensor failed'),
 }
 
 
