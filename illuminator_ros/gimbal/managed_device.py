@@ -154,4 +154,3 @@ class ManagedDevice:
         rates = status.angular_velocity_x, status.angular_velocity_y, status.angular_velocity_z
         turns = any(abs(rate) > TURNING for rate in rates)
         return Setpoint(status.flags, self.attitude.frame, None, STILL) if turns else None
-

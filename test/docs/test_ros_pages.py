@@ -172,4 +172,3 @@ def test_the_monitor_page_has_the_keys_states_topics_and_limits_of_the_code() ->
                  f'`--wait` {parser().get_default("wait"):g} s', f'{web.MAX_TABS} at most',
                  f'after {app.QUESTION_LIFETIME:g} s', f'http://{DEFAULT_WEB}/'):
         assert text in MONITOR
-

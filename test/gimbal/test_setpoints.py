@@ -217,7 +217,7 @@ def test_a_late_attitude_is_ignored_unless_the_device_has_restarted() -> None:
 
     def pitch_after(milliseconds: int, pitch: float) -> float:
         status = replaced(rig.managers[0].attitude(), time_boot_ms=milliseconds,
-                         q=Quaternion.from_euler(0.0, pitch, 0.0))
+                          q=Quaternion.from_euler(0.0, pitch, 0.0))
         rig.receive(rig.managers[0].device, status)
         attitude = rig.gimbal.snapshot(rig.now).attitude
         assert attitude is not None

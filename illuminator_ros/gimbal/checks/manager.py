@@ -252,16 +252,14 @@ async def attitude_stream(tester: ManagerTester) -> str:
 
 # Control
 
-@moves('take', 'gives primary control to a component that asks, and shows it', GIMBAL,
-          STARTING)
+@moves('take', 'gives primary control to a component that asks, and shows it', GIMBAL, STARTING)
 async def take(tester: ManagerTester) -> str:
     """Take primary control."""
     await tester.take(tester.session.address)
     return control_text(await tester.control())
 
 
-@moves('release', 'ends the control of a component that releases it', MESSAGES,
-          CONFIGURE_COMMAND)
+@moves('release', 'ends the control of a component that releases it', MESSAGES, CONFIGURE_COMMAND)
 async def release(tester: ManagerTester) -> None:
     """Send -3, which releases control."""
     await tester.prepare()
@@ -270,7 +268,7 @@ async def release(tester: ManagerTester) -> None:
 
 
 @moves('release-others', 'keeps the control of a component when another one releases', MESSAGES,
-          CONFIGURE_COMMAND)
+       CONFIGURE_COMMAND)
 async def release_others(tester: ManagerTester) -> None:
     """Send -3 from two other components: one has our component id, one our system id."""
     await tester.prepare()
@@ -286,8 +284,7 @@ async def release_others(tester: ManagerTester) -> None:
             raise one.failure(f'from {source}: {control_text(control)}')
 
 
-@moves('secondary', 'gives secondary control, and shows it', MESSAGES,
-          CONFIGURE_COMMAND)
+@moves('secondary', 'gives secondary control, and shows it', MESSAGES, CONFIGURE_COMMAND)
 async def secondary(tester: ManagerTester) -> None:
     """Give secondary control to the second player."""
     try:
@@ -297,8 +294,7 @@ async def secondary(tester: ManagerTester) -> None:
         await tester.configure(-3, -3, -3, -3, source=tester.other)
 
 
-@moves('unchanged', 'leaves control as it is at -1', MESSAGES,
-          CONFIGURE_COMMAND)
+@moves('unchanged', 'leaves control as it is at -1', MESSAGES, CONFIGURE_COMMAND)
 async def unchanged(tester: ManagerTester) -> None:
     """Send -1."""
     await tester.prepare()
@@ -308,8 +304,7 @@ async def unchanged(tester: ManagerTester) -> None:
     await tester.leads_to(one, lambda control: control == before)
 
 
-@moves('configure-values', 'rejects ids that do not exist', MESSAGES,
-          CONFIGURE_COMMAND)
+@moves('configure-values', 'rejects ids that do not exist', MESSAGES, CONFIGURE_COMMAND)
 async def configure_values(tester: ManagerTester) -> None:
     """Send -4 and 256."""
     await tester.prepare()
@@ -318,7 +313,7 @@ async def configure_values(tester: ManagerTester) -> None:
 
 
 @moves('one-player', 'obeys one player at a time when a second one takes control (GM-16)',
-          PROPOSAL, 'Proposed Architecture')
+       PROPOSAL, 'Proposed Architecture')
 async def one_player(tester: ManagerTester) -> str:
     """Let the second player take control; the player without control must not move the gimbal."""
     before, other = await tester.begin(), tester.other
