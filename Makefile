@@ -7,7 +7,7 @@ SECONDS ?= 60
 # Arguments of bench/run.py, such as '--repeat 3 enable'.
 BENCH ?=
 
-.PHONY: help demo test check lint unit fuzz soak bench clean environment
+.PHONY: help demo test check lint unit fuzz soak bench pictures clean environment
 
 help:
 	@echo 'make demo    run a simulated light and a camera with their nodes, and show what they do'
@@ -18,6 +18,7 @@ help:
 	@echo 'make fuzz    send hostile input to both sides of the link for SECONDS=60'
 	@echo 'make soak    run simulator and bridge with random faults for SECONDS=60'
 	@echo 'make bench   measure each target beside its peers, 5 minutes; options in BENCH'
+	@echo 'make pictures  draw the pictures of the documentation again, half a minute'
 	@echo 'make clean   remove .venv and all build files'
 
 environment:
@@ -50,6 +51,9 @@ soak: environment
 
 bench: environment
 	@$(PYTHON_IN_VENV) bench/run.py $(BENCH)
+
+pictures: environment
+	@$(PYTHON_IN_VENV) demo/pictures.py
 
 clean:
 	rm -rf .venv build install log .pytest_cache .mypy_cache .ruff_cache .hypothesis

@@ -1,0 +1,63 @@
+# Copyright 2026 The illuminator_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""The pictures of the documentation, drawn again, and their places in it."""
+
+from pathlib import Path
+import re
+import sys
+from xml.etree import ElementTree
+
+import pytest
+from support.processes import Program, ROOT
+
+# Texts of each picture, as the devices must answer the keys; matplotlib draws texts as outlines.
+TEXTS = {
+    'monitor-light': ['/illuminator ON 80 %', 'brightness 80 %: done', '2 lights: 1 ON, 1 off'],
+    'monitor-gimbal': ['/gimbal ours 30.0 down 20.0 left', 'yaw to 20.0 degrees: done'],
+    'monitor-camera': ['capture: done : image 1 taken', '/rededge ok 1,'],
+    'beam': [], 'flight': []}
+
+
+def text_of(picture: str) -> str:
+    """Return the text of a picture, with single spaces."""
+    elements = ElementTree.fromstring(picture).iter('{http://www.w3.org/2000/svg}text')
+    return ' '.join(' '.join(element.text or '' for element in elements).split())
+
+
+def test_pictures_are_drawn_from_real_devices_and_load_nothing(
+    domain: int, tmp_path: Path,
+) -> None:
+    for needed in ('matplotlib', 'textual', 'serial'):
+        pytest.importorskip(needed)
+    program = Program(sys.executable, 'demo/pictures.py', '--output', str(tmp_path),
+                      env={'ROS_DOMAIN_ID': str(domain)})
+    try:
+        assert program.wait(110.0) == 0, program.log
+    finally:
+        program.kill()
+
+    pictures = {path.stem: path.read_text() for path in tmp_path.iterdir()}
+    assert pictures.keys() == TEXTS.keys()
+    for name, texts in TEXTS.items():
+        assert [text for text in texts if text not in text_of(pictures[name])] == []
+        assert 'url(http' not in pictures[name]
+
+
+def test_each_picture_is_in_a_page_and_each_page_has_its_pictures() -> None:
+    shown = {name for page in (ROOT / 'README.md', *(ROOT / 'doc').glob('*.md'))
+             for name in re.findall(r'!\[[^]]+\]\((?:doc/)?pictures/([^)]+)\.svg\)',
+                                    page.read_text())}
+
+    assert shown == {path.stem for path in (ROOT / 'doc' / 'pictures').iterdir()} == {*TEXTS}
