@@ -176,6 +176,30 @@ def test_gm_16_of_requests_for_control_that_overlap_the_last_one_decides(
     assert rig.gimbal.in_control is (asks[1] is Gimbal.take_control)
 
 
+def test_gm_18_a_request_ends_with_the_manager_that_got_it() -> None:
+    rig = Rig(FakeManager(answers=False), FakeManager(OTHER, device_alive=False)).run(4.0)
+    used = rig.gimbal.snapshot(rig.now).managers[0]
+    first = next(one for one in rig.managers if one.address == used)
+    first.answers, first.alive = False, False
+    rig.run(2.0)
+    rig.gimbal.take_control(rig.now, rig.done)
+    rig.run(1.5)
+
+    assert [one.message for one in rig.results] == ['the manager was lost']
+
+
+def test_a_request_that_waits_for_another_ends_with_the_link() -> None:
+    rig = Rig(FakeManager(answers=False)).run(3.0)
+    for ask in Gimbal.take_control, Gimbal.release_control:
+        ask(rig.gimbal, rig.now, rig.done)
+    rig.component.link_closed(rig.now, 'cable pulled')
+
+    assert [one.message for one in rig.results] == [
+        'superseded by control released', 'cable pulled']
+    rig.component.link_opened(rig.now)
+    assert len(commands(rig.run(5.0), CONFIGURE)) <= 1
+
+
 def test_requests_are_confirmed_after_one_during_which_the_process_paused() -> None:
     rig = Rig(FakeManager()).run(3.0)
     rig.gimbal.take_control(rig.now, rig.done)

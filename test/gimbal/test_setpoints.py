@@ -256,11 +256,14 @@ def test_only_a_zero_of_a_rate_is_sent_if_the_link_is_lost_before_an_attitude_is
     assert [one.angular_velocity_z for _, one in setpoints(rig)[before:]] == sent
 
 
-@pytest.mark.parametrize(('turns', 'zeros'), [(True, len(REPEATS)), (False, 0)])
+@pytest.mark.parametrize(('start', 'turns', 'zeros'), [
+    (lambda rig: rig.gimbal.set_rates((0.0, 0.0, 0.2), rig.now), True, len(REPEATS)),
+    (lambda rig: rig.gimbal.set_rates((0.0, 0.0, 0.2), rig.now), False, 0),
+    (lambda rig: send_attitude(rig, False), True, 0)])
 def test_a_rate_that_another_player_has_ended_gets_its_zero_if_it_lasts_until_control_is_back(
-        turns: bool, zeros: int) -> None:
+        start: Callable[[Rig], object], turns: bool, zeros: int) -> None:
     rig = in_control()
-    rig.gimbal.set_rates((0.0, 0.0, 0.2), rig.now)
+    start(rig)
     rig.managers[0].primary = OTHER
     rig.run(3.0)
     assert len(setpoints(rig)) == 1
