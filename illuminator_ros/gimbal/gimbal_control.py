@@ -81,8 +81,6 @@ class GimbalControl:
 
     def request(self, take: bool, manager: RemoteManager, now: float, done: Done) -> None:
         """Take primary control, or release all; succeed only if the status shows it."""
-        changes = manager.control_changes
-
         def ended(result: Result, now: float) -> None:
             if result.success or take and result.refused:
                 self._may_have_it = False
@@ -91,11 +89,11 @@ class GimbalControl:
                     message=f'{result.message}; ArduPilot also obeys components without control')
             done(result, now)
 
-        if not take and self.known is not None and not changes.is_busy and not self.has_any:
+        if not take and self.known is not None and not self.has_any:
             # PX4 would take the system id from another component of our system.
             ended(Result(True, f'not in control: {self.known}'), now)
             return
         self._may_have_it |= take
-        changes.want(Desired(
+        manager.control_changes.want(Desired(
             Configure(self._us, self._key.device_id, take), since=now, limit=REQUEST_LIMIT),
             now, ended)

@@ -298,6 +298,14 @@ def test_control_is_known_of_a_manager_that_sends_its_status_on_request_only() -
     assert rig.all_of(ControlChanged)[-1].was_lost
 
 
+def test_control_is_not_known_in_a_silence_of_the_manager_of_a_silent_device() -> None:
+    rig = Rig(FakeManager(primary=OURS, device_alive=False)).run(3.0)
+    assert rig.gimbal.in_control
+    rig.managers[0].alive = False
+
+    assert not rig.run(3.5).gimbal.in_control
+
+
 @pytest.mark.parametrize(('primary', 'was_lost'), [(OURS, False), (NONE, True), (OTHER, True)])
 def test_control_is_not_known_in_a_silence_and_compared_with_control_before_afterwards(
         primary: mav.Address, was_lost: bool) -> None:
@@ -527,6 +535,18 @@ def test_zero_before_a_request_is_sent_again_only_if_the_request_fails(
 
     assert [one.angular_velocity_y for one in rig.messages(GimbalManagerSetAttitude)] == [
         -0.2, *[0] * zeros]
+
+
+@pytest.mark.parametrize('ask', [Gimbal.clear_roi, Gimbal.set_neutral])
+def test_zero_is_not_sent_again_while_a_request_has_no_answer(ask: Ask) -> None:
+    rig = in_control()
+    rig.managers[0].rates = (0.0, -0.2, 0.0)
+    rig.managers[0].answers = False
+    rig.gimbal.set_rates((0.0, 0.2, 0.0), rig.now)
+    ask(rig.gimbal, rig.now, rig.done)
+    rig.run(1.5)
+
+    assert [one.angular_velocity_y for one in rig.messages(GimbalManagerSetAttitude)] == [-0.2, 0]
 
 
 @pytest.mark.parametrize('asks', [
