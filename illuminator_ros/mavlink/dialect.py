@@ -59,6 +59,7 @@ def register(cls: type[M]) -> type[M]:
     """
     Add a message to the dialect, in place of another message with its id.
 
+    :param cls: in the form that pymavlink's ``mavgen`` generates from the definition.
     :return: the class that the dialect has from now on: its own, if that has all of the fields.
     """
     known = mavlink.mavlink_map.get(cls.id)
@@ -140,7 +141,7 @@ def base_size(cls: type[mavlink.MAVLink_message]) -> int:
 @cache
 def entry_names(enum: str) -> Mapping[int, str]:
     """Return the names of the entries of an enum, such as ``MAV_RESULT_DENIED``, by value."""
-    return {value: entry.name for value, entry in sorted(mavlink.enums[enum].items())
+    return {value: entry.name for value, entry in sorted(mavlink.enums.get(enum, {}).items())
             if not entry.name.endswith('_ENUM_END')}
 
 
@@ -164,8 +165,9 @@ def line_of(message: mavlink.MAVLink_message) -> str:
     """Return a message in a line, for people, with the names of the entries of enums."""
     def shown(field: str) -> str:
         value, enum = getattr(message, field), message.fieldenums_by_name.get(field)
-        if enum and message.fielddisplays_by_name.get(field) != 'bitmask':
-            return entry_names(enum).get(value, f'{value}')
+        if enum and message.fielddisplays_by_name.get(field) != 'bitmask' and value in (
+                names := entry_names(enum)):
+            return names[value]
         # repr, since the text of a string may hold control characters.
         return f'{value:g}' if isinstance(value, float) else repr(value)
 

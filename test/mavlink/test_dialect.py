@@ -28,14 +28,17 @@ from illuminator_ros.mavlink.dialect import (
     decode,
     encode,
     flag_names,
+    line_of,
     mavlink,
     raw,
     register,
     replaced,
 )
+from illuminator_ros.mavlink.frame_writer import FrameWriter
+from illuminator_ros.mavlink.signing import Signing
 from pymavlink.dialects.v20 import ardupilotmega
 import pytest
-from support.frames import frame_of, only
+from support.frames import frame_of, LIGHT, only
 from support.messages import EVERY_MESSAGE, INFORMATION, STATUS
 from support.reference_dialect import DEFINITIONS, generated
 
@@ -70,42 +73,31 @@ def test_status_and_information_lie_on_the_wire_as_specified() -> None:
         b'B', b'SN-7')
 
 
-def message_class(id_: int, name: str, *fields: str) -> type[mavlink.MAVLink_message]:
-    """Return a class in pymavlink's form, with float fields."""
-    def init(self: Any, *values: float) -> None:
-        mavlink.MAVLink_message.__init__(self, id_, name)
-        for field, value in zip(fields, values, strict=True):
-            setattr(self, field, value)
-
-    return type(name, (mavlink.MAVLink_message,), {
-        'id': id_, 'msgname': name, 'fieldnames': [*fields], 'ordered_fieldnames': [*fields],
-        'orders': [*range(len(fields))], 'lengths': [1] * len(fields), 'crc_extra': 77,
-        'unpacker': struct.Struct(f'<{len(fields)}f'), '__init__': init})
-
-
 @pytest.fixture
 def restored(monkeypatch: pytest.MonkeyPatch) -> None:
     """Restore the dialect after the test."""
     for id_ in (180, 440):
         monkeypatch.setitem(mavlink.mavlink_map, id_, mavlink.mavlink_map[id_])
         monkeypatch.setitem(CRC_EXTRA, id_, CRC_EXTRA[id_])
+    for name in ('MAVLink_illuminator_status_message', 'MAVLINK_MSG_ID_ILLUMINATOR_STATUS'):
+        monkeypatch.setattr(mavlink, name, getattr(mavlink, name))
 
 
 @pytest.mark.usefixtures('restored')
-def test_a_message_of_another_dialect_is_read_in_place_of_the_one_with_its_id() -> None:
-    load: Any = register(message_class(180, 'WINCH_LOAD', 'load'))
+def test_a_generated_message_of_another_dialect_is_read_in_place_of_the_one_with_its_id() -> None:
+    load = register(generated({180: ('WINCH_LOAD', 'float load, uint8_t[2] drum enum=DRUM')})[180])
 
-    frame = only(frame_of(load(12.5)))
-    assert decode(load, frame.payload).load == 12.5
+    message = decode(load, only(frame_of(load(12.5, [1, 2]))).payload)
+    assert line_of(message) == 'WINCH_LOAD load=12.5 drum=(1, 2)'
 
 
 @pytest.mark.usefixtures('restored')
-@pytest.mark.parametrize(('fields', 'steps_aside'), [
-    (STATUS.fieldnames, True), ([*STATUS.fieldnames, 'new'], True),
-    (STATUS.fieldnames[:11], False)])
+@pytest.mark.parametrize(('cut', 'added', 'steps_aside'), [
+    ('', '', True), ('', ', uint8_t new', True), (', uint8_t gimbal_device_id', '', False)])
 def test_an_added_class_steps_aside_for_one_of_the_wheel_with_its_fields(
-        fields: list[str], steps_aside: bool) -> None:
-    of_wheel = message_class(440, 'ILLUMINATOR_STATUS', *fields)
+        cut: str, added: str, steps_aside: bool) -> None:
+    name, fields = DEFINITIONS[440]
+    of_wheel = generated({440: (name, fields.removesuffix(cut) + added)})[440]
     mavlink.mavlink_map[440] = of_wheel
 
     assert (register(type(STATUS)) is of_wheel) is steps_aside
@@ -128,11 +120,23 @@ def test_a_random_payload_has_the_values_that_pymavlink_reads(id_: int) -> None:
     cls = mavlink.mavlink_map[id_]
     payload = random.Random(id_).randbytes(cls.unpacker.size)
     pymavlink = ardupilotmega.MAVLink(None)
-    expected = pymavlink.decode(bytearray(frame_of(decode(cls, payload))))
+    frame = FrameWriter(Signing()).frame(LIGHT, decode(cls, payload), 0.0, 0.0)
+    expected = pymavlink.decode(bytearray(frame))
 
     # As text: NaN is not equal to NaN, and pymavlink reads an array as a list.
     assert str(decode(cls, payload)).replace('(', '[').replace(')', ']') == (
         str(expected).replace('(', '[').replace(')', ']'))
+
+
+@pytest.mark.parametrize(('message', 'part'), [
+    (EVERY_MESSAGE[2], 'COMMAND_LONG target_system=1 target_component=243 '
+     'command=MAV_CMD_DO_ILLUMINATOR_CONFIGURE confirmation=2 param1=1 param2=50 param3=0.25 '),
+    (mav.CommandAck(405, 77), 'command=MAV_CMD_ILLUMINATOR_ON_OFF result=77 '),
+    (replaced(STATUS, error_status=1), ' error_status=1 mode=ILLUMINATOR_MODE_EXTERNAL_SYNC '),
+    (replaced(INFORMATION, model_name=b'a\x1b[31m\0b'), r" model_name='a\x1b[31m' ")])
+def test_line_of_a_message_names_entries_of_enums_and_has_no_control_characters(
+        message: mav.Message, part: str) -> None:
+    assert part in line_of(message)
 
 
 def test_mavlink_1_acknowledgement_has_neither_progress_nor_target() -> None:
