@@ -66,11 +66,13 @@ class Ending:
     Lights and their users, and the end.
 
     :ivar reports: the last result that was reported for each light, by address.
+    :ivar reported_at_once: the lights that were reported in the turn in which the end begins.
     """
 
     def __init__(self, pair: Pair) -> None:
         self.pair = pair
         self.reports: dict[Address, Result] = {}
+        self.reported_at_once: set[Address] = set()
         self.before, self.ended_at = 0, 0.0
         self.events: list[LightEvent] = []
 
@@ -82,6 +84,7 @@ class Ending:
         self.pair.controller.close(self.pair.now)
         if off:
             self.pair.controller.client.switch_off_finally(self.pair.now, self._report)
+        self.reported_at_once = set(self.reports)
         self.pair.turn()
 
     def _report(self, light: Light, result: Result, now: float) -> None:
@@ -291,6 +294,8 @@ def test_an_end_without_an_on_under_way_is_as_short_as_the_round_trip(
 ) -> None:
     assert ending.pair.enable(True).success
     ending.begin()
+    # The bridge ends if it has no light to wait for.
+    assert ending.reported_at_once == {light.source}
     ending.pair.run_until(lambda: ending.reports[light.source].success, within=0.02)
 
     assert ending.changes() == [(ON_OFF, 0.0)]
@@ -347,17 +352,31 @@ def test_a_light_that_is_found_or_heard_again_during_the_end_is_switched_off() -
     assert all(ending.reports[one.address].success for one in (found, heard))
 
 
-def test_of_lights_that_share_an_address_each_must_show_off() -> None:
+def test_lights_that_share_an_address_get_off_which_is_not_confirmed() -> None:
     lights = FakeLight(enable=1), FakeLight(enable=1)
     ending = Ending(Pair(SharedAddress(*lights, offset=0.05)))
     lights[1].boot = -50.0
     ending.pair.settle(10.0)
-    lights[1].applies = False
     ending.begin()
     ending.pair.run(LIMIT)
 
-    assert (lights[0].fields['enable'], lights[1].fields['enable']) == (0, 1)
-    assert not ending.reports[lights[0].source].success
+    assert [one.fields['enable'] for one in lights] == [0, 0]
+    report = ending.reports[lights[0].source]
+    assert not (report.success or report.permanent)
+
+
+@pytest.mark.parametrize(('enabled', 'ask', 'may_be_left_on'), [
+    (1, None, True), (0, None, False), (0, True, True), (0, False, False)])
+def test_a_light_that_is_on_or_gets_an_on_may_be_left_on_without_an_off(
+    ending: Ending, light: FakeLight, enabled: int, ask: bool | None, may_be_left_on: bool,
+) -> None:
+    light.fields['enable'] = enabled
+    ending.pair.run(1.5)
+    if ask is not None:
+        ending.pair.ask_enable(ask)
+    ending.begin(off=False)
+
+    assert ending.pair.light.may_stay_on(ending.pair.now) is may_be_left_on
 
 
 @pytest.mark.parametrize(('results', 'sends_status', 'reason', 'is_permanent'), [

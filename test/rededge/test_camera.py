@@ -22,15 +22,18 @@ from typing import Any
 from illuminator_ros.mavlink.command_sender import CommandSender
 from illuminator_ros.mavlink.component import Component
 from illuminator_ros.mavlink.messages import Address, Heartbeat, heartbeat, Message
+from illuminator_ros.payload.rotation import Quaternion
 from illuminator_ros.rededge import messages as rededge
 from illuminator_ros.rededge.camera import CameraConnected, CameraLost, ImageTaken
 from illuminator_ros.rededge.client import RedEdgeClient, Settings
+from illuminator_ros.rededge.input_states import Input, Stamp
 import pytest
 
 OWN, NEW, ADOPTED = Address(1, 191), Address(255, 100), Address(1, 100)
 # The heartbeat of real cameras; its type and autopilot do not identify a camera.
 BEAT = Heartbeat(0, 1, 2, 3, 4, 3)
 CLOSED_LOOP, OPEN_LOOP = 3, 4
+ENDING = 'the bridge is ending'
 
 
 def feedback(index: int, flags: int = CLOSED_LOOP) -> rededge.CameraFeedback:
@@ -371,6 +374,23 @@ def test_a_request_without_an_answer_makes_later_captures_fail_for_15_s_only() -
     successes = [success for success, _ in rig.results]
     assert rig.results[:2] == [(False, NO_ANSWER), (False, ambiguous)]
     assert successes == [False] * 4 + [True] * 2
+
+
+def test_from_the_beginning_of_the_end_requests_are_answered_and_nothing_is_sent() -> None:
+    rig = Rig()
+    rig.ping()
+    rig.capture()
+    sent = len(rig.sent)
+    rig.component.close(rig.now)
+    rig.client.camera.ping(rig.now, rig.take_result)
+    rig.capture()
+    rig.client.feeder.orientation.take_attitude(
+        Input.ATTITUDE, Quaternion(), (0.0, 0.0, 0.0), Stamp(1, 0.0), rig.now)
+    rig.run(0.6)
+
+    assert rig.results == [(False, text) for text in (
+        ENDING, f'{ENDING}; the image may have been taken', ENDING, ENDING)]
+    assert len(rig.sent) == sent
 
 
 def test_a_capture_is_refused_without_a_camera_or_while_another_runs() -> None:

@@ -17,6 +17,7 @@
 from collections.abc import Callable, Iterator
 import contextlib
 import signal
+import sys
 from unittest import mock
 
 from illuminator_ros.mavlink.dialect import mavlink
@@ -30,7 +31,14 @@ from std_msgs.msg import Bool
 from support.embedded import embedded_bridge
 from support.light import Address, CONFIGURE, ON_OFF, ServedLight
 from support.processes import Program
-from support.ros import Parameters, repeated, Ros, start_bridge, start_slow_bridge
+from support.ros import (
+    bridge_arguments,
+    Parameters,
+    repeated,
+    Ros,
+    start_bridge,
+    start_slow_bridge,
+)
 from support.waiting import eventually
 
 
@@ -94,6 +102,31 @@ def test_light_that_is_not_confirmed_off_is_an_error_that_does_not_delay_the_end
 
         line = f'light 1/243 may still be on: {line}'
         assert [found[:7] for found in program.lines if line in found] == ['[ERROR]']
+
+
+# A bridge that waits for its lights for longer than the process lasts.
+HURRIED = """
+from runpy import run_module
+from illuminator_ros.ros import bridge
+bridge.OFF_LIMIT = 30.0
+run_module('illuminator_ros.bridge', run_name='__main__')
+"""
+
+
+def test_light_is_named_although_the_process_is_forced_to_end(own_ros: Ros, port: int) -> None:
+    with ServedLight(port, link=Link, enable=1) as light:
+        program = Program(
+            sys.executable, '-c', HURRIED, *bridge_arguments(port, off_on_shutdown=True),
+            env={'ROS_DOMAIN_ID': str(own_ros.domain)})
+        try:
+            Parameters(own_ros).wait(brightness=100.0)
+            light.fake.results[ON_OFF] = None
+
+            assert_ends(program)
+        finally:
+            program.kill()
+
+    assert program.count('light 1/243 may still be on: no confirmation in time') == 1
 
 
 def test_busy_executor_does_not_prevent_it(own_ros: Ros, port: int) -> None:
