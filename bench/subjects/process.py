@@ -98,21 +98,25 @@ def nodes(bench: Bench) -> Iterator[Row]:
             seen(bench, names)
             discoveries = [seen(bench, names) for _ in range(bench.amount(PARTICIPANTS, 1))]
             with Client(bench) as client:
-                client.meet(f'/{names[-1]}/enable')
+                for name in (names[0], names[-1]):
+                    client.meet(f'/{name}/enable')
                 time.sleep(bench.amount(2.0, 0.0))
                 share = cpu_share(program.pid, bench.amount(3.0, 0.1))
-                calls = quantiles([client.enable(f'/{names[-1]}/enable') * 1e3
-                                   for _ in range(bench.amount(150, 3))])
+                first, last = (quantiles([client.enable(f'/{name}/enable') * 1e3
+                                          for _ in range(bench.amount(150, 3))])
+                               for name in (names[0], names[-1]))
             taken = resident(program.pid)
             threads = len([*Path(f'/proc/{program.pid}/task').iterdir()])
-        alone = alone or calls
+        alone = alone or first
         kind = f'nodes in one process: {count}'
         yield Row(f'CPU, each light at 1 Hz, {kind}', '%', {'': share})
         yield Row(f'memory, {kind}', 'MB', {'': taken}, targets=[
             at_most(taken, MEMORY, 'MB'), at_most(threads, THREADS, 'threads')],
             note=f'{threads} threads')
-        yield Row(f'~/enable of the last, {kind}', 'ms', calls, {'the smallest number': alone},
-                  [times(calls, alone, 1.2, 'p50')] if calls is not alone else [])
+        one = {'one node': alone}
+        yield Row(f'~/enable of the first, {kind}', 'ms', first, one,
+                  [times(first, alone, 1.2, 'p50')])
+        yield Row(f'~/enable of the last, {kind}', 'ms', last, one)
         yield Row(f'discovery of all by a new participant, {kind}', 's',
                   quantiles(discoveries, 0.5, 1),
                   targets=[at_most(max(discoveries), DISCOVERY, 's')])

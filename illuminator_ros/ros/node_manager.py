@@ -56,7 +56,7 @@ class NodeManager:
     """
     The nodes of further devices, made and removed one at a time by :meth:`work`.
 
-    One thread runs the callbacks of all of them; each node adds 5 us to a callback.
+    One thread runs the callbacks of all of them; each node adds 20 us to a callback.
 
     :param first: the process's first node, whose namespace the others share.
     :param arguments: the ROS arguments that the nodes follow.
