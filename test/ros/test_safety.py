@@ -68,6 +68,7 @@ def test_sources_hold_the_light_by_rank_and_release_it(own_ros: Ros) -> None:
           ServedLight(port) as light):
         parameters.wait(mode='internal_control')
         holder = own_ros.subscribe(String, '/illuminator/source')
+        holder.wait(lambda message: message.data == '')
         diagnostics = own_ros.subscribe(DiagnosticArray, '/diagnostics', STREAM)
         assert ask(own_ros, 'safety', False).success
 
