@@ -199,7 +199,11 @@ def test_all_off_acts_at_once_whatever_is_shown(before: list[str]) -> None:
 
 def test_arrows_move_a_gimbal_only_after_steering_has_begun() -> None:
     async def test(screen: Screen) -> None:
-        await screen.press('end', 'up', 'end', 'm', 'up', 'left', 'escape', 'up', 'end', 'm', 'j')
+        await screen.press('end', 'up', 'end')
+        assert '←' not in screen.text
+        await screen.press('m', 'up', 'left')
+        assert '←' in screen.text
+        await screen.press('escape', 'up', 'end', 'm', 'j')
         assert screen.graph.asked == [
             ('/gimbal', 'pitch to 23.6 degrees'), ('/gimbal', 'yaw to -9.3 degrees')]
         await screen.press('up', 'm', 'up')

@@ -18,6 +18,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 import contextlib
+from pathlib import Path
 import re
 import sys
 import urllib.error
@@ -58,6 +59,14 @@ def urls(server: Program, count: int) -> list[str]:
     return re.findall(r'http://\S+', server.log)
 
 
+def is_running(pid: str) -> bool:
+    """Return whether a process has not ended; a zombie has no command line."""
+    try:
+        return bool(Path(f'/proc/{pid}/cmdline').read_text())
+    except OSError:
+        return False
+
+
 def status(url: str, **headers: str) -> int:
     """Return the status of the answer to a browser that has no cookies yet."""
     opener = urllib.request.build_opener(urllib.request.HTTPCookieProcessor())
@@ -96,6 +105,12 @@ def test_page_operates_a_light_in_ten_tabs_and_on_a_phone_for_the_bearer_of_the_
         assert browser.run('return document.documentElement.scrollWidth') <= 390
         columns = browser.run('return window.size.width')
         assert max(map(len, browser.lines)) <= columns
+
+        # Each tab is a process, which ends with the server, even if that is killed.
+        tabs = Path(f'/proc/{server.pid}/task/{server.pid}/children').read_text().split()
+        assert len(tabs) == TABS
+        server.kill()
+        eventually(lambda: not any(map(is_running, tabs)))
 
 
 def assert_switches(browser: Browser, labels: list[str], state: str) -> None:
