@@ -71,6 +71,8 @@ class Bridge:
     """
     Connects the nodes of payloads with one link.
 
+    It has more than 15 fields: the parts of the process, which it starts and ends.
+
     :param node: the node of the first payload.
     :param arguments: the command line, which the nodes of further devices follow too.
     :param types: the kinds of payloads that the parameter ``payloads`` may name.

@@ -119,7 +119,8 @@ def test_colours_are_left_out_where_they_are_not_wanted(monkeypatch: pytest.Monk
     (['end', 'pageup'], '/a')])
 def test_selection_moves_and_stops_at_the_ends(keys: list[str], selected: str) -> None:
     async def test(screen: Screen) -> None:
-        await screen.press(*keys, 'r')
+        await screen.press(*keys)
+        await screen.press('r')
 
     assert show(test, *map(light, ('/a', '/b', '/c'))).asked == [(selected, 'refresh')]
 

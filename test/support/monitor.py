@@ -134,8 +134,9 @@ class Screen:
         return ' '.join(' '.join(self.lines).split())
 
     async def press(self, *keys: str) -> None:
-        """Press keys."""
+        """Press keys, and let the monitor act on them."""
         await self.pilot.press(*keys)
+        await self.pilot.pause()
 
     async def wait(self, seconds: float = 0.0) -> None:
         """Let time pass for the monitor, and let it draw."""
