@@ -272,6 +272,7 @@ class Light:
         if self._is_shared is not report.shared_address:
             self._is_shared = report.shared_address
             self._emit(events.AddressShared(self.address, self._is_shared))
+        self._forget_silenced(now)
         self._switch.reported(report, now, restarted=restarted)
         self._configuration.reported(
             report, now, can_follow=self._tracker.conflict.can_follow,

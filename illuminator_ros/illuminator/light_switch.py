@@ -220,8 +220,6 @@ class LightSwitch:
 
     def note_request(self, now: float) -> None:
         """Note that the light is not left alone: a silence begins again."""
-        if self.state.is_silent(now):
-            self.keep_off()
         self.state.requested_at, self._due = now, -math.inf
 
     def decide(

@@ -364,9 +364,9 @@ def test_an_off_for_all_lights_ends_a_remembered_on_of_a_lost_light(
     (False, lambda shared: shared.enable('operator', False), [0.0]),
     (True, lambda shared: shared.dim('operator', 20.0), []),
 ], ids=['on', 'off', 'brightness that is the switch'])
-@pytest.mark.parametrize('requests', [True, False])
+@pytest.mark.parametrize('then', ['nothing', 'a request', 'another sender'])
 def test_only_an_off_of_the_requests_before_a_silence_has_an_effect_after_it(
-    is_switch: bool, act: Callable[[Shared], object], sent: list[float], requests: bool,
+    is_switch: bool, act: Callable[[Shared], object], sent: list[float], then: str,
 ) -> None:
     shared = Shared(timeout=60.0)
     shared.light.brightness_is_switch = is_switch
@@ -377,9 +377,16 @@ def test_only_an_off_of_the_requests_before_a_silence_has_an_effect_after_it(
     act(shared)
     shared.pair.run(SILENCE + 1.0)
     assert shared.light.fields['enable'] == 0
-    if requests:
-        # A request after the silence does not restore those before it.
+    # Neither a request after the silence nor another sender's ON restores those before it.
+    if then == 'a request':
         shared.enable('autonomy', True)
+    elif then == 'another sender':
+        # A change soon after a configuration counts as its effect.
+        shared.pair.run(40.0)
+        shared.light.fields |= {'enable': 1, 'brightness': 50.0}
+        shared.pair.run(1.5)
+        shared.light.fields |= {'enable': 0, 'brightness': 0.0 if is_switch else 50.0}
+        shared.pair.run(1.5)
     released_at = shared.pair.now
     shared.release('safety')
     shared.pair.run(1.0)
