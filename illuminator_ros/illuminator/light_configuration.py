@@ -616,6 +616,10 @@ class LightConfiguration:
     def poll(self, now: float, *, connected: bool) -> None:
         """Send the values that are due; the light may be lost."""
         self._reconciler.poll(now)
+        desired = self._reconciler.desired
+        if connected and self._is_free and desired and isinstance(desired.change, Configure):
+            # The light has accepted a setpoint, and a newer one need not wait for the status.
+            self._accept(desired.change.configuration, None)
         # Required values go first, since a stream of setpoints may never end.
         if connected and self._is_free and now >= self._required_due:
             self._send_required(now)
@@ -631,7 +635,6 @@ class LightConfiguration:
     @property
     def _is_free(self) -> bool:
         """Whether values may be sent that no request has asked for."""
-        # A newer setpoint need not wait for the status.
         return not self._reconciler.is_busy or (
             self._setpoint is not None and self._is_stream and self._reconciler.is_accepted)
 

@@ -316,6 +316,17 @@ def test_one_command_is_in_flight_at_any_rate_and_the_newest_setpoint_wins(
     assert pair.recorder.failed_setpoints == []
 
 
+def test_the_parameter_follows_a_stream_that_is_faster_than_its_confirmation(
+    fake: FakeLight,
+) -> None:
+    pair = Pair(fake, there=Faults(latency=0.1)).settle()
+    publish(pair, *(10.0 + value / 2 for value in range(100)), rate=50)
+    followed = [change['brightness'] for cause, change in pair.recorder.changes[1:]
+                if cause is ChangeCause.REQUEST]
+    assert len(followed) >= 5
+    assert followed == sorted(followed)
+
+
 def test_a_setpoint_is_sent_once_with_the_other_fields_as_confirmed(pair: Pair) -> None:
     pair.configure(strobe_period=2)
     publish(pair, *[40.0] * 100, rate=100)
