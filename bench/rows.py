@@ -20,7 +20,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import NamedTuple
 
-# By statistic; that of a single figure is ''.
+# By statistic; the statistic of a single figure is ''.
 Figures = Mapping[str, float]
 
 
@@ -83,7 +83,7 @@ def quantiles(values: Sequence[float], *shares: float) -> Figures:
 
 
 def times(ours: Figures, peer: Figures, limit: float, name: str = '', whose: str = '') -> Target:
-    """Limit the ratio of a figure to that of a peer."""
+    """Limit the ratio of a figure to the figure of a peer."""
     ratio = f'1/{1 / limit:g}' if limit < 1 else f'{limit:g} times'
     return Target(f'{name} at most {ratio} {whose}'.strip(), ours[name] / peer[name], limit)
 

@@ -34,7 +34,7 @@ LIMIT, GROWTH = 20.0, 1.0
 
 
 def memory(bench: Bench) -> Iterator[Row]:
-    """Compare the memory with that of a node with one SetBool service; let the bridge serve."""
+    """Compare the memory with a node with one SetBool service; let the bridge serve."""
     took = []
     for _ in range(bench.amount(3, 1)):
         port = free_port()

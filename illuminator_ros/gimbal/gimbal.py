@@ -68,7 +68,7 @@ class GimbalSettings:
 
 class _Device:
     """
-    What the device of a gimbal reports; times are s.
+    The reports of the device of a gimbal; times are s.
 
     :param interval: between its attitudes; 0 for its own.
     :ivar problem: why the last status has no attitude, '' if it has one.

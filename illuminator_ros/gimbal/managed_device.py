@@ -42,7 +42,7 @@ HEADING_UNKNOWN = 'the heading of the vehicle is unknown'
 
 class ManagedDevice:
     """
-    What a manager knows of its device. Times are s.
+    The facts that a manager knows of its device. Times are s.
 
     :param tracker: knows its address.
     :param ranges: of the axes of a device without MAVLink.

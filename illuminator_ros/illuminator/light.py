@@ -140,7 +140,7 @@ class _StatusQuery:
         # s of silence after which the light is asked for a status, so that its answer arrives
         # within the heartbeat timeout.
         self._longest_silence = min(STATUS_TIMEOUT, heartbeat_timeout / 1.2)
-        self._asked_at = self._heard_at = -math.inf
+        self._asked_at = -math.inf
         self._due = math.inf
 
     def begin(self, now: float) -> None:
@@ -152,10 +152,6 @@ class _StatusQuery:
         """Request none: the light is lost."""
         self._due = math.inf
 
-    def heard(self, now: float) -> None:
-        """Note a sign of life."""
-        self._heard_at = now
-
     def reported(self, now: float) -> None:
         """Note a status."""
         self._due = now + self._timeout
@@ -164,17 +160,20 @@ class _StatusQuery:
         """Request a status at a time, s, or before."""
         self._due = min(self._due, due)
 
-    def poll(self, now: float, *, connected: bool) -> None:
+    def poll(self, now: float, silent_since: float) -> None:
         """Request a status that is due."""
-        if now >= self.next_deadline(connected=connected):
+        if now >= self.next_deadline(silent_since):
             self._asked_at, self._due = now, now + STATUS_TIMEOUT
             self._target.request_status(now)
 
-    def next_deadline(self, *, connected: bool) -> float:
-        """Return when a status is requested, s."""
+    def next_deadline(self, silent_since: float) -> float:
+        """
+        Return when a status is requested, s.
+
+        :param silent_since: the time of the last message, s; infinity while the light is lost.
+        """
         # The light may have no heartbeat, and a status interval above the heartbeat timeout.
-        silent_since = max(self._heard_at, self._asked_at) if connected else math.inf
-        return min(self._due, silent_since + self._longest_silence)
+        return min(self._due, max(silent_since, self._asked_at) + self._longest_silence)
 
 
 class Light:
@@ -239,7 +238,6 @@ class Light:
     def heard(self, now: float) -> None:
         """Take a heartbeat, or anything else that shows that the light is alive."""
         self.heard_at = now
-        self._status_query.heard(now)
         if not self.connected:
             self.connected = True
             self.lost_at = math.inf
@@ -590,12 +588,16 @@ class Light:
 
     # Time
 
+    @property
+    def _silent_since(self) -> float:
+        return self.heard_at if self.connected else math.inf
+
     def poll(self, now: float) -> None:
         """Do what is due."""
         # Compute the same sum as next_deadline(); the difference is rounded differently.
         if self.connected and now >= self.heard_at + self._settings.heartbeat_timeout:
             self.lose(f'no heartbeat for {format_seconds(now - self.heard_at)}', now)
-        self._status_query.poll(now, connected=self.connected)
+        self._status_query.poll(now, self._silent_since)
         self._identity_query.poll(now)
         self._change_holder(self._sources.poll(now), now)
         self._switch.poll(now, connected=self.connected)
@@ -606,7 +608,7 @@ class Light:
         """Return when :meth:`poll` has something to do."""
         connected = self.connected
         return min(
-            self._status_query.next_deadline(connected=connected),
+            self._status_query.next_deadline(self._silent_since),
             self._identity_query.next_deadline(),
             self._switch.next_deadline(connected=connected),
             self._configuration.next_deadline(connected=connected),

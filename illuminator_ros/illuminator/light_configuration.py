@@ -59,10 +59,11 @@ FIRST_STATUS_TIMEOUT = 3.0
 # %; set together with a strobe period where the duty cycle is 0, at which a light does not strobe.
 DEFAULT_DUTY_CYCLE = 50.0
 # s after a command of ours in which a change to a commanded value counts as its late effect, and a
-# change of another value as implied by it.
+# change of another value, or a switch, as implied by it.
 LATE_TIME = 30.0
 IMPLIED_TIME = 2.0
-# How often in a row a change by another sender is undone, and s between two of these commands.
+# How often in a row a change by another sender is undone, and s between two of these commands or
+# two tries of an OFF that no request has asked for.
 REPEATS = 3
 REPEAT_INTERVAL = 2.0
 

@@ -27,7 +27,13 @@ import math
 
 from . import events
 from .commands import SWITCHES
-from .light_configuration import LightConfiguration
+from .light_configuration import (
+    IMPLIED_TIME,
+    LATE_TIME,
+    LightConfiguration,
+    REPEAT_INTERVAL,
+    REPEATS,
+)
 from .model import DIMMING_FLAGS, Mode, Status
 from ..mavlink.command_sender import format_seconds
 from ..mavlink.dialect import mavlink
@@ -36,22 +42,14 @@ from ..payload.last_change import LastChange
 from ..payload.reconciler import decide, Desired, Reconciler, Rule
 from ..payload.repeat_limit import RepeatLimit
 
-# s between the tries of an OFF that no request has asked for, and between two that undo a switch.
-REPEAT_INTERVAL = 2.0
-# How often in a row a switch by another sender is undone.
-REPEATS = 3
-# s after a command in which a switch counts as its late effect, and after a configuration in which
-# a switch counts as implied by it.
-LATE_TIME = 30.0
 # s after an ON in which an OFF may overtake it on the way to the light.
 OVERTAKING_TIME = 0.2
-IMPLIED_TIME = 2.0
 
 
 @dataclass
 class SwitchState:
     """
-    What the rules know of a switch. Times are s.
+    The facts that the rules read. Times are s.
 
     :param off_after_silence: s without a request after which a light that is on is switched off;
         0 for never.
@@ -148,7 +146,7 @@ class LightSwitch:
     :param reassert: whether a switch by another sender is undone.
     :param earliest_on: returns the time before which an ON must not be sent.
     :param rules: the highest first.
-    :ivar state: what the rules know.
+    :ivar state: the facts that the rules read.
     """
 
     def __init__(
@@ -167,8 +165,8 @@ class LightSwitch:
             earliest=lambda change: earliest_on() if _is_on(change) else -math.inf)
         # The OFF at the end of the process.
         self._last_off: LastChange[Status] | None = None
-        # How the value was requested, for LightSwitched; None where no event is wanted.
-        self._detail: str | None = ''
+        # How the value was requested, for LightSwitched.
+        self._detail = ''
         # Whether it is switched on again if another sender switches it off: a request has switched
         # it on, and it was neither lost nor restarted since.
         self._undoes_off = False
@@ -183,18 +181,16 @@ class LightSwitch:
         # When another rule may come into force, s; at once after a change of the state.
         self._due = -math.inf
 
-    # What is desired
+    # Desired values
 
     def ask(
-        self, on: bool, now: float, done: Done, detail: str | None = '', *,
-        is_stream: bool = False,
+        self, on: bool, now: float, done: Done, detail: str = '', *, is_stream: bool = False,
     ) -> None:
         """
         Switch the light on or off; the light must be connected.
 
         :param done: called once with the result.
-        :param detail: how it was requested, for :class:`~.events.LightSwitched`; None for no
-            event.
+        :param detail: how it was requested, for :class:`~.events.LightSwitched`.
         :param is_stream: whether a newer request replaces it.
         """
         self.state.off = self.state.undoing = None
@@ -267,7 +263,7 @@ class LightSwitch:
                 self._configuration.drop_required()
         if result.success or result.refused:
             self._settled_at = now
-        detail: str | None = desired.reason
+        detail = desired.reason
         if desired is state.asked:
             state.asked, detail = None, self._detail
         elif desired == state.off:
@@ -279,7 +275,7 @@ class LightSwitch:
             if state.undoing is None and not result.success:
                 self._emit(events.ChangedByOther(
                     self._target.address, 'off' if on else 'on', undone=False))
-        if result.success and was_on is not on and detail is not None:
+        if result.success and was_on is not on:
             self._emit(events.LightSwitched(
                 self._target.address, on, events.Origin.REQUEST, detail))
 
@@ -319,7 +315,7 @@ class LightSwitch:
         if self._reconciler.desired and _is_on(self._reconciler.desired.change):
             self._reconciler.stop(message, now)
 
-    # What is known
+    # Known facts
 
     @property
     def is_changing(self) -> bool:
@@ -378,7 +374,7 @@ class LightSwitch:
                 or self.brightness.off_brightness == 0.0
                 and now <= self._configuration.sent_at + IMPLIED_TIME)
 
-    # What is reported
+    # Reports
 
     def reported(self, report: StatusReport[Status], now: float, *, restarted: bool) -> None:
         """Take a status that is newer than all before."""
@@ -402,10 +398,11 @@ class LightSwitch:
             self.note_request(now)
         if not is_busy:
             # The OFF of one of several lights does not show that the others are off.
-            if state.off and enabled is False and not report.shared_address:
-                state.off = None
-            if state.undoing and state.undoing.change.shown_by(report.status):
-                state.undoing = None
+            if enabled is not None and (enabled or not report.shared_address):
+                if not enabled:
+                    state.off = None
+                if state.undoing and state.undoing.change == SWITCHES[enabled]:
+                    state.undoing = None
             if self._rules and not restarted:
                 self._follow(before, report, now)
         self._reconciler.reported(report, now)

@@ -254,7 +254,7 @@ class Reconciler(Generic[S]):
     def _ready_at(self, desired: Desired[S]) -> float:
         """Return when the desired value can be sent, s."""
         attempt = self._attempt
-        # An acknowledgement names the command, so that one of another command is no answer to it.
+        # An acknowledgement names its command, so it cannot answer another command.
         if (attempt and attempt.phase is Phase.SENT
                 and attempt.change.command == desired.change.command
                 and not self._overtakes(desired.change)):

@@ -122,7 +122,7 @@ class Winch:
         """
         Release line, m, or wind it in if negative; ``done`` gets the confirmed result.
 
-        A newer release replaces one that is not confirmed.
+        A newer release replaces an unconfirmed one.
         """
         self.was_commanded = True
         self._length.want(
