@@ -122,9 +122,13 @@ class MinimalLight(Side):
             if beats == 2:
                 beats = 0
                 self.status()
-            for message in self.receive(0.1):
-                if isinstance(message, mav.CommandLong):
-                    self._execute(message)
+            self.answer(0.1)
+
+    def answer(self, timeout: float) -> None:
+        """Answer the commands of the next datagram, if one comes in this time, s."""
+        for message in self.receive(timeout):
+            if isinstance(message, mav.CommandLong):
+                self._execute(message)
 
     def _execute(self, command: Any) -> None:
         if command.command in self.silent:

@@ -111,10 +111,10 @@ def wait_until(condition: Callable[[], Any], what: str, patience: float = PATIEN
 
 
 def alternate(
-    actions: Mapping[str, Callable[[], float]], rounds: int, warm_up: int, block: int = 1,
+    actions: Mapping[str, Callable[[], Sequence[float]]], rounds: int, warm_up: int,
 ) -> dict[str, Figures]:
     """
-    Do blocks of actions in turn; return the quantiles of the times that each returns (s), ms.
+    Do actions in turn; return the quantiles of the times that each returns (s), ms.
 
     Each follows each other one equally often, since the program that ran before determines the
     content of the processor's caches.
@@ -130,9 +130,9 @@ def alternate(
             names.reverse()
         last = names[-1]
         for name in names:
-            values = [actions[name]() * 1e3 for _ in range(block)]
+            values = actions[name]()
             if number >= warm_up:
-                took[name] += values
+                took[name] += [seconds * 1e3 for seconds in values]
     return {name: quantiles(values) for name, values in took.items()}
 
 
@@ -167,12 +167,12 @@ class Client(SpunNode):
         found = answered.wait(patience)
         return time.perf_counter() - began, future.result() if found else None
 
-    def enable(self, service: str) -> float:
+    def enable(self, service: str) -> list[float]:
         """Switch on or off; return the time until success, s."""
         seconds, answer = self.call(service)
         if answer is None or not answer.success:
             raise RuntimeError(f'{service}: {answer}')
-        return seconds
+        return [seconds]
 
     def meet(self, service: str, *, success: bool = True) -> None:
         """

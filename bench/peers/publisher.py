@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""A bare publisher: each datagram makes it publish the time of publishing."""
+"""A bare publisher: a datagram has it publish the time COUNT times, INTERVAL s apart."""
 
 from __future__ import annotations
 
@@ -38,8 +38,10 @@ def main() -> None:
     print('ready', flush=True)
     with contextlib.suppress(KeyboardInterrupt):
         while True:
-            control.recv(100)
-            publisher.publish(Float64(data=time.monotonic()))
+            count, interval = control.recv(100).split()
+            for _ in range(int(count)):
+                publisher.publish(Float64(data=time.monotonic()))
+                time.sleep(float(interval))
 
 
 if __name__ == '__main__':

@@ -93,7 +93,7 @@ def _setpoints(bench: Bench) -> Row:
         far.bind(('127.0.0.1', 0))
         numbers = itertools.count()
 
-        def path(to: int, arrival: socket.socket, kind: int) -> float:
+        def path(to: int, arrival: socket.socket, kind: int) -> list[float]:
             device.beat()
             players.beat()
             data = players.frame(setpoint(PLAYERS[0], 0.3 * math.sin(next(numbers))))
@@ -105,7 +105,7 @@ def _setpoints(bench: Bench) -> Row:
             # The message id is in bytes 7 to 9 of a frame.
             while int.from_bytes(arrival.recv(2048)[7:10], 'little') != kind:
                 pass
-            return time.perf_counter() - began
+            return [time.perf_counter() - began]
 
         with peer('forwarder', forward, far.getsockname()[1]):
             found = alternate({

@@ -102,7 +102,7 @@ def nodes(bench: Bench) -> Iterator[Row]:
                     client.meet(f'/{name}/enable')
                 time.sleep(bench.amount(2.0, 0.0))
                 share = cpu_share(program.pid, bench.amount(3.0, 0.1))
-                first, last = (quantiles([client.enable(f'/{name}/enable') * 1e3
+                first, last = (quantiles([client.enable(f'/{name}/enable')[0] * 1e3
                                           for _ in range(bench.amount(150, 3))])
                                for name in (names[0], names[-1]))
             taken = resident(program.pid)

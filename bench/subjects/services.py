@@ -139,7 +139,7 @@ def parallel(bench: Bench) -> Iterator[Row]:
                     thread.start()
                     lights[-1].asked.wait(PATIENCE)
                 for number in range(bench.amount(CALLS, 3)):
-                    values.append(client.enable(others[number % len(others)]) * 1e3)
+                    values.append(client.enable(others[number % len(others)])[0] * 1e3)
                 if kind == BESIDE:
                     stop.set()
                     lights[-1].silent = set()

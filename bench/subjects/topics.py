@@ -21,7 +21,6 @@ import contextlib
 import functools
 import itertools
 import math
-import queue
 import socket
 import struct
 import time
@@ -36,7 +35,7 @@ from std_msgs.msg import Bool, Float64
 from support.ports import free_port
 
 from ..devices import MinimalLight, Side
-from ..rig import alternate, Bench, bridge, Client, PATIENCE, peer, udp, wait_until
+from ..rig import alternate, Bench, bridge, Client, peer, udp, wait_until
 from ..rows import Row, times
 
 # s between two messages; longer than the path of one.
@@ -58,8 +57,8 @@ def status(bench: Bench) -> Iterator[Row]:
 
 def over(bench: Bench, topic: str, type_: type[Any], place: str) -> Row:
     """Measure bridge and peer in turn."""
-    port, control_port = free_port(), free_port()
-    arrived: queue.SimpleQueue[tuple[float, Any]] = queue.SimpleQueue()
+    port, control_port, block = free_port(), free_port(), bench.amount(50, 3)
+    arrived: list[tuple[float, Any]] = []
     with contextlib.ExitStack() as stack:
         stack.enter_context(bridge(udp(port)))
         stack.enter_context(peer('publisher', control_port))
@@ -68,36 +67,41 @@ def over(bench: Bench, topic: str, type_: type[Any], place: str) -> Row:
         control = stack.enter_context(socket.socket(type=socket.SOCK_DGRAM))
         control.connect(('127.0.0.1', control_port))
 
-        def came(message: Any) -> None:
-            arrived.put((time.monotonic(), message.data))
+        def collected() -> list[tuple[float, Any]]:
+            wait_until(lambda: len(arrived) >= block, 'all messages arrive')
+            taken = arrived[:]
+            arrived.clear()
+            return taken
 
-        def ours() -> float:
+        def ours() -> list[float]:
             light.beat()
-            time.sleep(INTERVAL)
-            sent = light.status()
-            return arrived.get(timeout=PATIENCE)[0] - sent
+            light.drain()
+            sent = []
+            for _ in range(block):
+                sent.append(light.status())
+                time.sleep(INTERVAL)
+            return [at - began for (at, _), began in zip(collected(), sent, strict=True)]
 
-        def bare() -> float:
-            time.sleep(INTERVAL)
-            control.send(b'publish')
-            at, sent = arrived.get(timeout=PATIENCE)
-            return at - float(sent)
+        def bare() -> list[float]:
+            control.send(f'{block} {INTERVAL}'.encode())
+            time.sleep(block * INTERVAL)
+            return [at - began for at, began in collected()]
 
-        def arrives(send: Callable[[], object]) -> bool:
+        def reaches(send: Callable[[], object]) -> bool:
             light.beat()
             send()
             time.sleep(0.1)
-            return not arrived.empty()
+            return bool(arrived)
 
         for of_topic, name, send in (
-                (Float64, '/publisher/time', functools.partial(control.send, b'publish')),
+                (Float64, '/publisher/time', functools.partial(control.send, b'1 0')),
                 (type_, f'/illuminator/{topic}', light.status)):
-            client.subscribe(of_topic, name, came)
+            client.subscribe(of_topic, name, lambda message: arrived.append(
+                (time.monotonic(), message.data)))
             # The first ones may get lost.
-            wait_until(functools.partial(arrives, send), f'messages on {name}')
-            while not arrived.empty():
-                arrived.get()
-        found = alternate({'ours': ours, 'bare': bare}, *bench.amount((8, 2, 50), (1, 1, 3)))
+            wait_until(functools.partial(reaches, send), f'messages on {name}')
+            arrived.clear()
+        found = alternate({'ours': ours, 'bare': bare}, *bench.amount((8, 2), (1, 1)))
     return Row(
         f'status on the wire to a subscriber of ~/{topic}, the {place} of seven topics', 'ms',
         found['ours'], {'bare publisher and subscriber': found['bare']},
@@ -161,7 +165,10 @@ def gimbal(bench: Bench) -> Iterator[Row]:
                 'subscriber', lambda: [*struct.unpack('<3f', bare.recv(2048))])}
         for name, action in actions.items():
             wait_until(action, f'rates of {name} arrive')
-        found = alternate(actions, *bench.amount((12, 2, 50), (1, 1, 3)))
+        block = bench.amount(50, 3)
+        found = alternate({name: lambda action=action: [  # type: ignore[misc]
+            action() for _ in range(block)] for name, action in actions.items()},
+            *bench.amount((12, 2), (1, 1)))
     yield Row('~/cmd/rate to the datagram', 'ms', found['gimbal'],
               {'bare subscriber that sends a datagram': found['subscriber']},
               [times(found['gimbal'], found['subscriber'], 1.5, 'p50')])
