@@ -15,6 +15,7 @@
 """The pages of simulator and conformance, compared with these programs; needs no ROS."""
 
 from collections.abc import Sequence
+from dataclasses import fields
 import json
 from pathlib import Path
 import re
@@ -33,6 +34,7 @@ from illuminator_ros.illuminator.checks.requirements import REQUIREMENTS
 from illuminator_ros.illuminator.simulated import COMMANDS as LIGHT_COMMANDS
 from illuminator_ros.illuminator.simulated import SIMULATED
 from illuminator_ros.illuminator.simulated_properties import FAULTS, PROFILES
+from illuminator_ros.illuminator.thermal import ThermalProperties
 from illuminator_ros.payload.checks.report import as_json, RunReport
 from illuminator_ros.payload.checks.requirement import Requirement, Result, Verdict
 from illuminator_ros.payload.faults import FaultTable
@@ -145,6 +147,21 @@ def of_both(device: list[list[str]], manager: list[list[str]]) -> list[list[str]
 ])
 def test_a_table_of_the_simulator_has_every_row(heading: str, rows: list[list[str]]) -> None:
     assert table(SIMULATOR, heading) == rows
+
+
+def test_the_kinds_of_devices_are_listed_with_their_options() -> None:
+    kinds = {name: one.load('simulated') for name, one in PAYLOADS.items()}
+
+    assert {(row[0], *row[2:]) for row in table(SIMULATOR, '`--payload`')} == {
+        (f'`{name}`', str(kind.address({})), f'`--{kind.noun}`, `{kind.plural}`')
+        for name, kind in kinds.items()}
+
+
+def test_the_thermal_model_is_listed_with_its_defaults() -> None:
+    rows = table(SIMULATOR, 'value of `thermal`')
+
+    assert [f'{name} {meaning.rpartition("(default: ")[2]}' for name, meaning in rows] == [
+        f'`{one.name}` {one.default:g})' for one in fields(ThermalProperties)[1:]]
 
 
 def test_the_sample_file_of_the_simulator_is_valid() -> None:
