@@ -64,7 +64,7 @@ def meaning_of(spec: ParameterSpec) -> str:
 @pytest.mark.parametrize(('page', 'heading', 'specs'), [
     ('reference', 'parameter of the link', LINK_PARAMETERS),
     ('gimbal', 'parameter of the gimbal', GIMBAL_PARAMETERS),
-    ('gimbal', 'parameter of the manager', MANAGER_PARAMETERS),
+    ('gimbal_manager', 'parameter of the manager', MANAGER_PARAMETERS),
     ('rededge', 'parameter of the camera', CAMERA_PARAMETERS)],
     ids=['link', 'gimbal', 'manager', 'camera'])
 def test_a_page_has_each_parameter(

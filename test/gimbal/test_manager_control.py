@@ -17,7 +17,6 @@
 from __future__ import annotations
 
 from pathlib import Path
-import re
 
 from illuminator_ros.gimbal.manager_control import (
     ControlArbiter,
@@ -28,9 +27,9 @@ from illuminator_ros.gimbal.manager_control import (
 from illuminator_ros.mavlink.messages import Address
 from illuminator_ros.payload.arbitration import Cause, Policy
 import pytest
-from support.tables import table
+from support.tables import table, transitions
 
-PAGE = Path(__file__).parents[2] / 'doc' / 'gimbal.md'
+PAGE = Path(__file__).parents[2] / 'doc' / 'gimbal_manager.md'
 PLAYER, LOWER, HIGHER, OVERRULING = (Address(255, id_) for id_ in (10, 20, 30, 40))
 THIRD = Address(7, 7)
 LEASE = 3.0
@@ -81,9 +80,8 @@ def test_the_diagram_of_the_page_has_each_change_of_control() -> None:
     changes = {change for policy in Policy for holder in HOLDERS.values() for event in EVENTS
                for change in held(policy, holder).configure(PLAYER, EVENTS[event], 1.0) or ()}
     changes |= set(held(Policy.HOLD, PLAYER).poll(LEASE))
-    [diagram] = re.findall(r'```\n(FREE.*?)```', PAGE.read_text(), re.DOTALL)
 
-    assert set(re.findall(r'(\w+) +--(\w+)--> +(\w+)', diagram)) == {
+    assert set(transitions(PAGE.read_text(), 'FREE', 'CLAIM')) == {
         ('HELD' if one.before else 'FREE', one.cause.name, 'HELD' if one.after else 'FREE')
         for one in changes}
 

@@ -19,7 +19,6 @@ from __future__ import annotations
 from collections.abc import Callable
 import math
 from pathlib import Path
-import re
 
 from illuminator_ros.gimbal.manager_events import DemandRefused
 from illuminator_ros.gimbal.manager_state import (
@@ -51,8 +50,9 @@ from support.gimbal_manager import (
     pitch_yaw,
     request,
 )
+from support.tables import transitions
 
-PAGE = Path(__file__).parents[2] / 'doc' / 'gimbal.md'
+PAGE = Path(__file__).parents[2] / 'doc' / 'gimbal_manager.md'
 OTHER = Address(1, 191)
 
 
@@ -61,11 +61,8 @@ def status(device_id: int = DEVICE.component) -> GimbalManagerStatus:
 
 
 def test_the_diagram_of_the_page_has_the_transitions_of_the_table() -> None:
-    [diagram] = re.findall(r'```\n(NO_DEVICE.*?)```', PAGE.read_text(), re.DOTALL)
-    drawn = re.findall(r'(?=\b([A-Z_]+) +--([A-Z_]+)--> +([A-Z_]+))', diagram)
-
-    assert sorted(drawn) == sorted((state.name, by.name, then.name)
-                                   for (state, by), then in TRANSITIONS.items())
+    assert sorted(transitions(PAGE.read_text(), 'NO_DEVICE', 'DEVICE_HEARD')) == sorted(
+        (state.name, by.name, then.name) for (state, by), then in TRANSITIONS.items())
 
 
 def reached(state: ManagerState) -> ManagerRig:
