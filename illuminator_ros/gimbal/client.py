@@ -16,7 +16,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass, field
 import math
 
@@ -93,6 +93,11 @@ class GimbalClient(Payload):
         """See :meth:`Payload.link_closed`."""
         for gimbal in self._gimbals.values():
             gimbal.link_closed(now, reason)
+
+    def components_lost(self, lost: Collection[Address], now: float, reason: str) -> None:
+        """See :meth:`Payload.components_lost`."""
+        for gimbal in self._gimbals.values():
+            gimbal.components_lost(lost, now, reason)
 
     def receive(self, source: Address, message: Message, now: float) -> None:
         """See :meth:`Payload.receive`."""

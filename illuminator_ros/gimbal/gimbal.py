@@ -16,7 +16,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Collection
 from dataclasses import dataclass, replace
 import math
 
@@ -169,6 +169,13 @@ class Gimbal:
         """Record that the link is closed, and the reason."""
         self._link_problem = reason
         self._managers.link_closed(now, reason)
+        self._check(now)
+
+    def components_lost(self, lost: Collection[Address], now: float, reason: str) -> None:
+        """Record that some components cannot be reached, and the reason."""
+        self._managers.components_lost(lost, now, reason)
+        if self.key.address in lost:
+            self._device.heard_at = min(self._device.heard_at, now - SILENCE_LIMIT)
         self._check(now)
 
     @property

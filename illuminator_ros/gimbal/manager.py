@@ -21,7 +21,7 @@ manager a policy decides. No I/O.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass, field
 import math
 import random
@@ -129,6 +129,11 @@ class GimbalManager(Payload):
     def link_closed(self, now: float, reason: str) -> None:
         """See :meth:`Payload.link_closed`."""
         self.tracker.link_closed(now)
+
+    def components_lost(self, lost: Collection[Address], now: float, reason: str) -> None:
+        """See :meth:`Payload.components_lost`."""
+        if self.tracker.device in lost:
+            self.tracker.link_closed(now)
 
     def receive(self, source: Address, message: mav.Message, now: float) -> None:
         """See :meth:`Payload.receive`."""

@@ -22,7 +22,7 @@ to ROS as to all other players.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Collection
 from itertools import islice
 import math
 from typing import TypeVar
@@ -75,6 +75,13 @@ class ManagerWithClient(Payload):
         self._own.end_all(now, CommandStatus.LINK_LOST)
         self.manager.link_closed(now, reason)
         self.client.link_closed(now, reason)
+
+    def components_lost(
+        self, lost: Collection[mav.Address], now: float, reason: str,
+    ) -> None:
+        """See :meth:`Payload.components_lost`."""
+        self.manager.components_lost(lost, now, reason)
+        self.client.components_lost(lost, now, reason)
 
     def may_send_at_end(self, sent: Command | mav.Message) -> bool:
         """See :meth:`Payload.may_send_at_end`."""

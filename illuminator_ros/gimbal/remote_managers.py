@@ -16,7 +16,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Collection
 from dataclasses import dataclass
 import math
 from typing import Any
@@ -253,7 +253,11 @@ class RemoteManagers:
 
     def link_closed(self, now: float, reason: str) -> None:
         """Lose all managers at once."""
-        for manager in self._all.values():
+        self.components_lost([manager.address for manager in self._all.values()], now, reason)
+
+    def components_lost(self, lost: Collection[Address], now: float, reason: str) -> None:
+        """Lose some managers at once."""
+        for manager in [one for one in self._all.values() if one.address in lost]:
             manager.heard_at = min(manager.heard_at, now - SILENCE_LIMIT)
             for one in manager.reconcilers:
                 one.lost(reason, now)

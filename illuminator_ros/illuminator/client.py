@@ -16,7 +16,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 import functools
 import itertools
 
@@ -129,6 +129,13 @@ class IlluminatorClient(Payload):
         for light in self._discovery:
             light.link_closed(now, reason)
             self._discovery.changed(light.address)
+
+    def components_lost(self, lost: Collection[Address], now: float, reason: str) -> None:
+        """See :meth:`Payload.components_lost`."""
+        for light in self._discovery:
+            if light.address in lost:
+                light.lose('the link was lost', now)
+                self._discovery.changed(light.address)
 
     def receive(self, source: Address, message: Message, now: float) -> None:
         """See :meth:`Payload.receive`."""

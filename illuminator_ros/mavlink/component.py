@@ -18,7 +18,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections import deque
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Collection, Sequence
 import math
 
 from .command_receiver import CommandReceiver
@@ -66,6 +66,11 @@ class MessageHandler(ABC):
 
     def link_closed(self, now: float, reason: str) -> None:  # noqa: B027 - optional
         """Note that nothing can be sent any more, and why."""
+
+    def components_lost(  # noqa: B027 - optional
+        self, lost: Collection[Address], now: float, reason: str,
+    ) -> None:
+        """Note that some components cannot be reached any more, and why; others still can."""
 
     @abstractmethod
     def receive(self, source: Address, message: Message, now: float) -> None:
@@ -212,6 +217,13 @@ class Component(Endpoint):
         self.commands.end_all(now, CommandStatus.LINK_LOST)
         for payload in self._payloads:
             payload.link_closed(now, reason)
+
+    def components_lost(self, lost: Collection[Address], now: float, reason: str) -> None:
+        """See :meth:`Endpoint.components_lost`."""
+        for address in lost:
+            self.commands.end_all(now, CommandStatus.LINK_LOST, address)
+        for payload in self._payloads:
+            payload.components_lost(lost, now, reason)
 
     def receive(self, source: Address, message: Message, now: float) -> None:
         """See :meth:`Endpoint.receive`."""

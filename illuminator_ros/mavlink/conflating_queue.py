@@ -53,6 +53,11 @@ class ConflatingQueue:
         """Return whether a message of the most urgent group is held."""
         return bool(self._held and self._held[0])
 
+    @property
+    def first(self) -> Message:
+        """Return the first message of the most urgent group that has some."""
+        return next(held[0][1] for held in self._held if held)
+
     def hold(self, source: Address, message: Message, now: float) -> bool:
         """Take a message, if it belongs to a stream; return whether it does."""
         if type(message) not in self._places:

@@ -65,7 +65,7 @@ class Frame(NamedTuple):
     :param version: 1 or 2.
     :param signature: the 13 bytes of a signed frame: link id, 6 bytes of time stamp, 6 bytes of
         signature; None where it is not signed.
-    :param signed_part: the bytes that the signature covers before it, from STX to the checksum.
+    :param data: the whole frame, as received.
     """
 
     version: int
@@ -74,7 +74,7 @@ class Frame(NamedTuple):
     message_id: int
     payload: bytes
     signature: bytes | None = None
-    signed_part: bytes = b''
+    data: bytes = b''
 
 
 @dataclass(slots=True)
@@ -248,7 +248,8 @@ class Decoder:
                 break
             if foreign_extra is None:
                 frames.append(Frame(2, sequence, Address(system, component), id_,
-                                    data[start + HEADER_V2:end]))
+                                    data[start + HEADER_V2:end], None,
+                                    data[start:end + CHECKSUM]))
                 source = None
             else:
                 if source != (system, component):
@@ -292,7 +293,7 @@ class Decoder:
         if mcrf4xx(body) != int.from_bytes(data[end - CHECKSUM:end], 'little'):
             self.counters.crc_errors += 1
             return 1, None
-        signature, signed_part = (
-            (data[end:start + size], data[start:end]) if flags else (None, b''))
-        return size, Frame(version, sequence, Address(system, component), message_id,
-                           data[start + header:end - CHECKSUM], signature, signed_part)
+        return size, Frame(
+            version, sequence, Address(system, component), message_id,
+            data[start + header:end - CHECKSUM], data[end:start + size] if flags else None,
+            data[start:start + size])

@@ -26,6 +26,7 @@ import math
 from typing import NamedTuple
 
 from .dialect import CRC_EXTRA
+from .duplicate_filter import DuplicateFilter
 from .frame import Decoder, DecoderCounters, ForeignFrames, Frame
 from .signing import Signing
 from .transport import Peer
@@ -60,15 +61,21 @@ class FrameReader:
 
     :param handled: ids of the messages that are read; frames of others are only counted, unless
         their signatures matter.
+    :param duplicates: the frames that any of several lines has accepted, None if there is one
+        line. Frames of other messages are then forwarded, and not only counted.
     :ivar counters: totals over all peers since it was made.
     """
 
-    def __init__(self, signing: Signing, handled: Collection[int]) -> None:
+    def __init__(
+        self, signing: Signing, handled: Collection[int],
+        duplicates: DuplicateFilter | None = None,
+    ) -> None:
         self.counters = DecoderCounters()
         self._signing = signing
         self._signing_is_off = not signing.signs
+        self._duplicates = duplicates
         # Making a Frame of each foreign frame takes twice the time on a busy link.
-        self._foreign = {} if not self._signing_is_off else {
+        self._foreign = {} if not self._signing_is_off or duplicates is not None else {
             id_: bytes((crc_extra,)) for id_, crc_extra in CRC_EXTRA.items() if id_ not in handled}
         self._streams: dict[Peer, _Stream] = {}
         self._waits: dict[Peer, _Wait] = {}
@@ -91,9 +98,14 @@ class FrameReader:
             # An unsigned frame is accepted where signing is off; this test saves a call.
             frames = [one for one in frames if isinstance(one, ForeignFrames)
                       or self._signing_is_off and one.signature is None
-                      or self._signing.accepts(one, unix_time)]
+                      or self._accepts(one, now, unix_time)]
             stream.good = stream.good or bool(frames)
         return frames
+
+    def _accepts(self, frame: Frame, now: float, unix_time: float) -> bool:
+        # A copy of an accepted frame is not a replay.
+        return (self._duplicates is not None and self._duplicates.has(frame, now)
+                or self._signing.accepts(frame, unix_time))
 
     def _new_stream(self, peer: Peer) -> _Stream:
         if len(self._streams) >= MAX_DECODERS:
@@ -127,7 +139,7 @@ class FrameReader:
                 frames = decoder.give_up(wait.taken)
                 self._watch(peer, decoder, now)
                 found += [(peer, frame) for frame in frames
-                          if self._signing.accepts(frame, unix_time)]
+                          if self._accepts(frame, now, unix_time)]
         return found
 
     def next_deadline(self) -> float:

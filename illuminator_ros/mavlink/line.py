@@ -12,11 +12,13 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""A line: one connection URL with its transport, its state, and the endpoint that uses it."""
+"""A line: one connection URL with its transport, its state, and the frames that it carries."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from abc import ABC, abstractmethod
+from collections import Counter
+from collections.abc import Callable, Sequence
 import contextlib
 import copy
 import functools
@@ -24,17 +26,13 @@ import logging
 import math
 import selectors
 
-from .component import Endpoint
 from .connector import Connector
-from .dialect import decode, line_of
 from .fault_log import FaultLog
-from .frame import MAX_ID_V1
-from .frame_writer import FrameWriter
+from .frame import Frame
 from .link_state import LinkInput, LinkSnapshot, LinkState, LinkStatus
 from .messages import Address
 from .receiver import ReceivedFrame, Receiver
-from .sender import Sender
-from .signing import Signing
+from .signing import SigningCounters
 from .transport import Channel, Peer
 from .url import Url
 
@@ -52,40 +50,56 @@ THREAD_RETRY_INTERVAL = 0.25
 _frame_log = logging.getLogger('illuminator_ros')
 
 
+class LineUser(ABC):
+    """The user of a line, which the line calls in the thread that waits with the selector."""
+
+    @abstractmethod
+    def opened(self, now: float) -> None:
+        """Note that a line can carry messages, or that a new peer may receive them."""
+
+    @abstractmethod
+    def lost(self, heard: Sequence[Address], reason: str, now: float) -> None:
+        """
+        Note that a line is closed; it opens again by itself.
+
+        :param heard: the components that were heard over it.
+        """
+
+    @abstractmethod
+    def silent(self, line: Line, now: float) -> None:
+        """Note that no peer is heard over an open line; repeated."""
+
+    @abstractmethod
+    def receive(
+        self, line: Line, peer: Peer, frames: Sequence[ReceivedFrame], now: float,
+    ) -> None:
+        """Take accepted frames of a peer, of which all may be of messages that only count."""
+
+
 class Line:
     """
-    Opens a connection URL again and again, and carries the messages of an endpoint.
+    Opens a connection URL again and again, and carries frames.
 
     All methods but :meth:`stop` are for the thread that waits with the selector.
 
     :param label: its name while there is no transport.
     :param call: calls a function in that thread, given the time, s; callable from any thread.
-    :param mavlink_version: 1 or 2, of the frames that are sent; both are received.
-    :param wall_clock: s, Unix time, for the signing time stamps.
-    :raises ValueError: if MAVLink 1 cannot carry a message of the endpoint, or must be signed.
     """
 
     def __init__(
-        self, url: Url, endpoint: Endpoint, *, label: str, faults: FaultLog,
+        self, url: Url, user: LineUser, receiver: Receiver, *, label: str, faults: FaultLog,
         selector: selectors.BaseSelector, call: Callable[[Callable[[float], None]], None],
-        signing: Signing, mavlink_version: int, clock: Callable[[], float],
-        wall_clock: Callable[[], float],
+        clock: Callable[[], float],
     ) -> None:
-        classes = dict.fromkeys((*endpoint.messages, *endpoint.sends))
-        if mavlink_version == 1 and (too_high := [c.msgname for c in classes if c.id > MAX_ID_V1]):
-            raise ValueError(f'MAVLink 1 cannot carry {", ".join(too_high)}: it has no message '
-                             f'ids above {MAX_ID_V1}; use MAVLink 2')
         self.status = LinkStatus(label, clock())
-        self._endpoint = endpoint
-        self._classes = {cls.id: cls for cls in endpoint.messages}
+        self.receiver = receiver
+        self._forwarded = 0
+        # Frames of others that were replaced or dropped on channels that are closed.
+        self._not_forwarded: Counter[int] = Counter()
+        self._user = user
         self._faults = faults
         self._selector = selector
         self._clock = clock
-        self._signing = signing
-        writer = FrameWriter(signing, mavlink_version)
-        self._receiver = Receiver(signing, self._classes, writer, wall_clock)
-        self._sender = Sender(writer, endpoint.streams, self._receiver.routes,
-                              self._receiver.traffic, faults, wall_clock)
         self._connector = Connector(
             url, lambda outcome: call(functools.partial(self._connector_reports, outcome)))
         # When to connect, s; infinity while the connector tries, and while there is a channel.
@@ -95,31 +109,33 @@ class Line:
         self._proven_at = math.inf
         self._announce_at = math.inf
 
+    @property
+    def is_open(self) -> bool:
+        """Return whether there is a channel."""
+        return self._channel is not None
+
     def stop(self) -> None:
         """Open nothing any more; callable from any thread."""
         self._connector.stop()
 
-    def snapshot(self, now: float) -> LinkSnapshot:
-        """Return the line at this moment."""
-        status, receiver = self.status, self._receiver
+    def snapshot(self, now: float, signing: SigningCounters) -> LinkSnapshot:
+        """
+        Return the line at this moment.
+
+        :param signing: the counters of all lines.
+        """
+        status, receiver, channel = self.status, self.receiver, self._channel
         return LinkSnapshot(
-            status.state, status.since, self._channel.name if self._channel else status.label,
+            status.state, status.since, channel.name if channel else status.label,
             status.reason, status.openings, receiver.routes.peer_count(now),
-            receiver.traffic.snapshot(now), copy.copy(receiver.counters),
-            copy.copy(self._signing.counters))
-
-    def peer_count_of(self, source: Address, now: float) -> int:
-        """Return over how many peers a component is heard, which may be several senders."""
-        return self._receiver.routes.peer_count_of(source, now)
-
-    def reset_loss(self, source: Address) -> None:
-        """Forget recent losses of a component: its sequence numbers have restarted."""
-        if counter := self._receiver.traffic.sources.get(source):
-            counter.reset_loss()
+            receiver.traffic.snapshot(now), copy.copy(receiver.counters), copy.copy(signing),
+            self._forwarded,
+            self._not_forwarded + channel.not_forwarded if channel else self._not_forwarded)
 
     def opened(self, channel: Channel, now: float) -> None:
         """Use a channel from now on."""
         self._channel = channel
+        self.receiver.leads_to = channel.leads_to
         self._proven_at = now + PROOF_TIME
         self._announce_at = now + ANNOUNCE_INTERVAL
         try:
@@ -127,21 +143,54 @@ class Line:
         except (OSError, ValueError) as error:
             self._lost(OSError(f'cannot wait for {channel.name}: {error}'))
             return
-        self._faults.call(self._endpoint.link_opened, now)
-        self.flush()
+        self._user.opened(now)
         # Sending the first heartbeat may already have failed.
         if self._channel is channel:
             self.status.take(LinkInput.OPENED, now, channel.name)
 
-    def flush(self) -> None:
-        """Send the messages of the endpoint; without a channel they are dropped."""
-        messages = list(self._endpoint.outgoing)
-        self._endpoint.outgoing.clear()
-        if self._channel is not None:
-            try:
-                self._sender.send(self._channel, messages, self._clock())
-            except OSError as error:
-                self._lost(error)
+    def peers(self, now: float) -> Sequence[Peer]:
+        """Return all peers, none without a channel."""
+        return self._channel.peers(now) if self._channel else ()
+
+    def others(self, peer: Peer, now: float) -> Sequence[Peer]:
+        """Return the peers that do not hear a peer."""
+        channel = self._channel
+        if channel is None or not channel.has_clients:
+            return ()
+        return [one for one in channel.peers(now) if one != peer]
+
+    def write(self, frames: Sequence[bytes], peers: Sequence[Peer], now: float) -> None:
+        """Send our frames to some of the peers, ahead of those that are forwarded."""
+        channel, traffic = self._channel, self.receiver.traffic
+        if channel is None:
+            return
+        dropped, size = channel.dropped, sum(map(len, frames))
+        try:
+            channel.send(frames, peers)
+        except OSError as error:
+            self._lost(error)
+            return
+        channel.free_at = max(now, channel.free_at) + size / channel.rate
+        traffic.frames_dropped += channel.dropped - dropped
+        traffic.frames_sent += len(frames) * len(peers)
+        traffic.bytes_sent += size * len(peers)
+
+    def forward(self, frames: Sequence[Frame], peers: Sequence[Peer], now: float) -> None:
+        """Send frames of others to some of the peers, when the line has room."""
+        if self._channel is None:
+            return
+        try:
+            self._channel.forward(frames, peers, now)
+        except OSError as error:
+            self._lost(error)
+            return
+        self._forwarded += len(frames) * len(peers)
+
+    @property
+    def free_at(self) -> float:
+        """Return when our next frames can be sent without waiting, infinity if that is unknown."""
+        channel = self._channel
+        return math.inf if channel is None or channel.is_waiting else channel.free_at
 
     def poll(self, now: float) -> None:
         """Do what is due."""
@@ -155,25 +204,29 @@ class Line:
             self._proven_at = math.inf
             self._connector.backoff.succeeded()
             self.status.take(LinkInput.PROVED, now, channel.name)
-        for peer, frames in self._receiver.give_up(now):
+        for peer, frames in self.receiver.give_up(now):
             self._handle(channel, peer, frames, now)
+        if now >= channel.next_deadline():
+            try:
+                channel.forward_more(now)
+            except OSError as error:
+                self._lost(error)
         if now >= self._announce_at:
             self._announce_at = now + ANNOUNCE_INTERVAL
-            self._faults.call(self._endpoint.link_opened, now)
+            self._user.silent(self, now)
 
     def next_deadline(self) -> float:
-        """Return when :meth:`poll` or :meth:`flush` is due."""
+        """Return when :meth:`poll` is due."""
         return min(
             self._connect_at, self._proven_at, self._announce_at, self.status.next_deadline(),
-            self._receiver.next_deadline(),
-            self._sender.next_deadline(self._channel) if self._channel else math.inf)
+            self.receiver.next_deadline(),
+            self._channel.next_deadline() if self._channel else math.inf)
 
     def pause(self, now: float) -> float:
         """Return for how long to let foreign frames collect before the next read, s."""
         if self._channel is None or self._channel.more:
             return 0.0
-        pause = self._receiver.pause(now)
-        return pause if now >= self._sender.answer_expected_until else 0.0
+        return self.receiver.pause(now)
 
     def close(self) -> None:
         """Close the channel."""
@@ -185,9 +238,9 @@ class Line:
                 self._selector.unregister(key.fileobj)
         with contextlib.suppress(OSError):
             channel.close()
+        self._not_forwarded += channel.not_forwarded
         self._proven_at = self._announce_at = math.inf
-        self._receiver.clear()
-        self._sender.clear()
+        self.receiver.clear()
 
     def _connect(self, now: float) -> None:
         try:
@@ -210,10 +263,11 @@ class Line:
         if self._channel is None:
             return
         name, reason, now = self._channel.name, error.strerror or str(error), self._clock()
+        heard = self.receiver.routes.sources()
         self.close()
         self._connect_at = -math.inf
         self.status.take(LinkInput.CLOSED, now, name, reason)
-        self._faults.call(self._endpoint.link_closed, now, reason)
+        self._user.lost(heard, reason, now)
 
     def _serve(self, handle: object, events: int) -> None:
         """Send or receive on a handle that is ready."""
@@ -227,7 +281,7 @@ class Line:
             if events & selectors.EVENT_READ:
                 for peer, data in channel.receive(handle):
                     now = self._clock()
-                    frames = self._receiver.take(peer, data, now)
+                    frames = self.receiver.take(peer, data, now)
                     if frames is not None:
                         self._handle(channel, peer, frames, now)
         except OSError as error:
@@ -244,15 +298,5 @@ class Line:
         if channel.heard(peer, now):
             if _frame_log.isEnabledFor(logging.DEBUG):
                 _frame_log.debug('new peer %s on %s', peer, channel.name)
-            self._faults.call(self._endpoint.link_opened, now)
-        for frame, sender in frames:
-            cls = self._classes.get(frame.message_id)
-            if cls is None:
-                continue
-            if self._endpoint.inspect is not None:
-                self._faults.call(self._endpoint.inspect, frame, cls)
-            message = decode(cls, frame.payload, sender)
-            if _frame_log.isEnabledFor(logging.DEBUG):
-                _frame_log.debug('received from %s: %s', frame.source, line_of(message),
-                                 extra={'address': frame.source})
-            self._faults.call(self._endpoint.receive, frame.source, message, now)
+            self._user.opened(now)
+        self._user.receive(self, peer, frames, now)

@@ -12,11 +12,11 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""The link: the one thread that owns a line and the endpoint that uses it."""
+"""The link: the one thread that owns some lines and the endpoint that uses them."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 import functools
 import math
 import selectors
@@ -24,7 +24,7 @@ import time
 
 from .component import Endpoint
 from .fault_log import FaultLog
-from .line import Line
+from .lines import Lines
 from .link_state import LinkEvent, LinkInput, LinkSnapshot
 from .link_thread import LinkThread
 from .messages import Address
@@ -38,12 +38,13 @@ STORE_INTERVAL = 30.0
 
 class Link:
     """
-    Runs an endpoint over a connection URL in a thread of its own, and reopens lost transports.
+    Runs an endpoint over connection URLs in a thread of its own, and reopens lost transports.
 
     Only this thread calls the endpoint. Other threads hand it functions by :meth:`call`, and get
     snapshots and events.
 
-    :param on_event: called in that thread when the link is opened, lost, or cannot be
+    :param further: more URLs, by label; frames are forwarded between all lines.
+    :param on_event: called in that thread when a line is opened, lost, or cannot be
         opened at first; at a limited rate.
     :param store: keeps the time stamps of signing for the next run; None keeps them nowhere.
     :param mavlink_version: 1 or 2, of the frames that are sent; both are received.
@@ -54,7 +55,7 @@ class Link:
     """
 
     def __init__(
-        self, url: Url, endpoint: Endpoint, *, label: str,
+        self, url: Url, endpoint: Endpoint, *, label: str, further: Mapping[str, Url] = {},
         on_event: Callable[[LinkEvent], None] = lambda event: None,
         signing: Signing | None = None,
         store: TimestampStore | None = None,
@@ -73,10 +74,10 @@ class Link:
         self._faults = FaultLog(clock)
         self._thread = LinkThread(
             label, self._work, self._finish, self._faults, clock, selector)
-        self._line = Line(
-            url, endpoint, label=label, faults=self._faults, selector=self._thread.selector,
-            call=self._thread.call, signing=self._signing, mavlink_version=mavlink_version,
-            clock=clock, wall_clock=wall_clock)
+        self._lines = Lines(
+            [(label, url), *further.items()], endpoint, faults=self._faults,
+            selector=self._thread.selector, call=self._thread.call, signing=self._signing,
+            mavlink_version=mavlink_version, clock=clock, wall_clock=wall_clock)
 
     # From any thread
 
@@ -95,7 +96,8 @@ class Link:
         :param timeout: how long to wait for the thread, s.
         """
         # A channel that was just handed over is among the calls, which the thread still takes.
-        self._line.stop()
+        for line in self._lines:
+            line.stop()
         self._thread.stop(timeout)
 
     def is_running(self) -> bool:
@@ -109,46 +111,56 @@ class Link:
     # In the link's thread
 
     def snapshot(self, now: float) -> LinkSnapshot:
-        """Return the link at this moment."""
-        return self._line.snapshot(now)
+        """Return the first line at this moment."""
+        return self.snapshots(now)[0]
+
+    def snapshots(self, now: float) -> tuple[LinkSnapshot, ...]:
+        """Return each line at this moment."""
+        return self._lines.snapshots(now)
+
+    def copies(self, now: float) -> Mapping[tuple[int, int], int]:
+        """See :meth:`Lines.copies`."""
+        return self._lines.copies(now)
 
     def peer_count_of(self, source: Address, now: float) -> int:
-        """Return over how many peers a component is heard, which may be several senders."""
-        return self._line.peer_count_of(source, now)
+        """See :meth:`Lines.peer_count_of`."""
+        return self._lines.peer_count_of(source, now)
 
     def reset_loss(self, source: Address) -> None:
         """Forget recent losses of a component: its sequence numbers have restarted."""
-        self._line.reset_loss(source)
+        self._lines.reset_loss(source)
 
     def _work(self) -> float:
         now = self.clock()
-        self._line.flush()
+        self._lines.flush()
         due = self._next_deadline()
         if self.clock() >= due:
             self._poll()
             due = self._next_deadline()
-        self._thread.pause(self._line.pause(now))
+        self._thread.pause(self._lines.pause(now))
         return due
 
     def _next_deadline(self) -> float:
-        return min(self.endpoint.next_deadline(), self._line.next_deadline(), self._store_due)
+        return min(self.endpoint.next_deadline(), self._lines.next_deadline(), self._store_due)
 
     def _poll(self) -> None:
         """Do what is due."""
-        self._line.poll(self.clock())
+        self._lines.poll(self.clock())
         self._faults.call(self.endpoint.poll, self.clock())
-        self._line.flush()
+        self._lines.flush()
         now = self.clock()
         if now >= self._store_due:
             self._store_due = now + STORE_INTERVAL
             self._store_timestamp(last=False)
-        while event := self._line.status.event(now):
-            self._faults.call(self._on_event, event)
+        for line in self._lines:
+            while event := line.status.event(now):
+                self._faults.call(self._on_event, event)
 
     def _finish(self) -> None:
         self._store_timestamp(last=True)
-        self._line.close()
-        self._line.status.take(LinkInput.STOPPED, self.clock())
+        for line in self._lines:
+            line.close()
+            line.status.take(LinkInput.STOPPED, self.clock())
 
     def _store_timestamp(self, *, last: bool) -> None:
         if self._store:

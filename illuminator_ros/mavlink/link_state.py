@@ -16,7 +16,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
 from enum import Enum
 from typing import NamedTuple
 
@@ -96,6 +97,7 @@ class LinkEvent:
     :param reason: why it is not open.
     :param was_open: whether it was open before.
     :param unreported: number of earlier openings and losses without a report.
+    :param label: the name of the line while there is no transport.
     """
 
     is_open: bool
@@ -103,6 +105,7 @@ class LinkEvent:
     reason: str = ''
     was_open: bool = False
     unreported: int = 0
+    label: str = field(default='', compare=False)
 
     def __str__(self) -> str:
         more = f' ({self.unreported} more changes not reported)' if self.unreported else ''
@@ -119,6 +122,8 @@ class LinkSnapshot(NamedTuple):
     :param since: when it was opened or lost, on the link's clock, s.
     :param openings: how often it was opened.
     :param peers: how many have sent an authenticated frame within 10 s.
+    :param forwarded: frames of others that were sent, or wait to be sent, over this line.
+    :param not_forwarded: frames of others that were then replaced or dropped, by message id.
     """
 
     state: LinkState
@@ -130,6 +135,8 @@ class LinkSnapshot(NamedTuple):
     traffic: TrafficSnapshot
     decoding: DecoderCounters
     signing: SigningCounters
+    forwarded: int
+    not_forwarded: Mapping[int, int]
 
     @property
     def is_open(self) -> bool:
@@ -189,7 +196,7 @@ class LinkStatus:
             self._report(LinkEvent(False, self.label, reason))
 
     def _report(self, event: LinkEvent) -> None:
-        self._events.append(event)
+        self._events.append(replace(event, label=self.label))
         if len(self._events) > 2:
             del self._events[0]
             self._unreported += 1

@@ -19,12 +19,14 @@ from __future__ import annotations
 from collections.abc import Callable, Collection, Iterable
 import math
 
+from .duplicate_filter import DuplicateFilter
 from .frame import DecoderCounters, ForeignFrames, Frame
 from .frame_reader import FrameReader
 from .frame_writer import FrameWriter
+from .messages import Address
 from .routing_table import RoutingTable
 from .signing import Signing
-from .statistics import Traffic
+from .statistics import SequenceCounter, Traffic
 from .transport import Peer
 
 # To wake the loop costs as much as ten foreign frames. Where more than BATCH_THRESHOLD come per
@@ -44,18 +46,27 @@ class Receiver:
 
     :param handled: see :class:`~.frame_reader.FrameReader`.
     :param writer: has written our frames.
+    :param sources: see :class:`~.statistics.Traffic`.
+    :param duplicates: the frames that any of several lines has accepted, None if there is one
+        line. A copy of one of these shows a route, but is not returned.
+    :param line: the index of the line.
     :ivar traffic: of the line; the sending side counts here, too.
     :ivar routes: the peers over which components were heard.
+    :ivar leads_to: see :meth:`~.transport.base.Channel.leads_to`.
     """
 
     def __init__(
         self, signing: Signing, handled: Collection[int], writer: FrameWriter,
-        wall_clock: Callable[[], float],
+        wall_clock: Callable[[], float], sources: dict[Address, SequenceCounter],
+        duplicates: DuplicateFilter | None = None, line: int = 0,
     ) -> None:
-        self.traffic = Traffic()
+        self.traffic = Traffic(sources=sources)
         self.routes = RoutingTable()
-        self._reader = FrameReader(signing, handled)
+        self.leads_to: Callable[[Peer], Peer] = lambda peer: peer
+        self._reader = FrameReader(signing, handled, duplicates)
         self._writer = writer
+        self._duplicates = duplicates
+        self._line = line
         self._wall_clock = wall_clock
         # Foreign frames at the last pause, and the time of that.
         self._foreign = 0
@@ -93,16 +104,16 @@ class Receiver:
         return min(BATCH_TIME, BATCH_SIZE * gap / count) if count > BATCH_THRESHOLD * gap else 0.0
 
     def clear(self) -> None:
-        """Forget peers and sequence numbers: the channel is closed."""
+        """Forget the peers: the channel is closed."""
         self._reader.clear()
         self.routes.clear()
-        self.traffic.restart()
 
     def _accept(
         self, peer: Peer, frames: Iterable[Frame | ForeignFrames], now: float,
     ) -> list[ReceivedFrame] | None:
         accepted: list[ReceivedFrame] = []
         heard = set()
+        duplicates = self._duplicates
         for frame in frames:
             if isinstance(frame, ForeignFrames):
                 # Frames from our own address have returned, or show an address conflict.
@@ -112,8 +123,13 @@ class Receiver:
             elif self._writer.is_loopback(frame, now):
                 continue
             else:
-                accepted.append((frame, self.traffic.count(frame)))
+                if duplicates is not None and duplicates.is_copy(frame, self._line, now):
+                    # Its sequence number, if late, would look like that of another sender.
+                    self.traffic.frames_received += 1
+                else:
+                    accepted.append((frame, self.traffic.count(frame)))
             heard.add(frame.source)
+        neighbour = self.leads_to(peer)
         for source in heard:
-            self.routes.heard(source, peer, now)
+            self.routes.heard(source, neighbour, now)
         return accepted if heard else None

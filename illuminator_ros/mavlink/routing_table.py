@@ -12,13 +12,15 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""The peers that lead to each component (MAVLink guide, "Routing")."""
+"""The lines and peers that lead to each component (MAVLink guide, "Routing"); no I/O, no clock."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Container, Sequence
 import math
 
+from .frame import Frame
+from .message_traits import NEVER_FORWARDED, target_of
 from .messages import Address
 from .transport import Peer
 
@@ -33,7 +35,7 @@ EXPIRY_INTERVAL = 1.0
 
 class RoutingTable:
     """
-    The routes to components, learnt from the frames that come from them.
+    The routes to components over one line, learnt from the frames that come from them.
 
     A message to a component that is heard over several peers goes to all of them, so that an
     impostor diverts nothing from the real component.
@@ -72,17 +74,28 @@ class RoutingTable:
                 return
         route[peer] = now
 
-    def towards(self, message: object, peers: Sequence[Peer], now: float) -> Sequence[Peer]:
-        """Return the peers that lead to the message's target, all peers if none does."""
-        system = getattr(message, 'target_system', 0)
-        if not system:
-            return peers
-        target = system, getattr(message, 'target_component', 0)
-        if self._overflowed and now - self._overflowed.get(target, -math.inf) <= EXPIRY:
-            return peers
-        route = self._routes.get(target, {})
-        known = [peer for peer in peers if now - route.get(peer, -math.inf) <= EXPIRY]
-        return known or peers
+    def towards(
+        self, target: Address, peers: Sequence[Peer], now: float, within: float = EXPIRY,
+    ) -> Sequence[Peer]:
+        """
+        Return the peers that lead to a target, none if it has no route.
+
+        :param target: all components of the system where the component id is 0.
+        :param within: how far back a route counts, s.
+        """
+        sources = [target] if target.component else [
+            one for one in self._routes if one[0] == target.system]
+        known: set[Peer] = set()
+        for source in sources:
+            if self._overflowed and now - self._overflowed.get(source, -math.inf) <= within:
+                return peers
+            known.update(peer for peer, heard in self._routes.get(source, {}).items()
+                         if now - heard <= within)
+        return [peer for peer in peers if peer in known]
+
+    def sources(self) -> list[Address]:
+        """Return the components with a route."""
+        return [Address(*source) for source in self._routes]
 
     def clear(self) -> None:
         """Remove all routes: the link is closed."""
@@ -98,3 +111,55 @@ class RoutingTable:
                     del self._routes[source]
                     self._overflowed.pop(source, None)
         return len(self._routes) < MAX_ROUTES
+
+
+# The peers of each line, by its index.
+Peers = Sequence[Sequence[Peer]]
+
+
+class Router:
+    """
+    The rules by which messages and frames find the lines and peers that lead to their targets.
+
+    :param tables: what each line has heard.
+    :param own: the addresses of this program, from which it has sent.
+    """
+
+    def __init__(self, tables: Sequence[RoutingTable], own: Container[Address]) -> None:
+        self._tables = tables
+        self._own = own
+
+    def towards(self, target: Address, peers: Peers, now: float) -> Peers:
+        """
+        Return where to send one of our own messages: everywhere if no line knows the target.
+
+        A message to all components of a system goes everywhere, too: some may not have been heard
+        yet.
+        """
+        found = self._known(target, peers, now) if target.system and target.component else ()
+        return found if any(found) else peers
+
+    def targets(self, frame: Frame, peers: Peers, now: float) -> Peers:
+        """
+        Return where to forward a frame; nowhere if it is for us alone, or seems to be ours.
+
+        :param peers: all but the one from which it came.
+        """
+        if frame.source in self._own or frame.message_id in NEVER_FORWARDED:
+            return ()
+        target = target_of(frame)
+        if not target.system:
+            return peers
+        if target in self._own:
+            return ()
+        found = self._known(target, peers, now)
+        # A silent component is still where it was heard last.
+        return found if any(found) else self._known(target, peers, now, math.inf)
+
+    def is_reachable(self, source: Address, now: float) -> bool:
+        """Return whether a component was lately heard over any line."""
+        return any(table.peer_count_of(source, now) for table in self._tables)
+
+    def _known(self, target: Address, peers: Peers, now: float, within: float = EXPIRY) -> Peers:
+        return [table.towards(target, some, now, within) if some else ()
+                for table, some in zip(self._tables, peers, strict=True)]

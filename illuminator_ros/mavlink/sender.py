@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""The sending side of a line: messages to frames for the peers that lead to their targets."""
+"""The sending side of a link: messages to frames for the peers that lead to their targets."""
 
 from __future__ import annotations
 
@@ -25,10 +25,9 @@ from .conflating_queue import ConflatingQueue, StreamGroup
 from .dialect import line_of
 from .fault_log import FaultLog
 from .frame_writer import FrameWriter
-from .messages import Address, Message, target_of
-from .routing_table import RoutingTable
-from .statistics import Traffic
-from .transport import Channel, Peer
+from .line import Line
+from .messages import Address, Heartbeat, Message, target_of
+from .routing_table import Peers, Router
 
 # s for which the line may still be busy when the next group of a stream is written, so that it has
 # no gaps. The most urgent group may wait behind one more in the line.
@@ -43,82 +42,84 @@ _frame_log = logging.getLogger('illuminator_ros')
 
 class Sender:
     """
-    Sends messages over the channel of a line; an OSError of that is the caller's to handle.
+    Sends messages over the lines that lead to their targets.
+
+    A frame is the same on each line, so that a receiver behind two of them recognises the copy.
 
     :param streams: messages that newer ones replace while the line is busy.
-    :param routes: of the receiving side.
     :ivar answer_expected_until: s.
+    :ivar heartbeats: the last heartbeat frame of each of our addresses.
     """
 
     def __init__(
-        self, writer: FrameWriter, streams: Sequence[StreamGroup], routes: RoutingTable,
-        traffic: Traffic, faults: FaultLog, wall_clock: Callable[[], float],
+        self, writer: FrameWriter, streams: Sequence[StreamGroup], lines: Sequence[Line],
+        router: Router, faults: FaultLog, clock: Callable[[], float],
+        wall_clock: Callable[[], float],
     ) -> None:
         self.answer_expected_until = -math.inf
+        self.heartbeats: dict[Address, bytes] = {}
         self._writer = writer
         self._streams = ConflatingQueue(streams)
-        self._routes = routes
-        self._traffic = traffic
+        self._lines = lines
+        self._router = router
         self._faults = faults
+        self._clock = clock
         self._wall_clock = wall_clock
-        # When the line will have sent all written bytes, s.
-        self._line_free_at = -math.inf
 
-    def send(
-        self, channel: Channel, messages: Iterable[tuple[Address, Message]], now: float,
-    ) -> None:
+    def send(self, messages: Iterable[tuple[Address, Message]], now: float) -> None:
         """Send messages, and those of streams for which the line has room."""
         dropped = self._streams.dropped
-        self._send_now(
-            channel, [one for one in messages if not self._streams.hold(*one, now)], now)
-        while self.next_deadline(channel) <= now:
-            self._send_now(channel, self._streams.take(now), now)
-        self._traffic.frames_dropped += self._streams.dropped - dropped
+        self._send_now([one for one in messages if not self._streams.hold(*one, now)], now)
+        while self._streams and self.next_deadline() <= now:
+            self._send_now(self._streams.take(now), now)
+        self._lines[0].receiver.traffic.frames_dropped += self._streams.dropped - dropped
 
-    def next_deadline(self, channel: Channel) -> float:
-        """Return when messages of streams can be sent; infinity while the channel is full."""
-        if not self._streams or channel.is_waiting:
+    def next_deadline(self) -> float:
+        """Return when messages of streams can be sent; infinity while each line is full."""
+        if not self._streams:
             return math.inf
-        return self._line_free_at - (
+        now = self._clock()
+        target = target_of(self._streams.first)
+        towards = self._router.towards(target, [line.peers(now) for line in self._lines], now)
+        free = [line.free_at for line, peers in zip(self._lines, towards, strict=True) if peers]
+        if not free:
+            return now
+        return max((at for at in free if at < math.inf), default=math.inf) - (
             URGENT_WRITE_AHEAD if self._streams.is_urgent else WRITE_AHEAD)
 
     def clear(self) -> None:
-        """Drop all messages of streams: the channel is closed."""
+        """Drop all messages of streams: the lines are closed."""
         self._streams.clear()
-        self._line_free_at = -math.inf
 
-    def _send_now(
-        self, channel: Channel, messages: Sequence[tuple[Address, Message]], now: float,
-    ) -> None:
-        all_peers = channel.peers(now)
+    def _send_now(self, messages: Sequence[tuple[Address, Message]], now: float) -> None:
+        everywhere = [tuple(line.peers(now)) for line in self._lines]
         # Frames for the same peers are sent together: each receiver is then woken only once.
         frames: list[bytes] = []
-        peers: Sequence[Peer] = ()
+        peers: Peers = ()
         for source, message in messages:
-            if getattr(message, 'target_system', 0):
+            target = target_of(message)
+            if target.system:
                 self.answer_expected_until = now + ANSWER_TIME
-            towards = tuple(self._routes.towards(message, all_peers, now))
+            towards = self._router.towards(target, everywhere, now)
             if frames and towards != peers:
-                self._write(channel, frames, peers, now)
+                self._write(frames, peers, now)
                 frames = []
             peers = towards
             try:
-                frames.append(self._writer.frame(source, message, now, self._wall_clock()))
+                frame = self._writer.frame(source, message, now, self._wall_clock())
             except (ValueError, OverflowError, struct.error):
                 self._faults.log()
                 continue
+            frames.append(frame)
+            if isinstance(message, Heartbeat):
+                self.heartbeats[source] = frame
             if _frame_log.isEnabledFor(logging.DEBUG):
                 _frame_log.debug('sent from %s: %s', source, line_of(message),
-                                 extra={'address': target_of(message)})
+                                 extra={'address': target})
         if frames:
-            self._write(channel, frames, peers, now)
+            self._write(frames, peers, now)
 
-    def _write(
-        self, channel: Channel, frames: Sequence[bytes], peers: Sequence[Peer], now: float,
-    ) -> None:
-        dropped, size = channel.dropped, sum(map(len, frames))
-        channel.send(frames, peers)
-        self._line_free_at = max(now, self._line_free_at) + size / channel.rate
-        self._traffic.frames_dropped += channel.dropped - dropped
-        self._traffic.frames_sent += len(frames) * len(peers)
-        self._traffic.bytes_sent += size * len(peers)
+    def _write(self, frames: Sequence[bytes], peers: Peers, now: float) -> None:
+        for line, some in zip(self._lines, peers, strict=True):
+            if some:
+                line.write(frames, some, now)

@@ -143,7 +143,7 @@ class Signing:
             self.counters.unsigned += 1
             return self.mode is SigningMode.SIGN
         assert len(frame.signature) == SIGNATURE
-        expected = signature(self.key, frame.signed_part + frame.signature[:7])
+        expected = signature(self.key, frame.data[:-SIGNATURE] + frame.signature[:7])
         if not self._is_equal(expected, frame.signature[7:]):
             self.counters.bad += 1
             return False

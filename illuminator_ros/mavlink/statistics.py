@@ -251,14 +251,18 @@ class TrafficSnapshot(NamedTuple):
 
 @dataclass(slots=True)
 class Traffic:
-    """The traffic of a link since it was made; see :class:`TrafficSnapshot`."""
+    """
+    The traffic of a line since it was made; see :class:`TrafficSnapshot`.
+
+    :param sources: the counters of all sources; several lines may share them.
+    """
 
     bytes_received: int = 0
+    frames_received: int = 0
     bytes_sent: int = 0
     frames_sent: int = 0
     frames_dropped: int = 0
     sources: dict[Address, SequenceCounter] = field(default_factory=dict)
-    _frames_of_others: int = 0
     _received: WindowedCounter = WindowedCounter()
     _sent: WindowedCounter = WindowedCounter()
 
@@ -269,14 +273,14 @@ class Traffic:
         sources = {source: counter.snapshot(now) for source, counter in self.sources.items()}
         return TrafficSnapshot(
             self.bytes_received, self.bytes_sent,
-            self._frames_of_others + sum(counts.received for counts in sources.values()),
-            self.frames_sent, self.frames_dropped, self._received.rate, self._sent.rate, sources)
+            self.frames_received, self.frames_sent, self.frames_dropped,
+            self._received.rate, self._sent.rate, sources)
 
     def count(self, frame: Frame) -> int:
         """Count a frame, and return its sender; see :class:`SequenceCounter`."""
+        self.frames_received += 1
         counter = self._counter_of(frame.source)
         if counter is None:
-            self._frames_of_others += 1
             return 0
         counter.add(frame.sequence, hash((frame.message_id, frame.payload)))
         return counter.sender
@@ -287,10 +291,9 @@ class Traffic:
 
         :param sequences: their sequence numbers, at least one.
         """
+        self.frames_received += len(sequences)
         counter = self._counter_of(source)
-        if counter is None:
-            self._frames_of_others += len(sequences)
-        else:
+        if counter is not None:
             counter.add_run(sequences)
 
     def _counter_of(self, source: Address) -> SequenceCounter | None:
@@ -299,8 +302,3 @@ class Traffic:
         if counter is None and len(self.sources) < MAX_SOURCES:
             counter = self.sources[source] = SequenceCounter()
         return counter
-
-    def restart(self) -> None:
-        """Forget the sequence numbers but not the counts: the link was interrupted."""
-        for counter in self.sources.values():
-            counter.restart()

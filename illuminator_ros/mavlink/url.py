@@ -20,7 +20,7 @@ An empty host to listen on means all interfaces, as in all three. IPv6 addresses
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Hashable
 import ipaddress
 import re
 from typing import Literal, NamedTuple, NoReturn
@@ -113,6 +113,16 @@ def parse_url(text: str) -> Url:
     :raises UrlError: if it is wrong; the message quotes the wrong part.
     """
     return _Parser(text).parse()
+
+
+def resource(url: Url) -> Hashable:
+    """Return what a URL opens: two URLs with the same one cannot be used together."""
+    if isinstance(url, SerialUrl):
+        return url.device
+    # A port that the system chooses is another one each time.
+    if isinstance(url, UdpUrl) and url.bind.port:
+        return UdpUrl, url.bind
+    return url
 
 
 class _Parser:

@@ -17,7 +17,7 @@
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Callable
+from collections.abc import Callable, Collection
 from dataclasses import dataclass
 import math
 
@@ -151,6 +151,11 @@ class Camera:
         self._lose(self._link_failure)
         self._pings.stop(self._link_failure)
         self._captures.stop(now, self._link_failure)
+
+    def components_lost(self, lost: Collection[Address], reason: str) -> None:
+        """See :meth:`Payload.components_lost`."""
+        if self._address in lost:
+            self._lose(f'link lost: {reason}')
 
     def close(self, reason: str) -> None:
         """Answer all requests, those after this call too, with the reason."""

@@ -16,6 +16,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from dataclasses import dataclass
 import random
 
@@ -94,6 +95,10 @@ class RedEdgeClient(Payload):
         """See :meth:`Payload.link_closed`."""
         self.camera.link_closed(now, reason)
         self.feeder.link_closed()
+
+    def components_lost(self, lost: Collection[Address], now: float, reason: str) -> None:
+        """See :meth:`Payload.components_lost`."""
+        self.camera.components_lost(lost, reason)
 
     def receive(self, source: Address, message: Message, now: float) -> None:
         """See :meth:`Payload.receive`."""

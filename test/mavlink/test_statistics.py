@@ -183,7 +183,8 @@ def test_traffic_counts_each_source_apart_and_over_interruptions() -> None:
     traffic = statistics.Traffic()
     traffic.count_run(LIGHT, bytes((10, 13)))
     traffic.count_run(Address(1, 1), bytes((20, 26)))
-    traffic.restart()
+    for counter in traffic.sources.values():
+        counter.restart()
     traffic.count_run(LIGHT, bytes((90, 92)))
     assert counts(traffic.sources[LIGHT]) == (4, 3, 0, 0)
     assert counts(traffic.sources[Address(1, 1)]) == (2, 5, 0, 0)

@@ -46,5 +46,4 @@ def checker(mode: SigningMode = SigningMode.REQUIRE, *, timestamp: int = 0,
 
 def signed_frame(stamp: int, **options: Any) -> bytes:
     """Return the bytes of a signed frame."""
-    frame = signed(stamp, **options)
-    return frame.signed_part + (frame.signature or b'')
+    return signed(stamp, **options).data

@@ -111,14 +111,15 @@ class SimulatedLink(Link):
         super().__init__(URL, endpoint, label='simulated', clock=lambda: self.now,
                          wall_clock=lambda: 1.7e9 + self.now, signing=signing,
                          mavlink_version=mavlink_version, selector=_Selector(self))
-        self._line._connect_at = math.inf
-        self._line._sender._writer.sequences = _FromZero()
+        line = next(iter(self._lines))
+        line._connect_at = math.inf
+        self._lines._sender._writer.sequences = _FromZero()
         self._faults.log = self.log_fault  # type: ignore[method-assign]
         self.socket = _Socket(take)
         self.udp = UdpChannel(URL)
         self.udp._socket.close()
         self.udp._socket = self.socket  # type: ignore[assignment]
-        self._line.opened(self.udp, now)
+        line.opened(self.udp, now)
 
     def log_fault(self) -> None:
         raise  # noqa: PLE0704 - it is called while an exception is handled

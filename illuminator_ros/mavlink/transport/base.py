@@ -17,7 +17,7 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections import deque
+from collections import Counter, deque
 from collections.abc import Callable, Hashable, Iterator, Sequence
 import contextlib
 import math
@@ -26,6 +26,8 @@ import selectors
 import socket
 from typing import cast
 
+from ..forward_queue import ForwardQueue
+from ..frame import Frame
 from ..url import HostPort
 
 # The origin of received bytes, to which an answer can be sent.
@@ -41,6 +43,10 @@ MAX_QUEUED = 16 * 1024
 READ_SIZE = 4095
 # Reads in one pass of the link: 20 ms bring more than one takes at 5,000 frames a second.
 MAX_READS = 2
+# Bytes of frames of others that are written at once, and s for which the line may still be busy
+# then: our own messages wait behind them.
+FORWARD_SIZE = 2 * 1024
+FORWARD_AHEAD = 0.002
 
 
 class ChannelLost(OSError):
@@ -55,12 +61,20 @@ class Channel(ABC):
     :ivar dropped: frames that were not sent because the line or the kernel was full.
     :ivar more: whether the last read may have left bytes.
     :ivar rate: of the line, bytes/s; infinity where it is not known.
+    :ivar free_at: when the line will have sent all written bytes, s.
+    :ivar has_clients: whether its peers do not hear each other.
+    :ivar not_forwarded: frames of others that were replaced or dropped, by message id.
     """
 
     name: str = ''
     dropped: int = 0
     more: bool = False
     rate: float = math.inf
+    free_at: float = -math.inf
+    has_clients: bool = False
+
+    def __init__(self) -> None:
+        self.not_forwarded: Counter[int] = Counter()
 
     @property
     def is_waiting(self) -> bool:
@@ -94,6 +108,10 @@ class Channel(ABC):
         """
         return False
 
+    def leads_to(self, peer: Peer) -> Peer:
+        """Return the peer to which messages for the components behind a sender are sent."""
+        return peer
+
     @abstractmethod
     def send(self, frames: Sequence[bytes], peers: Sequence[Peer]) -> None:
         """
@@ -106,6 +124,28 @@ class Channel(ABC):
 
     def writable(self, handle: object) -> None:  # noqa: B027 - only queues have something to do
         """Continue sending on a registered handle that is writable."""
+
+    def forward(self, frames: Sequence[Frame], peers: Sequence[Peer], now: float) -> None:
+        """
+        Send frames of others to some of the peers, after our own.
+
+        :raises ChannelLost: if the channel is closed.
+        """
+        dropped = self.dropped
+        self.send([frame.data for frame in frames], peers)
+        if self.dropped > dropped:
+            self.not_forwarded.update(frame.message_id for frame in frames)
+
+    def forward_more(self, now: float) -> None:  # noqa: B027 - only queues have something to do
+        """
+        Send frames of others that have waited, if the line has room for them.
+
+        :raises ChannelLost: if the channel is closed.
+        """
+
+    def next_deadline(self) -> float:
+        """Return when :meth:`forward_more` is due, infinity if never."""
+        return math.inf
 
     @abstractmethod
     def close(self) -> None:
@@ -158,12 +198,17 @@ class StreamChannel(Channel):
     :param at_end: why the channel is lost when the stream ends.
     """
 
-    def __init__(self, name: str, file: socket.socket | int, at_end: str) -> None:
+    def __init__(
+        self, name: str, file: socket.socket | int, at_end: str, rate: float = math.inf,
+    ) -> None:
+        super().__init__()
         self.name = name
+        self.rate = rate
         self._file = file
         self._descriptor = file if isinstance(file, int) else file.fileno()
         self._at_end = at_end
         self._queue = FrameQueue()
+        self._forwarded = ForwardQueue(self.not_forwarded, rate)
 
     @property
     def is_waiting(self) -> bool:
@@ -219,6 +264,28 @@ class StreamChannel(Channel):
     def writable(self, handle: object) -> None:
         """See :meth:`Channel.writable`."""
         self.send((), ())
+
+    def forward(self, frames: Sequence[Frame], peers: Sequence[Peer], now: float) -> None:
+        """See :meth:`Channel.forward`."""
+        for frame in frames:
+            self._forwarded.put(frame, now)
+        self.forward_more(now)
+
+    def forward_more(self, now: float) -> None:
+        """See :meth:`Channel.forward_more`."""
+        while not self._queue and self.next_deadline() <= now:
+            frames: list[bytes] = []
+            size = 0
+            while (size < FORWARD_SIZE and self.free_at <= now + FORWARD_AHEAD
+                    and (frame := self._forwarded.take(now))):
+                frames.append(frame)
+                size += len(frame)
+                self.free_at = max(now, self.free_at) + len(frame) / self.rate
+            self.send(frames, ())
+
+    def next_deadline(self) -> float:
+        """See :meth:`Channel.next_deadline`."""
+        return self.free_at - FORWARD_AHEAD if self._forwarded and not self._queue else math.inf
 
 
 # An address as sockets of IPv4 and IPv6 have it.

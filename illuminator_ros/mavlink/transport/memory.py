@@ -39,6 +39,7 @@ def open_memory(url: MemoryUrl) -> Channel:
 class _MemoryChannel(Channel):
 
     def __init__(self, hub_name: str) -> None:
+        super().__init__()
         self._hub_name = hub_name
         self._inbox, self._entrance = socket.socketpair(socket.AF_UNIX, socket.SOCK_DGRAM)
         self._inbox.setblocking(False)

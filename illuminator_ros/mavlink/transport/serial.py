@@ -127,8 +127,7 @@ class _LineChannel(StreamChannel):
         self, fd: int, name: str, close: Callable[[], None],
         before_sending: Callable[[], None] = lambda: None, *, rate: float = math.inf,
     ) -> None:
-        super().__init__(name, fd, 'the device has gone')
-        self.rate = rate
+        super().__init__(name, fd, 'the device has gone', rate)
         self._close = close
         self._before_sending = before_sending
 

@@ -16,13 +16,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 import errno
 import math
 import selectors
 import socket
 
 from .base import Channel, ChannelLost, MAX_QUEUED, Peer, resolve, Serve, StreamChannel
+from ..frame import Frame
 from ..url import HostPort
 
 # s for all addresses of a name together; the link must return within 1 s of the other side.
@@ -97,7 +98,10 @@ class TcpServer(Channel):
     rejected if each has sent a valid frame within :data:`EXPIRY`.
     """
 
+    has_clients = True
+
     def __init__(self, address: HostPort) -> None:
+        super().__init__()
         family, sockaddr = resolve(address, socket.SOCK_STREAM)[0]
         self._listener = socket.socket(family, socket.SOCK_STREAM)
         try:
@@ -172,14 +176,31 @@ class TcpServer(Channel):
 
     def send(self, frames: Sequence[bytes], peers: Sequence[Peer]) -> None:
         """See :meth:`Channel.send`."""
+        self._each(peers, lambda client: client.send(frames, ()))
+
+    def forward(self, frames: Sequence[Frame], peers: Sequence[Peer], now: float) -> None:
+        """See :meth:`Channel.forward`."""
+        self._each(peers, lambda client: client.forward(frames, (), now))
+
+    def forward_more(self, now: float) -> None:
+        """See :meth:`Channel.forward_more`."""
+        self._each(tuple(self._clients), lambda client: client.forward_more(now))
+
+    def next_deadline(self) -> float:
+        """See :meth:`Channel.next_deadline`."""
+        return min((client.next_deadline() for client in self._clients.values()), default=math.inf)
+
+    def _each(self, peers: Sequence[Peer], call: Callable[[_Connection], None]) -> None:
         for peer in peers:
             if client := self._clients.get(peer):
                 before = client.dropped
                 try:
-                    client.send(frames, ())
+                    call(client)
                 except ChannelLost:
                     self._drop(peer)
                 self.dropped += client.dropped - before
+                self.not_forwarded.update(client.not_forwarded)
+                client.not_forwarded.clear()
 
     def writable(self, handle: object) -> None:
         """See :meth:`Channel.writable`."""

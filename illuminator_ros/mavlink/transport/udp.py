@@ -57,6 +57,7 @@ class UdpChannel(Channel):
     """
 
     def __init__(self, url: UdpUrl) -> None:
+        super().__init__()
         remote = resolve(url.remote, socket.SOCK_DGRAM)[0] if url.remote else None
         family = remote[0] if remote else socket.AF_INET
         if url.bind.host:
@@ -68,6 +69,7 @@ class UdpChannel(Channel):
         self._remote = remote[1] if remote else None
         self._broadcast = url.broadcast
         self._hears_all = remote is None or bool(url.broadcast)
+        self.has_clients = self._hears_all and url.broadcast != 'always'
         self._peers: dict[Peer, float] = {}
         self._socket = socket.socket(family, socket.SOCK_DGRAM)
         try:
@@ -151,7 +153,7 @@ class UdpChannel(Channel):
 
     def peers(self, now: float) -> Sequence[Peer]:
         """See :meth:`Channel.peers`."""
-        if not self._hears_all or self._broadcast == 'always':
+        if not self.has_clients:
             return (self._remote,)
         for heard in self._peers.values():
             if now - heard > PEER_EXPIRY:
@@ -171,6 +173,10 @@ class UdpChannel(Channel):
             return False
         self._peers[peer] = now
         return new
+
+    def leads_to(self, peer: Peer) -> Peer:
+        """See :meth:`Channel.leads_to`."""
+        return peer if self.has_clients else self._remote
 
     def send(self, frames: Sequence[bytes], peers: Sequence[Peer]) -> None:
         """See :meth:`Channel.send`."""

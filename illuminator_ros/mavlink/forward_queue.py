@@ -1,0 +1,108 @@
+# Copyright 2026 The illuminator_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Frames of others that wait for a slow line; no I/O, no clock."""
+
+from __future__ import annotations
+
+from collections import Counter, deque
+import itertools
+import math
+from typing import NamedTuple
+
+from .frame import Frame
+from .message_traits import Priority, traits_of
+
+# Bytes that may wait, and s: a slow line gets less, so that its delay is bounded.
+MAX_QUEUED = 16 * 1024
+MIN_QUEUED = 2 * 1024
+MAX_DELAY = 0.5
+# s for which a frame is worth sending, by its priority: a command has been sent again by then.
+MAX_AGES = {Priority.URGENT: 1.0, Priority.KEPT: 1.0, Priority.NEWEST: MAX_DELAY}
+
+
+class _Held(NamedTuple):
+    data: bytes
+    message_id: int
+    since: float
+
+
+class ForwardQueue:
+    """
+    Frames that wait until a line has room, the urgent ones first.
+
+    A frame that a newer one of its message and sender makes useless is replaced in its place.
+    When the queue is full, frames of the last priority are dropped first, the oldest of each
+    first.
+
+    :param dropped: counts replaced and dropped frames, by message id.
+    :param rate: of the line, bytes/s.
+    """
+
+    def __init__(self, dropped: Counter[int], rate: float = math.inf) -> None:
+        self._dropped = dropped
+        self._capacity = max(min(MAX_DELAY * rate, MAX_QUEUED), MIN_QUEUED)
+        self._held: dict[Priority, dict[object, _Held]] = {one: {} for one in Priority}
+        self._size = 0
+        self._numbers = itertools.count()
+        # The priorities that follow the urgent one, taken in turn.
+        self._turns = deque((Priority.KEPT, Priority.NEWEST))
+
+    def __bool__(self) -> bool:
+        return self._size > 0
+
+    @property
+    def size(self) -> int:
+        """Return the bytes that wait."""
+        return self._size
+
+    def put(self, frame: Frame, now: float) -> None:
+        """Append a frame, or replace an older one."""
+        traits = traits_of(frame.message_id)
+        held = self._held[traits.priority]
+        key: object = next(self._numbers)
+        if traits.replaced:
+            key = frame.message_id, frame.source, frame.payload[traits.instance]
+            if old := held.get(key):
+                self._size -= len(old.data)
+                self._dropped[frame.message_id] += 1
+        held[key] = _Held(frame.data, frame.message_id, now)
+        self._size += len(frame.data)
+        for priority in reversed(Priority):
+            while self._size > self._capacity and self._held[priority]:
+                self._drop(priority)
+
+    def take(self, now: float) -> bytes:
+        """Return the next frame that is still worth sending, b'' if there is none."""
+        while self:
+            urgent = self._held[Priority.URGENT]
+            if not urgent:
+                self._turns.rotate()
+            priority = next(one for one in (Priority.URGENT, *self._turns) if self._held[one])
+            if now - self._oldest(priority).since < MAX_AGES[priority]:
+                return self._remove(priority).data
+            self._drop(priority)
+        return b''
+
+    def _oldest(self, priority: Priority) -> _Held:
+        return next(iter(self._held[priority].values()))
+
+    def _remove(self, priority: Priority) -> _Held:
+        held = self._held[priority]
+        one = held.pop(next(iter(held)))
+        self._size -= len(one.data)
+        return one
+
+    def _drop(self, priority: Priority) -> None:
+        self._dropped[self._remove(priority).message_id] += 1

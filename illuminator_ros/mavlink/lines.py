@@ -1,0 +1,211 @@
+# Copyright 2026 The illuminator_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""The lines of a link: one endpoint uses them all, and frames are forwarded between them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
+from itertools import groupby
+import logging
+import math
+import selectors
+
+from .component import Endpoint
+from .dialect import decode, line_of
+from .duplicate_filter import DuplicateFilter
+from .fault_log import FaultLog
+from .frame import MAX_ID_V1
+from .frame_writer import FrameWriter
+from .line import Line, LineUser, SILENCE
+from .link_state import LinkSnapshot
+from .messages import Address
+from .receiver import ReceivedFrame, Receiver
+from .routing_table import Router
+from .sender import Sender
+from .signing import Signing
+from .statistics import RECENT, SequenceCounter
+from .transport import Peer
+from .url import Url
+
+# Each frame in a line, at DEBUG, with the ``address`` of the other component.
+_frame_log = logging.getLogger('illuminator_ros')
+
+
+class Lines(LineUser):
+    """
+    Carries the messages of an endpoint over all lines, and frames of others between them.
+
+    All lines are equal. With one line nothing is forwarded, between its peers neither.
+
+    :param urls: of each line, by its label.
+    :param call: calls a function in the thread of the link, given the time, s.
+    :param mavlink_version: 1 or 2, of the frames that are sent; both are received.
+    :param wall_clock: s, Unix time, for the signing time stamps.
+    :raises ValueError: if MAVLink 1 cannot carry a message of the endpoint, or must be signed.
+    """
+
+    def __init__(
+        self, urls: Sequence[tuple[str, Url]], endpoint: Endpoint, *, faults: FaultLog,
+        selector: selectors.BaseSelector, call: Callable[[Callable[[float], None]], None],
+        signing: Signing, mavlink_version: int, clock: Callable[[], float],
+        wall_clock: Callable[[], float],
+    ) -> None:
+        classes = dict.fromkeys((*endpoint.messages, *endpoint.sends))
+        if mavlink_version == 1 and (too_high := [c.msgname for c in classes if c.id > MAX_ID_V1]):
+            raise ValueError(f'MAVLink 1 cannot carry {", ".join(too_high)}: it has no message '
+                             f'ids above {MAX_ID_V1}; use MAVLink 2')
+        self._endpoint = endpoint
+        self._classes = {cls.id: cls for cls in endpoint.messages}
+        self._faults = faults
+        self._clock = clock
+        self._signing = signing
+        self._version = mavlink_version
+        self._duplicates = DuplicateFilter() if len(urls) > 1 else None
+        self._heard_at = -math.inf
+        writer = FrameWriter(signing, mavlink_version)
+        sources: dict[Address, SequenceCounter] = {}
+        self._lines = [
+            Line(url, self, Receiver(signing, self._classes, writer, wall_clock, sources,
+                                     self._duplicates, index),
+                 label=label, faults=faults, selector=selector, call=call, clock=clock)
+            for index, (label, url) in enumerate(urls)]
+        self._sources = sources
+        self._router = Router([line.receiver.routes for line in self._lines], writer.sequences)
+        self._sender = Sender(writer, endpoint.streams, self._lines, self._router, faults, clock,
+                              wall_clock)
+
+    def __iter__(self) -> Iterator[Line]:
+        return iter(self._lines)
+
+    def snapshots(self, now: float) -> tuple[LinkSnapshot, ...]:
+        """Return each line at this moment."""
+        return tuple(line.snapshot(now, self._signing.counters) for line in self._lines)
+
+    def copies(self, now: float) -> Mapping[tuple[int, int], int]:
+        """
+        Return how many copies of frames have come, where some came lately.
+
+        They come in a loop, or over several lines from one component.
+
+        :return: by the index of the line of the original, and that of the copy.
+        """
+        if self._duplicates is None:
+            return {}
+        return {lines: count for lines, (count, last) in self._duplicates.copies.items()
+                if now - last < RECENT}
+
+    def peer_count_of(self, source: Address, now: float) -> int:
+        """
+        Return over how many peers of one line a component is heard, which may be several senders.
+
+        A component may be heard over several lines, too.
+        """
+        return max(line.receiver.routes.peer_count_of(source, now) for line in self._lines)
+
+    def reset_loss(self, source: Address) -> None:
+        """Forget recent losses of a component: its sequence numbers have restarted."""
+        if counter := self._sources.get(source):
+            counter.reset_loss()
+
+    def flush(self) -> None:
+        """Send the messages of the endpoint; without a channel they are dropped."""
+        messages = list(self._endpoint.outgoing)
+        self._endpoint.outgoing.clear()
+        if any(line.is_open for line in self._lines):
+            self._sender.send(messages, self._clock())
+
+    def poll(self, now: float) -> None:
+        """Do what is due."""
+        for line in self._lines:
+            line.poll(now)
+
+    def next_deadline(self) -> float:
+        """Return when :meth:`poll` or :meth:`flush` is due."""
+        return min(self._sender.next_deadline(),
+                   *(line.next_deadline() for line in self._lines))
+
+    def pause(self, now: float) -> float:
+        """Return for how long to let foreign frames collect before the next read, s."""
+        pause = min(line.pause(now) for line in self._lines)
+        return pause if now >= self._sender.answer_expected_until else 0.0
+
+    # The calls of a line
+
+    def opened(self, now: float) -> None:
+        """See :meth:`LineUser.opened`."""
+        self._faults.call(self._endpoint.link_opened, now)
+        self.flush()
+
+    def lost(self, heard: Sequence[Address], reason: str, now: float) -> None:
+        """See :meth:`LineUser.lost`."""
+        if not any(line.is_open for line in self._lines):
+            self._heard_at = -math.inf
+            self._sender.clear()
+            self._restart(self._sources)
+            self._faults.call(self._endpoint.link_closed, now, reason)
+            return
+        lost = [source for source in heard if not self._router.is_reachable(source, now)]
+        self._restart(lost)
+        self._faults.call(self._endpoint.components_lost, lost, now, reason)
+
+    def _restart(self, lost: Collection[Address]) -> None:
+        """Forget the sequence numbers of components: their line was interrupted."""
+        for source in lost:
+            if counter := self._sources.get(source):
+                counter.restart()
+
+    def silent(self, line: Line, now: float) -> None:
+        """See :meth:`LineUser.silent`."""
+        if now >= self._heard_at + SILENCE:
+            self._faults.call(self._endpoint.link_opened, now)
+        else:
+            # A router on this line forwards nothing to us until it has heard us.
+            line.write([*self._sender.heartbeats.values()], line.peers(now), now)
+
+    def receive(
+        self, line: Line, peer: Peer, frames: Sequence[ReceivedFrame], now: float,
+    ) -> None:
+        """See :meth:`LineUser.receive`."""
+        self._heard_at = now
+        for frame, sender in frames:
+            cls = self._classes.get(frame.message_id)
+            if cls is None:
+                continue
+            if self._endpoint.inspect is not None:
+                self._faults.call(self._endpoint.inspect, frame, cls)
+            message = decode(cls, frame.payload, sender)
+            if _frame_log.isEnabledFor(logging.DEBUG):
+                _frame_log.debug('received from %s: %s', frame.source, line_of(message),
+                                 extra={'address': frame.source})
+            self._faults.call(self._endpoint.receive, frame.source, message, now)
+        if len(self._lines) > 1:
+            self._forward(line, peer, frames, now)
+
+    def _forward(
+        self, line: Line, peer: Peer, frames: Sequence[ReceivedFrame], now: float,
+    ) -> None:
+        # A neighbour that sends from another port than it listens on is one neighbour.
+        peers = [other.others(peer, now) if other is line else other.peers(now)
+                 for other in self._lines]
+        if not any(peers):
+            return
+        routed = [(self._router.targets(frame, peers, now), frame) for frame, _ in frames
+                  if frame.version <= self._version]
+        # Frames for the same peers are sent together: each receiver is then woken only once.
+        for towards, group in groupby(routed, key=lambda one: one[0]):
+            some = [frame for _, frame in group]
+            for other, chosen in zip(self._lines, towards, strict=False):
+                if chosen:
+                    other.forward(some, chosen, now)

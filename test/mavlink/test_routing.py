@@ -1,0 +1,112 @@
+# Copyright 2026 The illuminator_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""The lines over which messages and frames go."""
+
+from __future__ import annotations
+
+from illuminator_ros.mavlink.dialect import mavlink
+from illuminator_ros.mavlink.messages import Address, CommandLong, heartbeat, Message
+from illuminator_ros.mavlink.routing_table import EXPIRY, Router, RoutingTable
+import pytest
+from support.frames import frame_of, LIGHT, only, raw_v2
+
+OWN = Address(1, 194)
+GIMBAL, AUTOPILOT, GROUND = Address(1, 154), Address(1, 1), Address(255, 190)
+# The light is on line 0, the autopilot on 0 and 1, the gimbal on 1, and the ground station on 2.
+HEARD = ((LIGHT, 0), (AUTOPILOT, 0), (AUTOPILOT, 1), (GIMBAL, 1), (GROUND, 2))
+UNKNOWN_TARGET = 8  # LINK_NODE_STATUS: the dialect has its seed, and no class.
+
+
+def router(now: float = 0.0) -> Router:
+    """Return a router with three lines of one peer each."""
+    tables = [RoutingTable() for _ in range(3)]
+    for address, line in HEARD:
+        tables[line].heard(address, f'peer {line}', now)
+    return Router(tables, {OWN: 0})
+
+
+def peers(*lines: int) -> list[list[str]]:
+    return [[f'peer {line}'] if line in lines else [] for line in range(3)]
+
+
+def lines_of(found: object) -> set[int]:
+    assert isinstance(found, list | tuple)
+    return {line for line, some in enumerate(found) if some}
+
+
+def to(system: int, component: int) -> CommandLong:
+    return CommandLong(system, component, 512, 0, 0, 0, 0, 0, 0, 0, 0)
+
+
+SETUP_SIGNING = mavlink.MAVLink_setup_signing_message(1, 1, [0] * 32, 0)
+
+
+@pytest.mark.parametrize(('frame', 'origin', 'expected'), [
+    (frame_of(heartbeat(44), source=LIGHT), 0, {1, 2}),
+    (frame_of(heartbeat(6), source=GROUND), 2, {0, 1}),
+    (frame_of(to(0, 0), source=GROUND), 2, {0, 1}),
+    (frame_of(to(0, 154), source=GROUND), 2, {0, 1}),
+    (frame_of(to(*LIGHT), source=GROUND), 2, {0}),
+    (frame_of(to(*GIMBAL), source=GROUND), 2, {1}),
+    (frame_of(to(*AUTOPILOT), source=GROUND), 2, {0, 1}),
+    (frame_of(to(*AUTOPILOT), source=GIMBAL), 1, {0}),
+    (frame_of(to(1, 0), source=GROUND), 2, {0, 1}),
+    (frame_of(to(1, 0), source=LIGHT), 0, {1}),
+    (frame_of(to(*GROUND), source=LIGHT), 0, {2}),
+    (frame_of(to(1, 7), source=GROUND), 2, set()),
+    (frame_of(to(9, 0), source=GROUND), 2, set()),
+    (frame_of(to(*GROUND), source=GROUND), 2, set()),
+    (frame_of(to(*OWN), source=GROUND), 2, set()),
+    (frame_of(to(*LIGHT), source=OWN), 2, set()),
+    (frame_of(to(*GIMBAL), source=GROUND, version=1), 2, {1}),
+    (frame_of(SETUP_SIGNING, source=GROUND), 2, set()),
+    (raw_v2(UNKNOWN_TARGET, bytes((9, 9, 9)), source=GROUND), 2, {0, 1})])
+def test_a_frame_goes_to_the_other_lines_where_its_target_was_heard(
+        frame: bytes, origin: int, expected: set[int]) -> None:
+    others = peers(*{0, 1, 2} - {origin})
+    for now in (0.0, 10 * EXPIRY):
+        assert lines_of(router().targets(only(frame), others, now)) == expected
+
+
+def test_a_frame_goes_where_its_target_was_heard_last_if_that_is_long_ago() -> None:
+    tables = [RoutingTable(), RoutingTable()]
+    router = Router(tables, {})
+    both = [['a'], ['b']]
+    tables[0].heard(LIGHT, 'a', 0.0)
+    tables[1].heard(LIGHT, 'b', EXPIRY)
+    frame = only(frame_of(to(*LIGHT), source=GROUND))
+    assert [lines_of(router.targets(frame, both, now)) for now in (
+        EXPIRY, EXPIRY + 1, 3 * EXPIRY)] == [{0, 1}, {1}, {0, 1}]
+
+
+@pytest.mark.parametrize(('target', 'now', 'expected'), [
+    (LIGHT, 0.0, {0}), (AUTOPILOT, 0.0, {0, 1}), (GROUND, EXPIRY, {2}),
+    (GROUND, EXPIRY + 1, {0, 1, 2}), (Address(1, 0), 0.0, {0, 1, 2}),
+    (Address(0, 0), 0.0, {0, 1, 2}), (Address(9, 9), 0.0, {0, 1, 2})])
+def test_our_message_goes_where_its_target_was_lately_heard_and_else_everywhere(
+        target: Address, now: float, expected: set[int]) -> None:
+    assert lines_of(router().towards(target, peers(0, 1, 2), now)) == expected
+
+
+def test_a_frame_goes_to_the_other_clients_of_its_server_by_the_same_rules() -> None:
+    table = RoutingTable()
+    for address, client in ((LIGHT, 'a'), (GIMBAL, 'b'), (GROUND, 'c')):
+        table.heard(address, client, 0.0)
+    router = Router([table], {})
+    sent: list[tuple[Message, object]] = [
+        (to(*LIGHT), [['a']]), (heartbeat(6), [['a', 'b']]), (to(*GROUND), [[]])]
+    for message, expected in sent:
+        frame = only(frame_of(message, source=GROUND))
+        assert router.targets(frame, [['a', 'b']], 0.0) == expected
