@@ -105,13 +105,16 @@ class Bridge:
         self._component = Component(commands, clients)
         signing, store = parameters.signing()
         try:
+            (label, first), *further = parameters.urls.items()
             self.link = Link(
-                parameters.url, self._component, label=parameters.connection_url,
+                first, self._component, label=label, further=dict(further),
                 on_event=self._link_event, signing=signing, store=store,
                 mavlink_version=parameters.mavlink_version)
         except ValueError as error:
             raise ParameterError(f'mavlink_version: {error}') from None
         self._signing_reported = False
+        # The pairs of lines between which copies of frames come.
+        self._loops: Set[tuple[int, int]] = set()
         # Set if there is work before the next tick.
         self._wake = threading.Event()
         self._ended = threading.Event()
@@ -124,7 +127,7 @@ class Bridge:
             target=self._keep_house, name='housekeeping', daemon=True)
         self._nodes = NodeManager(node, arguments, self.log, self._wake.set)
         self._diagnostics = DiagnosticsPublisher(
-            node, self.link, self._component, url=parameters.connection_url,
+            node, self.link, self._component, urls=tuple(parameters.urls),
             period=parameters.diagnostics_period)
         self._executor = NodeExecutor(node.context, self.log)
         self._logs = [self.log, *(NodeLog(own.get_logger()) for own in self._own_nodes[1:])]
@@ -282,6 +285,10 @@ class Bridge:
                 and self.link.snapshot(now).signing.unchecked):
             self._signing_reported = True
             self.log.warning(f'{SIGNING_NEEDED}: set signing_mode and signing_key_file')
+        loops = self._diagnostics.loops(now)
+        for lines in loops.keys() - self._loops:
+            self.log.warning(loops[lines], 'loop')
+        self._loops = loops.keys()
         for payload in self._payloads:
             payload.poll(now)
 
@@ -307,7 +314,8 @@ class Bridge:
         return texts
 
     def _link_event(self, event: LinkEvent) -> None:
-        self.log.write(logging.INFO if event.is_open else logging.WARNING, str(event), 'link')
+        self.log.write(logging.INFO if event.is_open else logging.WARNING, str(event),
+                       f'link {event.label}')
         self._wake.set()
 
 

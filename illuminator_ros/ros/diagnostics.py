@@ -24,6 +24,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+import functools
 from typing import NamedTuple
 
 from diagnostic_msgs.msg import DiagnosticStatus, KeyValue
@@ -32,6 +33,7 @@ from ..mavlink import link_state
 from ..mavlink.command_sender import format_seconds
 from ..mavlink.component import Component
 from ..mavlink.link import Link
+from ..mavlink.message_traits import name_of
 from ..mavlink.messages import Address
 
 OK, WARN, ERROR = DiagnosticStatus.OK, DiagnosticStatus.WARN, DiagnosticStatus.ERROR
@@ -43,6 +45,8 @@ SIGNING_NEEDED = ('commands are not answered, and others sign their frames while
 DISCOVERY_GRACE = 10.0
 # % of lost frames of a device above which there is a warning.
 LOSS_WARNING = 5.0
+# Messages that are named in the status of a line.
+MAX_NAMED = 8
 
 # A level and a text for people.
 Finding = tuple[bytes, str]
@@ -93,27 +97,74 @@ class LinkDiagnostics:
     """
     The link at one moment, for any thread.
 
+    :param lines: each of its lines, the first one first.
+    :param loops: the texts on copies of frames that come over each line.
     :param unanswering: the devices whose last command got no acknowledgement.
-    :param values: the values of the status ``link`` that are the same for all devices.
+    :param values: the values of the status of each line that are the same for all devices.
     :param devices: values of single devices, by address.
     """
 
-    state: link_state.LinkSnapshot
+    lines: Sequence[link_state.LinkSnapshot]
+    loops: Sequence[Sequence[str]]
     taken_at: float
     address: Address
     address_conflict: bool
     unanswering: frozenset[Address]
-    values: Mapping[str, Value]
+    values: Sequence[Mapping[str, Value]]
     devices: Mapping[Address, Mapping[str, Value]]
 
+    @property
+    def state(self) -> link_state.LinkSnapshot:
+        """Return the first line; the counts of sources and signatures are those of all lines."""
+        return self.lines[0]
 
-def link_diagnostics(link: Link, component: Component, url: str, now: float) -> LinkDiagnostics:
-    """Return a snapshot of the link; call it in the link's thread."""
-    state = link.snapshot(now)
-    traffic, decoding, signing = state.traffic, state.decoding, state.signing
-    commands = component.commands
+    @property
+    def failure(self) -> str:
+        """Return why no line is open, for people; '' if one is."""
+        return '' if any(line.is_open for line in self.lines) else self.state.failure
+
+    @property
+    def names(self) -> str:
+        """Return the names of all lines, for people."""
+        return ' and '.join(line.name for line in self.lines)
+
+    @property
+    def frames_received(self) -> int:
+        """Return how many frames all lines have received."""
+        return sum(line.traffic.frames_received for line in self.lines)
+
+    @property
+    def bytes_received(self) -> int:
+        """Return how many bytes all lines have received."""
+        return sum(line.traffic.bytes_received for line in self.lines)
+
+
+def loops(
+    copies: Mapping[tuple[int, int], int], urls: Sequence[str],
+) -> dict[tuple[int, int], str]:
+    """
+    Return texts on copies of frames, for people.
+
+    :param copies: their numbers, by the index of the line of the original and that of the copy.
+    """
+    return {
+        (first, second): f'copies of frames from {urls[first]} come over {urls[second]}: there is '
+                         'a loop, or a component is on both'
+        for first, second in copies}
+
+
+def link_diagnostics(
+    link: Link, component: Component, urls: Sequence[str], now: float,
+) -> LinkDiagnostics:
+    """
+    Return a snapshot of the link; call it in the link's thread.
+
+    :param urls: of its lines.
+    """
+    lines = link.snapshots(now)
+    commands, copies = component.commands, link.copies(now)
     devices: dict[Address, Mapping[str, Value]] = {}
-    for address, counter in traffic.sources.items():
+    for address, counter in lines[0].traffic.sources.items():
         trip = commands.round_trip(address)
         p50, p95 = trip.quantile(0.5), trip.quantile(0.95)
         devices[address] = {
@@ -124,31 +175,66 @@ def link_diagnostics(link: Link, component: Component, url: str, now: float) -> 
             'round_trip_p50_ms': None if p50 is None else p50 * 1000,
             'round_trip_p95_ms': None if p95 is None else p95 * 1000,
         }
+    own: dict[str, Value] = {
+        'commands_sent': commands.counters.sent,
+        'commands_resent': commands.counters.resent,
+        'commands_unanswered': commands.counters.unanswered,
+        'signatures_good': lines[0].signing.good,
+        'signatures_bad': lines[0].signing.bad,
+        'signatures_replayed': lines[0].signing.replayed,
+        'unsigned_frames': lines[0].signing.unsigned,
+        'signatures_unchecked': lines[0].signing.unchecked,
+    }
+    values = [_line_values(line, url, now, sum(
+        count for (_, second), count in copies.items() if second == index))
+        for index, (line, url) in enumerate(zip(lines, urls, strict=True))]
+    texts = loops(copies, urls)
     return LinkDiagnostics(
-        state, now, component.address, component.address_conflict(now),
-        frozenset(commands.unanswering), {
-            'url': url,
-            'open': state.is_open,
-            'since_s': now - state.since,
-            'openings': state.openings,
-            'peers': state.peers,
-            'frames_received': traffic.frames_received,
-            'frames_sent': traffic.frames_sent,
-            'frames_dropped': traffic.frames_dropped,
-            'bytes_received': traffic.bytes_received,
-            'bytes_sent': traffic.bytes_sent,
-            'bytes_received_per_s': traffic.received_rate,
-            'bytes_sent_per_s': traffic.sent_rate,
-            'crc_errors': decoding.crc_errors,
-            'commands_sent': commands.counters.sent,
-            'commands_resent': commands.counters.resent,
-            'commands_unanswered': commands.counters.unanswered,
-            'signatures_good': signing.good,
-            'signatures_bad': signing.bad,
-            'signatures_replayed': signing.replayed,
-            'unsigned_frames': signing.unsigned,
-            'signatures_unchecked': signing.unchecked,
-        }, devices)
+        lines, [[text for (_, second), text in texts.items() if second == index]
+                for index in range(len(lines))], now, component.address,
+        component.address_conflict(now), frozenset(commands.unanswering),
+        [{**values[0], **own}, *values[1:]], devices)
+
+
+def _line_values(
+    line: link_state.LinkSnapshot, url: str, now: float, copies: int,
+) -> Mapping[str, Value]:
+    traffic = line.traffic
+    most = sorted(line.not_forwarded.items(), key=lambda one: -one[1])[:MAX_NAMED]
+    return {
+        'url': url,
+        'open': line.is_open,
+        'since_s': now - line.since,
+        'openings': line.openings,
+        'peers': line.peers,
+        'frames_received': traffic.frames_received,
+        'frames_sent': traffic.frames_sent,
+        'frames_dropped': traffic.frames_dropped,
+        'bytes_received': traffic.bytes_received,
+        'bytes_sent': traffic.bytes_sent,
+        'bytes_received_per_s': traffic.received_rate,
+        'bytes_sent_per_s': traffic.sent_rate,
+        'crc_errors': line.decoding.crc_errors,
+        'frames_forwarded': line.forwarded,
+        'frames_not_forwarded': sum(line.not_forwarded.values()),
+        'not_forwarded': ', '.join(f'{name_of(id_)} {count}' for id_, count in most),
+        'copies_received': copies,
+    }
+
+
+def line_reports(link: LinkDiagnostics) -> list[Report]:
+    """Return the status of each further line."""
+    return [
+        Report(f'link {index + 1}', str(link.values[index]['url']), line_findings(link, index),
+               f'open: {link.lines[index].name}', functools.partial(dict, link.values[index]))
+        for index in range(1, len(link.lines))]
+
+
+def line_findings(link: LinkDiagnostics, index: int) -> list[Finding]:
+    """Return the findings on one line."""
+    line = link.lines[index]
+    return [*([] if line.is_open else [(ERROR, f'not open: {line.reason}')]),
+            *((WARN, text) for text in link.loops[index])]
 
 
 def why_nothing_is_heard(link: LinkDiagnostics, device: str) -> str:
@@ -157,7 +243,7 @@ def why_nothing_is_heard(link: LinkDiagnostics, device: str) -> str:
 
     :param device: such as ``an illuminator``.
     """
-    signing, traffic = link.state.signing, link.state.traffic
+    signing, frames, bytes_ = link.state.signing, link.frames_received, link.bytes_received
     if link.address_conflict:
         return (f'another sender uses our address {link.address}: set component_id to a free one '
                 'here or there')
@@ -167,14 +253,14 @@ def why_nothing_is_heard(link: LinkDiagnostics, device: str) -> str:
     if signing.bad:
         return (f'{signing.bad} frames refused for their signature, made with another '
                 'key: both sides need the same key')
-    if signing.unsigned and not traffic.frames_received:
+    if signing.unsigned and not frames:
         return (f'{signing.unsigned} frames refused because they are not signed: sign them at the '
                 'other side, or set signing_mode to sign')
-    if traffic.frames_received:
-        return (f'{traffic.frames_received} frames received, none from {device}: check that it is '
+    if frames:
+        return (f'{frames} frames received, none from {device}: check that it is '
                 'on, and that routers forward its frames')
-    if traffic.bytes_received:
-        return f'{traffic.bytes_received} bytes received, no valid frame; check the baud rate'
+    if bytes_:
+        return f'{bytes_} bytes received, no valid frame; check the baud rate'
     return ('nothing is received: check that the device is on, and that it, or a router, sends '
             'to this address or line')
 
@@ -193,9 +279,7 @@ def link_report(
     :param count: how many devices of this kind are known, None where there is one at most.
     :param limit_reached: whether there are more, which are ignored.
     """
-    findings: list[Finding] = []
-    if not link.state.is_open:
-        findings.append((ERROR, f'not open: {link.state.reason}'))
+    findings = line_findings(link, 0)
     if link.address_conflict:
         findings.append((ERROR, f'another sender uses our address {link.address}'))
     waited = link.taken_at - started
@@ -203,7 +287,7 @@ def link_report(
         findings.append((
             ERROR if waited > DISCOVERY_GRACE else WARN,
             f'no {kind} connected for {format_seconds(waited)}'
-            + (f': {absence}' if link.state.is_open else '')))
+            + (f': {absence}' if not link.failure else '')))
     if device in link.unanswering and link.state.signing.unchecked:
         findings.append((WARN, SIGNING_NEEDED))
     counts = link.state.traffic.sources.get(device) if device else None
@@ -213,5 +297,6 @@ def link_report(
         findings.append((WARN, f'more than {count} {kind}s, some ignored'))
     known = {} if count is None else {f'{kind}s': count}
     own = link.devices.get(device, {}) if device else {}
-    return Report('link', str(link.values['url']), findings, f'open: {link.state.name}',
-                  lambda: {**link.values, **known, **own})
+    values = link.values[0]
+    return Report('link', str(values['url']), findings, f'open: {link.state.name}',
+                  lambda: {**values, **known, **own})

@@ -16,7 +16,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 import queue
 import threading
@@ -24,7 +24,7 @@ import threading
 from diagnostic_msgs.msg import DiagnosticArray
 from rclpy.node import Node
 
-from .diagnostics import link_diagnostics, LinkDiagnostics, Report
+from .diagnostics import line_reports, link_diagnostics, LinkDiagnostics, loops, Report
 from .qos import STREAM_QOS
 from ..mavlink.component import Component
 from ..mavlink.link import Link
@@ -53,18 +53,19 @@ class DiagnosticsPublisher:
     """
     Publishes the reports of each node when they are due, or at once when a level has changed.
 
-    :param url: the connection URL, which is the hardware id of the link.
+    :param urls: the URL of each line, which is its hardware id.
     :param period: s between publications of a node.
     """
 
     def __init__(
-        self, node: Node, link: Link, component: Component, *, url: str, period: float,
+        self, node: Node, link: Link, component: Component, *, urls: Sequence[str],
+        period: float,
     ) -> None:
         self._clock = node.get_clock()
         self._publisher = node.create_publisher(DiagnosticArray, '/diagnostics', STREAM_QOS)
         self._link = link
         self._component = component
-        self._url = url
+        self._urls = urls
         self._period = period
         self._lock = threading.Lock()
         # When each source is due, and the levels that were published last.
@@ -82,7 +83,11 @@ class DiagnosticsPublisher:
 
     def snapshot(self, now: float) -> LinkDiagnostics:
         """Return a snapshot of the link; call it in the link's thread."""
-        return link_diagnostics(self._link, self._component, self._url, now)
+        return link_diagnostics(self._link, self._component, self._urls, now)
+
+    def loops(self, now: float) -> Mapping[tuple[int, int], str]:
+        """Return the loops between lines, for people; call it in the link's thread."""
+        return loops(self._link.copies(now), self._urls)
 
     def poll(self, tolerance: float) -> None:
         """
@@ -101,7 +106,8 @@ class DiagnosticsPublisher:
         except queue.Empty:
             return
         for source, make_reports in zip(sources, snapshots, strict=True):
-            reports = make_reports(link)
+            # The status of each further line is that of the process, and not of each node.
+            reports = [*make_reports(link), *(line_reports(link) if source is sources[0] else ())]
             levels = [report.level for report in reports]
             due, published = self._sources.get(source, (0.0, levels))
             if now >= due - tolerance:

@@ -29,7 +29,7 @@ from rclpy.parameter import Parameter
 from ..mavlink.messages import Address
 from ..mavlink.signing import Signing, SigningMode
 from ..mavlink.signing_files import KeyFileError, load_signing, TimestampStore
-from ..mavlink.url import parse_url, Url, UrlError
+from ..mavlink.url import parse_url, resource, Url, UrlError
 
 # Values of parameters by name, each of the type of its default.
 Values = Mapping[str, Any]
@@ -139,10 +139,13 @@ class ParameterSpec(NamedTuple):
         return value
 
 
+# URLs in forward_urls.
+MAX_FURTHER = 7
 DEFAULT_URL = 'udpin://127.0.0.1:14590'
 
 LINK_PARAMETERS = (
     ParameterSpec('connection_url', DEFAULT_URL, 'where the device is: UDP, TCP or serial'),
+    ParameterSpec('forward_urls', [], 'further links; frames are forwarded between all links'),
     ParameterSpec('payloads', ['illuminator'], 'kinds of devices that the bridge serves'),
     ParameterSpec('system_id', 1, 'our MAVLink system id', low=1, high=255),
     ParameterSpec('component_id', 194, 'our MAVLink component id', low=1, high=255),
@@ -159,10 +162,13 @@ LINK_PARAMETERS = (
 
 
 class LinkParameters(NamedTuple):
-    """The link parameters, checked; :data:`LINK_PARAMETERS` has their units and ranges."""
+    """
+    The link parameters, checked; :data:`LINK_PARAMETERS` has their units and ranges.
 
-    connection_url: str
-    url: Url
+    :param urls: that of the connection, and those to forward to, by their texts.
+    """
+
+    urls: Mapping[str, Url]
     address: Address
     mavlink_version: int
     command_timeout: float
@@ -206,13 +212,27 @@ def declare_link_parameters(node: Node, defaults: Values | None = None) -> LinkP
     """
     values = dict(declare_read_only(
         node, [spec for spec in LINK_PARAMETERS if spec.name != 'payloads'], defaults))
-    try:
-        url = parse_url(values['connection_url'])
-    except UrlError as error:
-        raise ParameterError(f'connection_url: {error}') from None
     return LinkParameters(
-        url=url, address=Address(values.pop('system_id'), values.pop('component_id')),
+        urls=_urls(values.pop('connection_url'), values.pop('forward_urls')),
+        address=Address(values.pop('system_id'), values.pop('component_id')),
         signing_mode=SigningMode(values.pop('signing_mode')), **values)
+
+
+def _urls(first: str, further: list[str]) -> Mapping[str, Url]:
+    """Return the URLs by their texts; no two of them use the same port or device."""
+    urls: dict[str, Url] = {}
+    if len(further) > MAX_FURTHER:
+        raise ParameterError(f'forward_urls: {len(further)} URLs, but {MAX_FURTHER} are possible')
+    for name, text in [('connection_url', first), *(('forward_urls', one) for one in further)]:
+        try:
+            url = parse_url(text)
+        except UrlError as error:
+            raise ParameterError(f'{name}: {error}') from None
+        for other, used in urls.items():
+            if resource(url) == resource(used):
+                raise ParameterError(f'{name}: {text!r} and {other!r} are the same link')
+        urls[text] = url
+    return urls
 
 
 def declare_read_only(

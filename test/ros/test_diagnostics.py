@@ -28,7 +28,7 @@ INFORMATION = 396
 PROTOCOL = (ROOT / 'doc' / 'protocol.md').read_text()
 # The values that are text; each other value is one number, true or false.
 TEXTS = {'url', 'address', 'mode', 'agreed', 'holder', 'vendor', 'model', 'software_version',
-         'hardware_version', 'serial_number', 'node'}
+         'hardware_version', 'serial_number', 'node', 'not_forwarded'}
 
 
 def values(status: DiagnosticStatus) -> dict[str, str]:

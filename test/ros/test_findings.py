@@ -74,7 +74,7 @@ class Reported:
         """Return the statuses by what they are of."""
         light = self.snapshot()
         made = reports(
-            link_diagnostics(self.link, self.client, 'udpin://', self.link.now), light=light,
+            link_diagnostics(self.link, self.client, ['udpin://'], self.link.now), light=light,
             heard=heard or LightsHeard(0, (), (), False),
             hardware_id=hardware_id(light) if light else '', started=self._started)
         return {one.name: one.message('/illuminator') for one in made}

@@ -48,9 +48,9 @@ def why_no_gimbal(
     :param heard: the announced gimbals, each with the reason why it is not connected, else ''.
     :param known: the reason that a manager in this process gives, else ''.
     """
-    if link.state.failure:
-        return link.state.failure
-    if known and link.state.traffic.frames_received:
+    if link.failure:
+        return link.failure
+    if known and link.frames_received:
         return known
     if heard:
         return '; '.join(

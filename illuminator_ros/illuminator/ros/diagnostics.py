@@ -104,8 +104,8 @@ class LightsHeard:
 
 def why_no_light(link: diagnostics.LinkDiagnostics, heard: LightsHeard) -> str:
     """Return why the node has no light, for people."""
-    if link.state.failure:
-        return link.state.failure
+    if link.failure:
+        return link.failure
     if heard.some:
         return (f'{", ".join(map(str, heard.some))} heard, none of which is the target: set '
                 'target_system and target_component')
@@ -113,7 +113,7 @@ def why_no_light(link: diagnostics.LinkDiagnostics, heard: LightsHeard) -> str:
         return (f'{", ".join(map(str, heard.unanswering))} heard, without an answer or an '
                 'ILLUMINATOR_STATUS so far: check the line to it, and whether it requires signed '
                 'messages')
-    return (f'none heard yet on {link.state.name}: '
+    return (f'none heard yet on {link.names}: '
             + diagnostics.why_nothing_is_heard(link, 'an illuminator'))
 
 

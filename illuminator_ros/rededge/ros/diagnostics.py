@@ -56,8 +56,8 @@ def reports(
 
 def why_no_camera(link: LinkDiagnostics) -> str:
     """Return why no camera was heard, for people."""
-    return link.state.failure or (
-        f'none heard yet on {link.state.name}: {why_nothing_is_heard(link, "a camera")}')
+    return link.failure or (
+        f'none heard yet on {link.names}: {why_nothing_is_heard(link, "a camera")}')
 
 
 def camera_findings(camera: CameraSnapshot) -> list[Finding]:
