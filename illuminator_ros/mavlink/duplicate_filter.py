@@ -50,36 +50,29 @@ class DuplicateFilter:
 
     def has(self, frame: Frame, now: float) -> bool:
         """Return whether a frame is a copy of one that was accepted."""
-        return self._find(frame, now) is not None
+        found = self._frames.get(hash(frame.data))
+        return (found is not None and now - found[0] < MEMORY
+                and self._counts.get(frame.source, 0) - found[1] < WRAP)
 
     def is_copy(self, frame: Frame, line: int, now: float) -> bool:
         """Count a frame if it is a copy, and remember it otherwise; return whether it is one."""
-        found = self._find(frame, now)
-        if found is None:
-            self._add(frame, line, now)
-            return False
-        count, _ = self.copies.get((found[2], line), (0, 0.0))
-        self.copies[found[2], line] = count + 1, now
-        return True
-
-    def _find(self, frame: Frame, now: float) -> tuple[float, int, int] | None:
-        found = self._frames.get(hash(frame.data))
-        if (found is None or now - found[0] >= MEMORY
-                or self._counts.get(frame.source, 0) - found[1] >= WRAP):
-            return None
-        return found
-
-    def _add(self, frame: Frame, line: int, now: float) -> None:
+        key = hash(frame.data)
+        if key in self._frames and self.has(frame, now):
+            pair = self._frames[key][2], line
+            count, _ = self.copies.get(pair, (0, 0.0))
+            self.copies[pair] = count + 1, now
+            return True
         order, frames, counts = self._order, self._frames, self._counts
         while order and (now - order[0][1][0] >= MEMORY or len(order) >= MAX_FRAMES):
-            key, entry = order.popleft()
-            if frames.get(key) is entry:
-                del frames[key]
+            old, entry = order.popleft()
+            if frames.get(old) is entry:
+                del frames[old]
         count = counts.pop(frame.source, 0) + 1
         # The source that was silent for longest is forgotten.
         if len(counts) >= MAX_SOURCES:
             del counts[next(iter(counts))]
         counts[frame.source] = count
-        key, entry = hash(frame.data), (now, count, line)
+        entry = now, count, line
         frames[key] = entry
         order.append((key, entry))
+        return False

@@ -17,7 +17,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
-from itertools import groupby
 import logging
 import math
 import selectors
@@ -26,13 +25,13 @@ from .component import Endpoint
 from .dialect import decode, line_of
 from .duplicate_filter import DuplicateFilter
 from .fault_log import FaultLog
-from .frame import MAX_ID_V1
+from .frame import Frame, MAX_ID_V1
 from .frame_writer import FrameWriter
 from .line import Line, LineUser, SILENCE
 from .link_state import LinkSnapshot
 from .messages import Address
 from .receiver import ReceivedFrame, Receiver
-from .routing_table import Router
+from .routing_table import Peers, Router
 from .sender import Sender
 from .signing import Signing
 from .statistics import RECENT, SequenceCounter
@@ -121,6 +120,8 @@ class Lines(LineUser):
 
     def flush(self) -> None:
         """Send the messages of the endpoint; without a channel they are dropped."""
+        if not self._endpoint.outgoing and not self._sender.is_holding:
+            return
         messages = list(self._endpoint.outgoing)
         self._endpoint.outgoing.clear()
         if any(line.is_open for line in self._lines):
@@ -138,8 +139,9 @@ class Lines(LineUser):
 
     def pause(self, now: float) -> float:
         """Return for how long to let foreign frames collect before the next read, s."""
-        pause = min(line.pause(now) for line in self._lines)
-        return pause if now >= self._sender.answer_expected_until else 0.0
+        if len(self._lines) > 1 or now < self._sender.answer_expected_until:
+            return 0.0
+        return self._lines[0].pause(now)
 
     # The calls of a line
 
@@ -201,11 +203,20 @@ class Lines(LineUser):
                  for other in self._lines]
         if not any(peers):
             return
-        routed = [(self._router.targets(frame, peers, now), frame) for frame, _ in frames
-                  if frame.version <= self._version]
         # Frames for the same peers are sent together: each receiver is then woken only once.
-        for towards, group in groupby(routed, key=lambda one: one[0]):
-            some = [frame for _, frame in group]
-            for other, chosen in zip(self._lines, towards, strict=False):
-                if chosen:
-                    other.forward(some, chosen, now)
+        held: list[Frame] = []
+        towards: Peers = ()
+        for frame, _ in frames:
+            if frame.version <= self._version:
+                found = self._router.targets(frame, peers, now)
+                if held and found != towards:
+                    self._forward_to(held, towards, now)
+                    held = []
+                towards = found
+                held.append(frame)
+        self._forward_to(held, towards, now)
+
+    def _forward_to(self, frames: Sequence[Frame], towards: Peers, now: float) -> None:
+        for line, peers in zip(self._lines, towards, strict=False):
+            if peers and frames:
+                line.forward(frames, peers, now)

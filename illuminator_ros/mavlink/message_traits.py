@@ -99,8 +99,10 @@ def target_of(frame: Frame) -> Address:
     """Return the address that a frame is for; an id is 0 where the frame does not name it."""
     traits, payload = traits_of(frame.message_id), frame.payload
     # MAVLink 2 cuts trailing zeros.
-    return Address(*(payload[at] if 0 <= at < len(payload) else 0
-                     for at in (traits.system_at, traits.component_at)))
+    size = len(payload)
+    system = payload[traits.system_at] if 0 <= traits.system_at < size else 0
+    component = payload[traits.component_at] if 0 <= traits.component_at < size else 0
+    return Address(system, component)
 
 
 def name_of(message_id: int) -> str:

@@ -120,7 +120,7 @@ class Receiver:
                 if frame.source in self._writer.sequences:
                     continue
                 self.traffic.count_run(frame.source, frame.sequences)
-            elif self._writer.is_loopback(frame, now):
+            elif frame.source in self._writer.sequences and self._writer.is_loopback(frame, now):
                 continue
             else:
                 if duplicates is not None and duplicates.is_copy(frame, self._line, now):

@@ -66,6 +66,11 @@ class Sender:
         self._clock = clock
         self._wall_clock = wall_clock
 
+    @property
+    def is_holding(self) -> bool:
+        """Return whether messages of streams are held."""
+        return bool(self._streams)
+
     def send(self, messages: Iterable[tuple[Address, Message]], now: float) -> None:
         """Send messages, and those of streams for which the line has room."""
         dropped = self._streams.dropped
