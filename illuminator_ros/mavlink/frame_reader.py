@@ -64,6 +64,7 @@ class FrameReader:
     :param duplicates: the frames that any of several lines has accepted, None if there is one
         line. Frames of other messages are then forwarded, and not only counted.
     :ivar counters: totals over all peers since it was made.
+    :ivar waits: the waits for rests of frames, by peer.
     """
 
     def __init__(
@@ -78,7 +79,7 @@ class FrameReader:
         self._foreign = {} if not self._signing_is_off or duplicates is not None else {
             id_: bytes((crc_extra,)) for id_, crc_extra in CRC_EXTRA.items() if id_ not in handled}
         self._streams: dict[Peer, _Stream] = {}
-        self._waits: dict[Peer, _Wait] = {}
+        self.waits: dict[Peer, _Wait] = {}
 
     def __len__(self) -> int:
         return len(self._streams)
@@ -92,7 +93,7 @@ class FrameReader:
             stream = self._new_stream(peer)
         decoder = stream.decoder
         frames = decoder.sort(data, self._foreign)
-        if decoder.rest or self._waits:
+        if decoder.rest or self.waits:
             self._watch(peer, decoder, now)
         if frames:
             # An unsigned frame is accepted where signing is off; this test saves a call.
@@ -113,16 +114,16 @@ class FrameReader:
             oldest = next((old for old, stream in self._streams.items() if not stream.good),
                           next(iter(self._streams)))
             del self._streams[oldest]
-            self._waits.pop(oldest, None)
+            self.waits.pop(oldest, None)
         self._streams[peer] = stream = _Stream(self.counters)
         return stream
 
     def _watch(self, peer: Peer, decoder: Decoder, now: float) -> None:
         start = decoder.incomplete
         if start is None:
-            self._waits.pop(peer, None)
-        elif peer not in self._waits or self._waits[peer].start != start:
-            self._waits[peer] = _Wait(start, decoder.taken, now)
+            self.waits.pop(peer, None)
+        elif peer not in self.waits or self.waits[peer].start != start:
+            self.waits[peer] = _Wait(start, decoder.taken, now)
 
     def give_up(self, now: float, unix_time: float) -> list[tuple[Peer, Frame]]:
         """
@@ -133,7 +134,7 @@ class FrameReader:
         if now < self.next_deadline():
             return []
         found = []
-        for peer, wait in list(self._waits.items()):
+        for peer, wait in list(self.waits.items()):
             if now >= wait.since + STALL:
                 decoder = self._streams[peer].decoder
                 frames = decoder.give_up(wait.taken)
@@ -144,11 +145,11 @@ class FrameReader:
 
     def next_deadline(self) -> float:
         """Return when :meth:`give_up` has something to do, infinity if never."""
-        if not self._waits:
+        if not self.waits:
             return math.inf
-        return min(wait.since for wait in self._waits.values()) + STALL
+        return min(wait.since for wait in self.waits.values()) + STALL
 
     def clear(self) -> None:
         """Forget all peers and incomplete frames: the link is closed."""
         self._streams.clear()
-        self._waits.clear()
+        self.waits.clear()

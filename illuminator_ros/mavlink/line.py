@@ -217,10 +217,13 @@ class Line:
 
     def next_deadline(self) -> float:
         """Return when :meth:`poll` is due."""
-        return min(
-            self._connect_at, self._proven_at, self._announce_at, self.status.next_deadline(),
-            self.receiver.next_deadline(),
-            self._channel.next_deadline() if self._channel else math.inf)
+        due = min(self._connect_at, self._proven_at, self._announce_at)
+        # Most lines have none of these, and this is called for each frame.
+        if self.status.events:
+            due = min(due, self.status.next_deadline())
+        if self.receiver.waits:
+            due = min(due, self.receiver.next_deadline())
+        return min(due, self._channel.next_deadline()) if self._channel else due
 
     def pause(self, now: float) -> float:
         """Return for how long to let foreign frames collect before the next read, s."""

@@ -134,8 +134,10 @@ class Lines(LineUser):
 
     def next_deadline(self) -> float:
         """Return when :meth:`poll` or :meth:`flush` is due."""
-        return min(self._sender.next_deadline(),
-                   *(line.next_deadline() for line in self._lines))
+        due = self._sender.next_deadline() if self._sender.is_holding else math.inf
+        for line in self._lines:
+            due = min(due, line.next_deadline())
+        return due
 
     def pause(self, now: float) -> float:
         """Return for how long to let foreign frames collect before the next read, s."""
@@ -181,6 +183,8 @@ class Lines(LineUser):
     ) -> None:
         """See :meth:`LineUser.receive`."""
         self._heard_at = now
+        if self._duplicates is not None:
+            self._faults.call(self._forward, line, peer, frames, now)
         for frame, sender in frames:
             cls = self._classes.get(frame.message_id)
             if cls is None:
@@ -192,8 +196,6 @@ class Lines(LineUser):
                 _frame_log.debug('received from %s: %s', frame.source, line_of(message),
                                  extra={'address': frame.source})
             self._faults.call(self._endpoint.receive, frame.source, message, now)
-        if len(self._lines) > 1:
-            self._forward(line, peer, frames, now)
 
     def _forward(
         self, line: Line, peer: Peer, frames: Sequence[ReceivedFrame], now: float,

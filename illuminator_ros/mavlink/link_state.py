@@ -157,6 +157,7 @@ class LinkStatus:
     :ivar since: when it was opened or lost, s.
     :ivar reason: why it is not open, '' where it is.
     :ivar openings: how often it was opened.
+    :ivar events: those that are not reported yet.
     """
 
     def __init__(self, label: str, now: float) -> None:
@@ -169,7 +170,7 @@ class LinkStatus:
         self._unreported = 0
         self._allowed = float(MAX_EVENTS)
         self._allowed_at = now
-        self._events: list[LinkEvent] = []
+        self.events: list[LinkEvent] = []
 
     def take(self, input_: LinkInput, now: float, name: str = '', reason: str = '') -> None:
         """Change the state; ``reason`` says why a transport was closed."""
@@ -196,14 +197,14 @@ class LinkStatus:
             self._report(LinkEvent(False, self.label, reason))
 
     def _report(self, event: LinkEvent) -> None:
-        self._events.append(replace(event, label=self.label))
-        if len(self._events) > 2:
-            del self._events[0]
+        self.events.append(replace(event, label=self.label))
+        if len(self.events) > 2:
+            del self.events[0]
             self._unreported += 1
 
     def event(self, now: float) -> LinkEvent | None:
         """Return the next event if it may be reported now, once."""
-        if not self._events:
+        if not self.events:
             return None
         self._allowed = min(
             self._allowed + (now - self._allowed_at) / EVENT_INTERVAL, MAX_EVENTS)
@@ -212,10 +213,10 @@ class LinkStatus:
             return None
         self._allowed -= 1
         unreported, self._unreported = self._unreported, 0
-        return replace(self._events.pop(0), unreported=unreported)
+        return replace(self.events.pop(0), unreported=unreported)
 
     def next_deadline(self) -> float:
         """Return when a waiting event may be reported, infinity if there is none."""
-        if not self._events:
+        if not self.events:
             return float('inf')
         return self._allowed_at + max(1 - self._allowed, 0) * EVENT_INTERVAL

@@ -52,6 +52,7 @@ class Receiver:
     :param line: the index of the line.
     :ivar traffic: of the line; the sending side counts here, too.
     :ivar routes: the peers over which components were heard.
+    :ivar waits: see :class:`~.frame_reader.FrameReader`.
     :ivar leads_to: see :meth:`~.transport.base.Channel.leads_to`.
     """
 
@@ -64,6 +65,7 @@ class Receiver:
         self.routes = RoutingTable()
         self.leads_to: Callable[[Peer], Peer] = lambda peer: peer
         self._reader = FrameReader(signing, handled, duplicates)
+        self.waits = self._reader.waits
         self._writer = writer
         self._duplicates = duplicates
         self._line = line
