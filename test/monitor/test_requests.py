@@ -22,6 +22,7 @@ from illuminator_ros.cli.monitor.ros_graph import (
     DISCOVERY_LIMIT,
     OFF_INTERVAL,
     Requests,
+    WANTED_LIFETIME,
 )
 from illuminator_ros.ros.monitor_view import Device, Request
 import pytest
@@ -75,11 +76,11 @@ class Bench:
     def create_publisher(self, type_: Any, name: str, depth: int) -> Endpoint:
         return self.endpoints.setdefault(name, Topic())
 
-    def press(self, *keys: str) -> None:
+    def press(self, *keys: str, typed: str = '') -> None:
         for key in keys:
             [found] = [one for one in self.device.view.keys if key in one.keys]
             self.device.now = self.now
-            request = found.request(self.device, '')
+            request = found.request(self.device, typed)
             assert isinstance(request, Request)
             self.requests.submit(request)
 
@@ -239,3 +240,23 @@ def test_message_on_a_topic_waits_for_a_subscriber_and_has_no_answer() -> None:
 
     assert [round(message.vector.y, 3) for message in topic.sent] == [0.413, 0.325]
     assert bench.outcome()[1:] == ('done', 'sent, which has no answer')
+
+
+def test_steps_of_several_axes_before_the_subscriber_is_known_reach_it_together() -> None:
+    bench = Bench(gimbal())
+    angles, place = (bench.endpoints.setdefault(f'/gimbal/cmd/{name}', Topic())
+                     for name in ('angles', 'roi'))
+    angles.ready = place.ready = False
+    bench.press('up', 'up', 'left')
+    bench.press('p', typed='47.3 8.5 480')
+
+    angles.ready = place.ready = True
+    bench.requests.poll()
+
+    # The yaw of the last one, with the pitch of both steps; the place was sent once.
+    assert [(round(message.vector.y, 3), round(message.vector.z, 3)) for message in angles.sent
+            ][1:] == [(0.325, -0.163)]
+    assert len(place.sent) == 1
+    bench.now = WANTED_LIFETIME
+    bench.device.now = bench.now
+    assert bench.device.wants('pitch', 0.5) == 0.5

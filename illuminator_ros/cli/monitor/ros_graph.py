@@ -102,10 +102,10 @@ class Requests:
     """
     The requests to one device.
 
-    For the same values there is one request at a time. The newest of those that come meanwhile
-    waits, so that a key held down does not cause a hundred commands; a failure drops it, since it
-    would hide the reason. An OFF does not wait for an ON, and waits for another OFF only
-    :data:`OFF_INTERVAL`: the bridge may have been restarted.
+    For each topic, and for the same values of a service, there is one request at a time. The
+    newest of those that come meanwhile waits, so that a key held down does not cause a hundred
+    commands; a failure drops it, since it would hide the reason. An OFF does not wait for an ON,
+    and waits for another OFF only :data:`OFF_INTERVAL`: the bridge may have been restarted.
     """
 
     def __init__(self, node: Node, device: Device, clock: Callable[[], float]) -> None:
@@ -128,7 +128,8 @@ class Requests:
 
     def submit(self, request: Request) -> None:
         """Send a request, or let it wait for the pending one."""
-        lane, now = (request.name, *request.values), self._clock()
+        is_service = hasattr(request.type, 'Request')
+        lane, now = (request.name, *(request.values if is_service else ())), self._clock()
         self._device.wanted |= {
             name: (value, math.inf) for name, value in request.values.items()}
         one = self._pending.get(lane)
@@ -145,6 +146,9 @@ class Requests:
         """Take answers, send what can be sent, and give up requests without an answer."""
         for lane, one in list(self._pending.items()):
             request, endpoint = one.request, self.prepare(one.request)
+            if self._pending.get(lane) is not one:
+                # The end of another one has sent it.
+                continue
             if one.sequence is not None:
                 while self._pending.get(lane) is one and (
                         taken := endpoint.handle.take_response(request.type.Response))[0]:

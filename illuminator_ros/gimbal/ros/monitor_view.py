@@ -62,13 +62,13 @@ def nudge(device: Device, typed: str, axis: str, step: float) -> Request | str:
     aim, limit = start + math.radians(step), AXES[axis][0]
     # Yaw has no end: it goes on beyond half a turn.
     aim = math.remainder(aim, math.tau) if axis == 'yaw' else min(max(aim, -limit), limit)
-    # NaN leaves an axis as it is.
-    vector = Vector3(**{name: aim if one == axis else math.nan
-                        for name, one in zip('xyz', AXES, strict=True)})
+    # NaN leaves an axis as it is. The newest setpoint replaces others, so it has their targets.
+    targets = {one: aim if one == axis else device.wants(one, math.nan) for one in AXES}
     return Request(
         f'{axis} to {math.degrees(aim):.1f} degrees', f'{device.prefix}cmd/angles', Vector3Stamped,
-        Vector3Stamped(header=Header(frame_id=device.values['angles'][0]), vector=vector),
-        {axis: aim})
+        Vector3Stamped(header=Header(frame_id=device.values['angles'][0]),
+                       vector=Vector3(**dict(zip('xyz', targets.values(), strict=True)))),
+        {one: target for one, target in targets.items() if math.isfinite(target)})
 
 
 def point(device: Device, typed: str) -> Request | str:
