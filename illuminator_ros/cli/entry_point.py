@@ -20,7 +20,6 @@ from collections.abc import Callable, Iterable, Sequence
 import io
 import os
 import re
-import signal
 import sys
 
 from .termination import Termination
@@ -42,7 +41,7 @@ CANNOT_CREATE = 'cannot create the node'
 
 
 def run_program(
-    name: str, run: Callable[[Termination], int], more: Iterable[signal.Signals] = (),
+    name: str, run: Callable[[Termination], int], more: Iterable[int] = (),
 ) -> int:
     """
     Run a program and return its exit status.

@@ -52,10 +52,10 @@ class Termination:
     :ivar is_terminal: whether stderr leads to a terminal.
     """
 
-    def __init__(self, more: Iterable[signal.Signals] = ()) -> None:
+    def __init__(self, more: Iterable[int] = ()) -> None:
         # sigwait() would return a blocked signal although it is ignored.
         ignored = {signal.SIGHUP} if signal.getsignal(signal.SIGHUP) == signal.SIG_IGN else set()
-        self._signals = {*SIGNALS, *more} - ignored
+        self._signals: set[int] = {*SIGNALS, *more} - ignored
         signal.pthread_sigmask(signal.SIG_BLOCK, self._signals)
         self.is_terminal = sys.stderr is not None and sys.stderr.isatty()
         self._output: OutputQueue | None = None

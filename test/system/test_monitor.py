@@ -56,7 +56,8 @@ def test_keys_switch_and_dim_the_light(own_ros: Ros, port: int) -> None:
 
 
 @pytest.mark.parametrize('way', [
-    'q', '\x03', 'SIGTERM', 'SIGQUIT', 'SIGHUP'])
+    'q', '\x03', 'SIGTERM', 'SIGQUIT', 'SIGHUP', 'SIGUSR1', 'SIGALRM', 'SIGABRT', 'SIGSEGV',
+    'SIGRTMAX'])
 def test_end_restores_the_terminal(own_ros: Ros, way: str) -> None:
     with monitor(own_ros) as screen:
         screen.wait_for('no devices in this ROS graph yet')
