@@ -14,12 +14,17 @@
 
 """The screen of the monitor, on terminals of every size and kind, its keys and its labels."""
 
-from illuminator_ros.cli.monitor.app import ACTIONS, COMMON_KEYS, QUESTION_LIFETIME
+import asyncio
+from typing import cast
+
+from illuminator_ros.cli.monitor.app import ACTIONS, COMMON_KEYS, MonitorApp, QUESTION_LIFETIME
+from illuminator_ros.cli.monitor.ros_graph import Graph
 from illuminator_ros.ros.monitor_view import DONE, FAILED
 import pytest
-from support.monitor import camera, gimbal, light, NOW, Screen, show
+from support.monitor import camera, FakeGraph, gimbal, light, NOW, Screen, show
 from textual.color import Color
 from textual.events import Paste
+from textual.widgets import Static
 
 SIZES = [(500, 500), (200, 50), (80, 24), (40, 44), (20, 6), (12, 3), (5, 2), (1, 1)]
 
@@ -65,6 +70,17 @@ def test_state_is_a_word_and_not_only_a_colour() -> None:
         assert 'nothing heard for 30 s' in screen.text
 
     show(test, light(), gone, light('/lost', connected=False))
+
+
+def test_poll_before_the_screen_exists_is_shown_on_it() -> None:
+    app = MonitorApp(cast(Graph, FakeGraph(light())))
+    app.poll()
+
+    async def run() -> None:
+        async with app.run_test(size=(132, 40)):
+            assert '/bow' in app.query_one('#details', Static).render_line(0).text
+
+    asyncio.run(run())
 
 
 def test_last_request_is_shown_with_its_answer_and_age() -> None:
@@ -216,7 +232,7 @@ def test_place_is_typed_or_pasted_corrected_and_sent_with_enter() -> None:
     async def test(screen: Screen) -> None:
         await screen.press('p', *'47.1', 'backspace', '3', 'space', *'8.5')
         screen.app.post_message(Paste(' 480'))
-        await screen.pilot.pause()
+        await screen.settle()
         assert '47.3 8.5 480_' in screen.text
         await screen.press('enter', 'p', '1', 'escape', 'p', 'enter')
 

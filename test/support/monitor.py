@@ -136,18 +136,27 @@ class Screen:
     async def press(self, *keys: str) -> None:
         """Press keys, and let the monitor act on them."""
         await self.pilot.press(*keys)
+        await self.settle()
+
+    async def settle(self) -> None:
+        """Wait until the events so far have gone from the application to its screen and back."""
+        for one in (self.app, self.app.screen, self.app):
+            handled = asyncio.Event()
+            if one.call_later(handled.set):
+                await handled.wait()
         await self.pilot.pause()
 
     async def wait(self, seconds: float = 0.0) -> None:
         """Let time pass for the monitor, and let it draw."""
         self.graph.now += seconds
         self.app.poll()
-        await self.pilot.pause()
+        await self.settle()
 
     async def click(self, label: str) -> None:
         """Click a text."""
         [(x, y)] = [(line.index(label), y) for y, line in enumerate(self.lines) if label in line]
         await self.pilot.click(offset=(x + 1, y))
+        await self.settle()
 
 
 def show(

@@ -87,11 +87,13 @@ class MonitorApp(App[None], inherit_bindings=False):
         self._question: tuple[str, Callable[[str], Request | str], bool, float] | None = None
         self._typed = ''
         self._lines: list[Device | Cell] = []
+        # Held here, since a poll may come before they are on the screen.
+        self._parts = {name: Static(id=name) for name in ('devices', 'details', 'bar')}
         self._shown: dict[str, Content] = {}
 
     def compose(self) -> ComposeResult:
         """See :meth:`App.compose`."""
-        yield from (Static(id=name) for name in ('devices', 'details', 'bar'))
+        yield from self._parts.values()
 
     def on_mount(self) -> None:
         """Begin to poll."""
@@ -206,7 +208,8 @@ class MonitorApp(App[None], inherit_bindings=False):
         if device not in devices:
             before = [one for one in devices if device is not None and one.name < device.name]
             self._select(next(iter(before[-1:] or devices), None))
-        self.screen.set_class(self.size.height < 12, 'low')
+        for name in ('details', 'bar'):
+            self._parts[name].display = self.size.height >= 12
         self._show('devices', self._help() if self._mode == HELP else self._list())
         self._show('details', Content('\n').join(
             Content.assemble((f'{label:8}', 'bold'), *cells) for label, cells in (
@@ -220,10 +223,10 @@ class MonitorApp(App[None], inherit_bindings=False):
             content = Content(shown, [*content.spans])
         if name not in self._shown or not content.is_same(self._shown[name]):
             self._shown[name] = content
-            self.query_one(f'#{name}', Static).update(content, layout=name != 'devices')
+            self._parts[name].update(content, layout=name != 'devices')
 
     def _list(self) -> Content:
-        width, height = self.query_one('#devices').size
+        width, height = self._parts['devices'].size
         lines: list[Device | Cell] = []
         name_width = max((len(one.name) for one in self._graph.devices), default=0)
         name_width = max(min(name_width, width // 3), 14)
