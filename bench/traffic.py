@@ -82,26 +82,27 @@ class Line:
     """
     A way to one receiver, which must be ready before frames are fed.
 
+    :ivar port: of UDP or TCP.
     :ivar urls: the connection URL of the bridge, that of pymavlink, the arguments of
         ``peers/bare_receiver.py``.
     """
 
     def __init__(self, transport: str) -> None:
         self._sent = 0
-        self._port = free_port(socket.SOCK_STREAM)
-        at = f'127.0.0.1:{self._port}'
+        self.port = free_port(socket.SOCK_STREAM)
+        at = f'127.0.0.1:{self.port}'
         self._stack = contextlib.ExitStack()
         self._send: Callable[[Sequence[bytes]], None]
         self.urls: tuple[str, str, tuple[object, ...]]
         if transport == 'UDP':
             self._socket = self._stack.enter_context(socket.socket(type=socket.SOCK_DGRAM))
-            self._socket.connect(('127.0.0.1', self._port))
-            self.urls = f'udpin://{at}', f'udpin:{at}', ('udp', self._port)
+            self._socket.connect(('127.0.0.1', self.port))
+            self.urls = f'udpin://{at}', f'udpin:{at}', ('udp', self.port)
             self._send = self._send_datagrams
         elif transport == 'TCP':
             self._socket = self._stack.enter_context(
-                socket.create_server(('127.0.0.1', self._port)))
-            self.urls = f'tcpout://{at}', f'tcp:{at}', ('tcp', self._port)
+                socket.create_server(('127.0.0.1', self.port)))
+            self.urls = f'tcpout://{at}', f'tcp:{at}', ('tcp', self.port)
             self._send = self._send_stream
         else:
             far, near = os.openpty()
@@ -130,6 +131,10 @@ class Line:
             with contextlib.suppress(ConnectionError):
                 self._socket.send(frame)
 
+    def next_of(self, prepared: Sequence[bytes]) -> bytes:
+        """Return the frame that is sent next."""
+        return prepared[self._sent % len(prepared)]
+
     def feed(self, prepared: Sequence[bytes], rate: float, count: int) -> None:
         """
         Send frames.
@@ -143,7 +148,7 @@ class Line:
                 due = min(int((time.monotonic() - began) * rate) + 1, count)
             else:
                 due = min(done + CHUNK, count)
-                while self._is_udp and _queued(self._port) > FULL:
+                while self._is_udp and _queued(self.port) > FULL:
                     time.sleep(0.0002)
             at = self._sent % len(prepared)
             part = prepared[at:at + due - done]

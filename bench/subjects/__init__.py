@@ -19,5 +19,6 @@ SUBJECTS = {
     'enable': 'services', 'status': 'topics', 'gimbal': 'topics',
     'gimbal_manager': 'gimbal_manager', 'foreign': 'receiving', 'burst': 'receiving',
     'noise': 'receiving', 'memory': 'process', 'startup': 'services', 'overhead': 'link',
+    'forward': 'forwarding',
     'lights': 'link', 'nodes': 'process', 'reconnection': 'link', 'loss': 'link',
     'parallel': 'services', 'rededge': 'rededge', 'limits': 'services'}
