@@ -41,6 +41,7 @@ def test_gm_27_gimbal_is_found_by_the_information_of_its_manager() -> None:
     assert rig.all_of(events.GimbalFound) == [events.GimbalFound(GimbalKey(DEVICE))]
     assert rig.all_of(events.GimbalConnected) == [
         events.GimbalConnected(GimbalKey(DEVICE), AUTOPILOT)]
+    assert not rig.all_of(events.GimbalLost)
     assert [target for _, target in requests(rig)].count(AUTOPILOT) == 1
     snapshot = rig.gimbal.snapshot(rig.now)
     assert (snapshot.unreachable, snapshot.managers) == ('', (AUTOPILOT,))

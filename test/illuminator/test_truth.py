@@ -143,6 +143,20 @@ def test_a_status_from_before_the_last_repeat_does_not_confirm(
     assert not faked.wait_for(answer).success
 
 
+@pytest.mark.parametrize('retries', [0, 2])
+def test_a_command_is_acknowledged_once_more_than_the_tries_of_a_lost_one_before_it(
+    fake: FakeLight, retries: int,
+) -> None:
+    # Each acknowledgement may belong to a late ON, which undoes the OFF before it.
+    pair = Pair(fake, command_retries=retries).settle()
+    fake.results[ON_OFF] = None
+    assert not pair.enable(True).success
+    fake.results[ON_OFF] = mavlink.MAV_RESULT_ACCEPTED
+    begun = pair.now
+    assert pair.enable(False).success
+    assert [one.param1 for one in pair.commands(ON_OFF, since=begun)] == [0.0] * (retries + 2)
+
+
 def test_a_status_that_comes_sooner_than_any_answer_does_not_confirm(fake: FakeLight) -> None:
     # A copy of an earlier ON arrives late, and is undone before the present ON arrives. The light
     # acknowledges and shows the copy after the present ON was sent and before it can arrive.
