@@ -155,6 +155,17 @@ def test_gm_10_information_does_not_wait_for_a_device_that_reports_progress_for_
     assert rig.result(PILOT, request(GimbalManagerInformation)) == mavlink.MAV_RESULT_ACCEPTED
 
 
+def test_gm_10_no_information_is_requested_once_it_has_come_without_an_acknowledgement() -> None:
+    rig = ManagerRig(active=False, lost=(math.inf, 0))
+    rig.run(0.1)
+    rig.component.receive(DEVICE, rig.device_information, rig.now)
+
+    rig.run(60.0)
+
+    [_] = [one for one in rig.messages(mav.CommandLong)
+           if one.param1 == GimbalDeviceInformation.id and not one.confirmation]
+
+
 def test_the_manager_passes_on_the_information_of_its_device() -> None:
     rig = ManagerRig()
 

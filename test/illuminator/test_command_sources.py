@@ -328,6 +328,27 @@ def test_a_light_that_may_go_on_after_its_release_goes_off_where_release_is_off(
     assert 0.0 in shared.sent(ON_OFF, released_at)
 
 
+def test_values_that_wait_when_a_light_is_released_do_not_switch_it_on_later() -> None:
+    shared = Shared(off_on_release=True, timeout=60.0)
+    light, pair = shared.light, shared.pair
+    light.brightness_is_switch = True
+    pair.settle()
+    light.fields['enable'] = 1
+    pair.run(1.0)
+    light.fields |= {'enable': 0, 'brightness': 0.0}
+    pair.run(1.0)
+    pair.wait_for(shared.enable('operator', False))
+    light.results[CONFIGURE] = None
+    pair.light.set_desired({'brightness': 20.0}, pair.now)
+    # The second try of the values was sent 2.4 s ago, and the third one is due in 0.3 s.
+    pair.run(4.4)
+    shared.release('operator')
+    light.results.clear()
+    pair.run(1.0)
+
+    assert light.fields['enable'] == 0
+
+
 def test_an_off_at_a_release_is_repeated_though_a_source_that_dims_takes_the_light() -> None:
     shared = Shared(off_on_release=True, timeout=60.0)
     shared.pair.settle()
