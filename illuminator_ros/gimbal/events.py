@@ -176,6 +176,7 @@ class GimbalSnapshot:
     :param attitude_at: when the last attitude status came, s; -inf if none has.
     :param attitude_problem: why the last status has no attitude, '' if it has one.
     :param control: the components in control, None if they are not known.
+    :param control_since: when that changed last, s.
     :param in_control: whether this component has primary control.
     :param status_at: when the last GIMBAL_MANAGER_STATUS came, s; -inf if none has.
     :param enforces_control: False if the manager is known to obey components without control.
@@ -196,6 +197,7 @@ class GimbalSnapshot:
     flags: int
     errors: int
     control: Control | None
+    control_since: float
     in_control: bool
     status_at: float
     enforces_control: bool

@@ -229,7 +229,7 @@ class Gimbal:
         control = self._manager.known_control(now)
         if control == self._control.known:
             return
-        is_first = self._control.update(control, self._manager)
+        is_first = self._control.update(control, self._manager, now)
         if control is None:
             # The manager that had shown this component in control takes the zero.
             last = self._manager.control if self._manager.is_heard(now) else None
@@ -576,5 +576,6 @@ class Gimbal:
             self.key, self.unreachable(now), self._managers.addresses, self._capabilities(),
             device.ranges or (read_ranges(information) if information else None),
             device.identity, device.attitude, device.attitude_at, device.problem, device.flags,
-            device.errors, self._control.known, self.in_control, manager.status_at,
-            manager.enforces_control, self._setpoints.sent, sources.shown_holder, sources.since)
+            device.errors, self._control.known, self._control.since, self.in_control,
+            manager.status_at, manager.enforces_control, self._setpoints.sent,
+            sources.shown_holder, sources.since)

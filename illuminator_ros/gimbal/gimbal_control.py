@@ -36,6 +36,7 @@ class GimbalControl:
     :param us: the address of this component.
     :param emit: takes the events.
     :ivar known: the components in control, None if they are not known.
+    :ivar since: when that changed last, s.
     :ivar take_due: whether control must be taken as soon as no component has it.
     """
 
@@ -43,6 +44,7 @@ class GimbalControl:
         self, key: events.GimbalKey, us: Address, emit: Callable[[events.GimbalEvent], None],
     ) -> None:
         self.known: Control | None = None
+        self.since = 0.0
         self.take_due = False
         self._key = key
         self._us = us
@@ -61,9 +63,9 @@ class GimbalControl:
         """Whether this component has primary or secondary control, as far as it is known."""
         return self._may_have_it or (self.known is not None and self.known.includes(self._us))
 
-    def update(self, control: Control | None, manager: RemoteManager) -> bool:
+    def update(self, control: Control | None, manager: RemoteManager, now: float) -> bool:
         """Take a change of the known control; return whether it was never known before."""
-        before, self.known = self._last, control
+        before, self.known, self.since = self._last, control, now
         self._last = control or before
         self._emit(events.ControlChanged(
             self._key, before, control, self.is_ours,

@@ -200,6 +200,18 @@ def test_details_have_what_is_known(one: shared.Device, texts: list[str]) -> Non
     assert [text for text in texts if text not in shown] == []
 
 
+def test_control_and_image_from_before_the_monitor_are_those_of_the_diagnostics() -> None:
+    turned, shot = gimbal(), camera()
+    turned.diagnoses['device'] = shared.Diagnosis(0, 'in control', {'controller_s': '90.2'})
+    del shot.values['image/index']
+    shot.diagnoses['camera'] = shared.Diagnosis(0, 'connected', {'image_index': '6'})
+
+    assert ('control', ['ours: ', 'primary 1/194', ' for 90 s']) in turned.view.details(turned)
+    assert ('image', ['6, at 47.300000 8.500000 480.0 m']) in shot.view.details(shot)
+    turned.changed_at['controller'] = NOW - 1
+    assert ('control', ['ours: ', 'primary 1/194', ' for 1 s']) in turned.view.details(turned)
+
+
 def test_nothing_known_is_shown_as_unknown() -> None:
     for one in (light(), gimbal(), camera()):
         one.values.clear()

@@ -133,6 +133,7 @@ def _values(gimbal: GimbalSnapshot, now: float) -> dict[str, diagnostics.Value]:
         'connected': not gimbal.unreachable,
         'in_control': gimbal.in_control,
         'controller': controller(gimbal.control),
+        'controller_s': None if gimbal.control is None else now - gimbal.control_since,
         'control_enforced': None if gimbal.enforces_control else False,
         'setpoints_sent': gimbal.setpoints_sent,
         'failure_flags': gimbal.errors,

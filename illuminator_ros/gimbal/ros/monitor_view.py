@@ -102,9 +102,11 @@ def _details(device: Device) -> Iterable[shared.Line]:
             low, high = high, low
         yield axis, [(shared.dial(angle(device, axis), low, high, DIAL_WIDTH), 'cyan'),
                      f' {described(device, axis)}']
-    since = device.since('controller')
+    # The diagnostics also know it from before this monitor, but up to a second later.
+    known = device.number('device', 'controller_s')
+    since = device.since('controller') or (known is not None and shared.age(known))
     yield 'control', ['ours: ' if device.values.get('in_control') else '',
-                      device.values.get('controller', 'unknown'), since and f' for {since}']
+                      device.values.get('controller', 'unknown'), f' for {since}' * bool(since)]
 
 
 VIEW = shared.View(

@@ -44,7 +44,9 @@ def inputs(device: Device) -> Iterable[tuple[str, str, str]]:
 
 
 def _image(device: Device) -> str:
-    index, since = device.values.get('image/index', UNKNOWN), device.since('image/index')
+    # The diagnostics also have the number of an image from before this monitor.
+    known = device.diagnosed('camera', 'image_index') or UNKNOWN
+    index, since = device.values.get('image/index', known), device.since('image/index')
     return f'{index}' + (since and f', {since} ago')
 
 
