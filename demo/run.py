@@ -223,7 +223,7 @@ NEXT = """
 Go on with these three, each in a terminal of its own:
   {python} -m illuminator_ros.simulator   # a light on the screen; type "help"
   {python} -m illuminator_ros.bridge      # finds that light
-  {python} -m illuminator_ros.monitor     # all lights, switched with keys
+  {python} -m illuminator_ros.monitor     # all devices, operated with keys
 """
 
 
