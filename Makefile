@@ -7,7 +7,7 @@ SECONDS ?= 60
 # Arguments of bench/run.py, such as '--repeat 3 enable'.
 BENCH ?=
 
-.PHONY: help demo test check lint unit fuzz soak bench pictures clean environment
+.PHONY: help demo test check lint unit fuzz soak bench pictures doc-tables clean environment
 
 help:
 	@echo 'make demo    run a simulated light and a camera with their nodes, and show what they do'
@@ -19,6 +19,7 @@ help:
 	@echo 'make soak    run simulator and bridge with random faults for SECONDS=60'
 	@echo 'make bench   measure each target beside its peers, 5 minutes; options in BENCH'
 	@echo 'make pictures  draw the pictures of the documentation again, half a minute'
+	@echo 'make doc-tables  write the tables of the documentation that the code knows'
 	@echo 'make clean   remove .venv and all build files'
 
 environment:
@@ -34,7 +35,7 @@ unit: environment
 	@$(PYTHON_IN_VENV) -m pytest -p support.no_ros test/mavlink test/transport test/payload \
 		test/illuminator test/rededge test/gimbal test/payloads test/simulator \
 		test/conformance test/cli test/docs/test_links.py test/docs/test_tool_pages.py \
-		test/docs/test_payload_pages.py
+		test/docs/test_payload_pages.py test/docs/test_tables.py
 
 check: environment
 	@$(PYTHON_IN_VENV) -m ruff check .
@@ -54,6 +55,9 @@ bench: environment
 
 pictures: environment
 	@$(PYTHON_IN_VENV) demo/pictures.py
+
+doc-tables: environment
+	@$(PYTHON_IN_VENV) -m tools.doc_tables
 
 clean:
 	rm -rf .venv build install log .pytest_cache .mypy_cache .ruff_cache .hypothesis

@@ -12,14 +12,13 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""The pages about gimbals and the camera: their rules, poses and fields."""
+"""The pages about gimbals and the camera: their rules and poses."""
 
 import math
 import re
 
 from illuminator_ros.payload.mount_attitude import to_mavlink, YawFrame
 from illuminator_ros.payload.rotation import Quaternion
-from illuminator_ros.rededge.conversions import FIELDS
 import pytest
 from support.processes import ROOT
 from support.tables import table
@@ -35,15 +34,6 @@ def test_each_requirement_on_the_camera_is_listed_and_has_a_test() -> None:
 
     assert listed == [f'RE-{number}' for number in range(1, 31)]
     assert {*listed} == tested
-
-
-def test_the_page_of_the_camera_has_the_table_of_fields() -> None:
-    assert table(REDEDGE, 'message') == [
-        [cls.msgname, f'`{name}`', field.source, field.unit,
-         '' if field.scale is None else f'{field.scale:g}',
-         f'{field.low:.10g} to {field.high:.10g}',
-         '' if field.unknown is None else str(field.unknown)]
-        for cls, fields in FIELDS.items() for name, field in fields.items()]
 
 
 def numbers(cell: str) -> list[float]:

@@ -25,9 +25,8 @@ from illuminator_ros.cli.payloads import PAYLOADS
 from illuminator_ros.gimbal.ros.gimbals import GIMBAL_PARAMETERS
 from illuminator_ros.gimbal.ros.manager_node import MANAGER_PARAMETERS
 from illuminator_ros.illuminator.messages import IlluminatorStatus
-from illuminator_ros.illuminator.ros.diagnostics import FLAG_LEVELS
 from illuminator_ros.illuminator.ros.parameters import DEVICE_PARAMETERS, LIGHT_PARAMETERS
-from illuminator_ros.mavlink.dialect import entry_names, mavlink, short_names
+from illuminator_ros.mavlink.dialect import entry_names, mavlink
 from illuminator_ros.mavlink.messages import CommandAck, ComponentInformationBasic
 from illuminator_ros.rededge.ros import camera_node as camera
 from illuminator_ros.ros import monitor_view
@@ -36,6 +35,7 @@ from illuminator_ros.ros.parameters import ParameterSpec
 import pytest
 from support.processes import ROOT
 from support.tables import parameter_file, table
+from tools.doc_tables import values_of
 
 README = (ROOT / 'README.md').read_text()
 YAML = (ROOT / 'config' / 'bridge.yaml').read_text()
@@ -47,41 +47,6 @@ URL, CAMERA_URL = (
     SHARED_PARAMETERS[0]._replace(default=default)
     for default in (SHARED_PARAMETERS[0].default, camera.REDEDGE.link_defaults['connection_url']))
 PARAMETERS = (*LINK_PARAMETERS, *DEVICE_PARAMETERS)
-LEVELS = {b'\0': 'OK', b'\1': 'WARN', b'\2': 'ERROR'}
-
-
-def range_of(spec: ParameterSpec) -> str:
-    """Return the values that a parameter may have, as the reference shows them."""
-    return ', '.join(f'`{one}`' for one in spec.choices) or spec.shown_range
-
-
-def meaning_of(spec: ParameterSpec) -> str:
-    """Return the meaning of a parameter as tools show it, without choices and unit."""
-    extra = spec.descriptor(read_only=False).additional_constraints
-    return spec.description if not extra or spec.choices else f'{spec.description}; {extra}'
-
-
-@pytest.mark.parametrize(('page', 'heading', 'specs'), [
-    ('reference', 'parameter of the link', LINK_PARAMETERS),
-    ('gimbal', 'parameter of the gimbal', GIMBAL_PARAMETERS),
-    ('gimbal_manager', 'parameter of the manager', MANAGER_PARAMETERS),
-    ('rededge', 'parameter of the camera', CAMERA_PARAMETERS)],
-    ids=['link', 'gimbal', 'manager', 'camera'])
-def test_a_page_has_each_parameter(
-    page: str, heading: str, specs: Sequence[ParameterSpec],
-) -> None:
-    document = (ROOT / 'doc' / f'{page}.md').read_text().replace('`', '')
-
-    assert table(document, heading) == [
-        [spec.name, spec.shown_default, spec.shown_range, spec.unit, meaning_of(spec)]
-        for spec in specs]
-
-
-def test_the_reference_has_the_parameters_of_the_light() -> None:
-    kinds = {float: 'double', str: 'string'}
-    assert table(REFERENCE, 'parameter of the light') == [
-        [f'`{spec.name}`', kinds[type(spec.default)], range_of(spec), spec.unit,
-         meaning_of(spec)] for spec in DEVICE_PARAMETERS]
 
 
 # While geoid_separation is not set, the diagnostics of the camera warn.
@@ -100,7 +65,7 @@ def test_a_parameter_file_has_each_parameter_with_its_default(
 
 @pytest.mark.parametrize('spec', PARAMETERS, ids=lambda spec: spec.name)
 def test_parameter_file_and_help_have_each_parameter_with_its_unit(spec: ParameterSpec) -> None:
-    limits = f'{range_of(spec)} {spec.unit}'.replace('`', '').strip()
+    limits = f'{values_of(spec)} {spec.unit}'.replace('`', '').strip()
     shown = re.escape(spec.description + (f' ({limits})' if limits else ''))
     unit = f'# {re.escape(spec.unit)}(,|$)' if spec.unit else ''
 
@@ -139,29 +104,18 @@ def test_the_protocol_page_has_each_field_of_a_message(message: Any) -> None:
     assert fields[message.msgname] == {*message.fieldnames}
 
 
-def test_the_protocol_page_has_each_command_and_error_flag() -> None:
+def test_the_protocol_page_has_each_command() -> None:
     assert {cells[0] for cells in table(PROTOCOL, 'command')} == {
         f'{entry_names("MAV_CMD")[command]} ({command})' for command in (
             mavlink.MAV_CMD_ILLUMINATOR_ON_OFF, mavlink.MAV_CMD_DO_ILLUMINATOR_CONFIGURE,
             mavlink.MAV_CMD_SET_MESSAGE_INTERVAL, mavlink.MAV_CMD_REQUEST_MESSAGE)}
-    rows = {cells[0]: cells[1:] for cells in table(PROTOCOL, 'ILLUMINATOR_ERROR_FLAGS')}
-    for flag, name in short_names('ILLUMINATOR_ERROR_FLAGS').items():
-        level, text = FLAG_LEVELS[flag]
-        assert rows[f'{name} ({flag})'] == [LEVELS[level], text]
 
 
-def test_the_monitor_page_has_the_keys_states_topics_and_limits_of_the_code() -> None:
+def test_the_monitor_page_has_the_states_topics_and_limits_of_the_code() -> None:
     app = pytest.importorskip('illuminator_ros.cli.monitor.app')
     web = pytest.importorskip('illuminator_ros.cli.monitor.web')
     views = [one.load('view') for one in PAYLOADS.values() if one.view]
 
-    def keys(heading: str) -> list[tuple[tuple[str, ...], str]]:
-        return [(tuple(re.findall('`([^`]+)`', cells[0])), cells[1])
-                for cells in table(MONITOR, heading)]
-
-    assert keys('key') == [(names, text) for names, text, _, _ in app.COMMON_KEYS]
-    for view in views:
-        assert keys(f'key for a {view.kind}') == [(key.keys, key.text) for key in view.keys]
     assert [[kind, topics] for kind, topics, _ in table(MONITOR, 'kind')] == [
         [view.kind, ', '.join(f'`{topic}`' for topic in view.signature)] for view in views]
     assert [word for cells in table(MONITOR, 'state') for word in re.findall('`(.+?)`', cells[0])

@@ -1,0 +1,55 @@
+# Copyright 2026 The illuminator_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""The tables that ``make doc-tables`` writes are those of the pages."""
+
+from pathlib import Path
+
+import pytest
+from tools.doc_tables import DOC, ros_tables, tool_tables, with_rows, written
+
+
+def differing(pages: dict[Path, str]) -> list[str]:
+    return [path.name for path, text in pages.items() if text != path.read_text()]
+
+
+def test_make_doc_tables_changes_no_table_of_the_tools() -> None:
+    assert differing(written(tool_tables())) == []
+
+
+def test_make_doc_tables_changes_no_table_of_ros_and_the_monitor() -> None:
+    pytest.importorskip('rclpy')
+    pytest.importorskip('textual')
+
+    assert differing(written(ros_tables())) == []
+
+
+def test_each_table_is_written_as_a_whole_and_nothing_else_changes() -> None:
+    tables = tool_tables()
+    pages = {path: path.read_text() for path in written(tables)}
+
+    for (page, heading), rows in tables.items():
+        text = pages[DOC / f'{page}.md']
+        emptied = with_rows(text, heading, [])
+
+        assert emptied.count('\n') == text.count('\n') - len([*rows])
+        assert with_rows(emptied, heading, rows) == text
+
+
+def test_a_table_that_a_page_has_not_or_has_twice_is_an_error() -> None:
+    table = '| fault | effect |\n|---|---|\n| `one` | two |\n'
+
+    for text in ('', table + '\n' + table):
+        with pytest.raises(ValueError, match="tables 'fault'"):
+            with_rows(text, 'fault', [])

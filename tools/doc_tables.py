@@ -1,0 +1,213 @@
+# Copyright 2026 The illuminator_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""
+Write the tables of the documentation whose rows the code knows.
+
+A table is found by the heading of its first column; headings and all else are written by hand.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Sequence
+from pathlib import Path
+import re
+import sys
+from typing import Any, TYPE_CHECKING
+
+from illuminator_ros.cli.payloads import PAYLOADS
+from illuminator_ros.cli.simulator.console import COMMANDS as CONSOLE_COMMANDS
+from illuminator_ros.cli.simulator.console import OTHERS
+from illuminator_ros.gimbal import simulated_device, simulated_manager
+from illuminator_ros.gimbal.checks import device, manager
+from illuminator_ros.illuminator.checks.requirements import REQUIREMENTS
+from illuminator_ros.illuminator.simulated import COMMANDS as LIGHT_COMMANDS
+from illuminator_ros.illuminator.simulated import SIMULATED
+from illuminator_ros.illuminator.simulated_properties import FAULTS, PROFILES
+from illuminator_ros.payload.checks.requirement import Requirement
+from illuminator_ros.payload.faults import FaultTable
+from illuminator_ros.payload.simulated import SimulatedType
+from illuminator_ros.rededge.checks import REQUIREMENTS as CAMERA_REQUIREMENTS
+from illuminator_ros.rededge.conversions import FIELDS
+from illuminator_ros.rededge.simulated import COLUMNS
+from illuminator_ros.rededge.simulated import SIMULATED as CAMERA
+
+if TYPE_CHECKING:
+    from illuminator_ros.ros.parameters import ParameterSpec
+
+DOC = Path(__file__).resolve().parent.parent / 'doc'
+Rows = Iterable[Sequence[str]]
+# The rows of each table, by page and heading.
+Tables = dict[tuple[str, str], Rows]
+
+
+def requirements(of: Sequence[Requirement[Any]], consent: str) -> Rows:
+    """Return the rows of requirements, with what they do to a device."""
+    notes = {(False, False): '', (True, False): 'changes', (True, True): consent}
+    return [[f'`{one.name}`', one.title, f'[{one.specification.title}], {one.section}',
+             notes[one.changes, one.needs_consent]] for one in of]
+
+
+def faults(of: FaultTable) -> list[list[str]]:
+    """Return the rows of faults, with what they do without a value."""
+    return [[f'`{name}={fault.metavar}`' if fault.metavar else f'`{name}`',
+             fault.description, fault.default_text] for name, fault in of.items()]
+
+
+def settings(of: SimulatedType[Any]) -> list[list[str]]:
+    """Return the rows of the settings of a simulated device."""
+    return [[f'`{name}`', setting.metavar, setting.help]
+            for name, setting in of.all_settings.items()]
+
+
+def of_both(device: list[list[str]], manager: list[list[str]]) -> Rows:
+    """Return the rows of devices and managers; a row of only one of them ends with its name."""
+    return [*([*row, '' if row in manager else 'device'] for row in device),
+            *([*row, 'manager'] for row in manager if row not in device)]
+
+
+def tool_tables() -> Tables:
+    """Return the tables of the tools that need no ROS."""
+    return {
+        ('conformance', 'requirement'): requirements(REQUIREMENTS, 'dazzles'),
+        ('conformance', 'requirement on a gimbal'): requirements(device.REQUIREMENTS, 'moves'),
+        ('conformance', 'requirement on a gimbal manager'): requirements(
+            manager.REQUIREMENTS, 'moves'),
+        ('conformance', 'requirement on a camera'): requirements(CAMERA_REQUIREMENTS, 'images'),
+        ('rededge', 'message'): [
+            [cls.msgname, f'`{name}`', field.source, field.unit,
+             '' if field.scale is None else f'{field.scale:g}',
+             f'{field.low:.10g} to {field.high:.10g}',
+             '' if field.unknown is None else str(field.unknown)]
+            for cls, fields in FIELDS.items() for name, field in fields.items()],
+        ('simulator', 'command'): [
+            *([f'`{one.usage}`', one.help] for one in LIGHT_COMMANDS),
+            *([f'`{one.usage}`', one.help] for one in CONSOLE_COMMANDS),
+            *([f'`{name}`', text] for name, text in OTHERS)],
+        ('simulator', 'setting'): settings(SIMULATED),
+        ('simulator', 'profile'): [
+            [f'`{name}`', profile.description] for name, profile in PROFILES.items()],
+        ('simulator', 'fault'): faults(FAULTS),
+        ('simulator', 'profile of a manager'): [
+            [f'`{name}`', profile.description]
+            for name, profile in simulated_manager.PROFILES.items()],
+        ('simulator', 'command of a gimbal'): [
+            [f'`{one.usage}`', one.help] for one in simulated_device.COMMANDS],
+        ('simulator', 'setting of a gimbal'): of_both(*(
+            [row for row in settings(one) if row[0] != '`fault`']
+            for one in (simulated_device.SIMULATED, simulated_manager.SIMULATED))),
+        ('simulator', 'fault of a gimbal'): of_both(
+            faults(simulated_device.FAULTS), faults(simulated_manager.FAULTS)),
+        ('simulator', 'command of a camera'): [
+            [f'`{one.usage}`', one.help] for one in CAMERA.device.commands],
+        ('simulator', 'setting of a camera'): settings(CAMERA),
+        ('simulator', 'fault of a camera'): faults(CAMERA.device.faults),
+        ('simulator', 'column'): [[f'`{name}`', text] for name, text in COLUMNS.items()],
+    }
+
+
+def values_of(spec: ParameterSpec) -> str:
+    """Return the values that a parameter may have."""
+    return ', '.join(f'`{one}`' for one in spec.choices) or spec.shown_range
+
+
+def meaning_of(spec: ParameterSpec) -> str:
+    """Return the meaning of a parameter as tools show it, without choices and unit."""
+    extra = spec.descriptor(read_only=False).additional_constraints
+    text = spec.description if not extra or spec.choices else f'{spec.description}; {extra}'
+    # Topics, and the example of names.
+    return re.sub(r'(~/[\w/]*\w|\d+/\d+=\w+)', r'`\1`', text)
+
+
+def parameters(of: Sequence[ParameterSpec]) -> Rows:
+    """Return the rows of parameters, with their defaults."""
+    return [[f'`{spec.name}`', f'`{spec.shown_default}`' if spec.shown_default else '',
+             values_of(spec), spec.unit, meaning_of(spec)] for spec in of]
+
+
+def ros_tables() -> Tables:
+    """Return the tables of the ROS interface and of the monitor."""
+    from illuminator_ros.cli.monitor import app
+    from illuminator_ros.gimbal.ros.gimbals import GIMBAL_PARAMETERS
+    from illuminator_ros.gimbal.ros.manager_node import MANAGER_PARAMETERS
+    from illuminator_ros.illuminator.ros.diagnostics import FLAG_LEVELS
+    from illuminator_ros.illuminator.ros.parameters import DEVICE_PARAMETERS, LIGHT_PARAMETERS
+    from illuminator_ros.mavlink.dialect import short_names
+    from illuminator_ros.rededge.ros import camera_node as camera
+    from illuminator_ros.ros.parameters import LINK_PARAMETERS
+
+    kinds = {float: 'double', str: 'string'}
+    levels = {b'\0': 'OK', b'\1': 'WARN', b'\2': 'ERROR'}
+    views = [one.load('view') for one in PAYLOADS.values() if one.view]
+
+    def names(keys: Iterable[str]) -> str:
+        return ' '.join(f'`{key}`' for key in keys)
+
+    return {
+        ('reference', 'parameter of the light'): [
+            [f'`{spec.name}`', kinds[type(spec.default)], values_of(spec), spec.unit,
+             meaning_of(spec)] for spec in DEVICE_PARAMETERS],
+        ('reference', 'parameter of the link'): parameters(
+            (*LINK_PARAMETERS, *LIGHT_PARAMETERS)),
+        ('gimbal', 'parameter of the gimbal'): parameters(GIMBAL_PARAMETERS),
+        ('gimbal_manager', 'parameter of the manager'): parameters(MANAGER_PARAMETERS),
+        ('rededge', 'parameter of the camera'): parameters(
+            (*camera.PARAMETERS, *camera.MOUNT_PARAMETERS)),
+        ('protocol', 'ILLUMINATOR_ERROR_FLAGS'): [
+            *([f'{name} ({flag})', levels[FLAG_LEVELS[flag][0]], FLAG_LEVELS[flag][1]]
+              for flag, name in short_names('ILLUMINATOR_ERROR_FLAGS').items()),
+            ['any other', 'WARN', 'unknown flags, in hexadecimal']],
+        ('monitor', 'key'): [[names(keys), text] for keys, text, _, _ in app.COMMON_KEYS],
+        **{('monitor', f'key for a {view.kind}'): [
+            [names(key.keys), key.text] for key in view.keys] for view in views},
+    }
+
+
+def with_rows(text: str, heading: str, rows: Rows) -> str:
+    """Return a page with these rows in the table whose first column has this heading."""
+    # A function: a row may contain backslashes.
+    text, count = re.subn(
+        rf'(^\| {re.escape(heading)} \|.*\n\|[-|]+\n)(?:\|.*\n)*',
+        lambda found: found[1] + ''.join(f'| {" | ".join(row)} |\n' for row in rows),
+        text, flags=re.MULTILINE)
+    if count != 1:
+        raise ValueError(f'{count} tables {heading!r}')
+    return text
+
+
+def written(tables: Tables) -> dict[Path, str]:
+    """Return the pages as they are with these tables."""
+    pages: dict[Path, str] = {}
+    for (page, heading), rows in tables.items():
+        path = DOC / f'{page}.md'
+        pages[path] = with_rows(pages.get(path) or path.read_text(), heading, rows)
+    return pages
+
+
+def main() -> None:
+    """Write all tables; without ROS, those that need none."""
+    sources: list[Callable[[], Tables]] = [tool_tables, ros_tables]
+    for source in sources:
+        try:
+            pages = written(source())
+        except ModuleNotFoundError as error:
+            print(f'tables of the ROS interface are left as they are: {error}', file=sys.stderr)
+            continue
+        for path, text in pages.items():
+            if text != path.read_text():
+                path.write_text(text)
+                print(f'wrote {path}')
+
+
+if __name__ == '__main__':
+    main()
