@@ -74,6 +74,16 @@ def test_gm_16_control_is_taken_and_released_as_the_status_shows(secondary: mav.
         (False, False), (True, False), (False, False)]
 
 
+def test_time_of_control_is_that_of_its_last_change() -> None:
+    rig = Rig(FakeManager(primary=OTHER)).run(3.0)
+    taken_at = rig.now
+    assert rig.gimbal.snapshot(rig.now).control_since < taken_at - 2.0
+
+    assert asked(rig, Gimbal.take_control, 10.0)[0]
+
+    assert taken_at <= rig.gimbal.snapshot(rig.now).control_since < taken_at + 1.5
+
+
 @pytest.mark.parametrize(('fields', 'text'), [
     ({'results': {CONFIGURE: mavlink.MAV_RESULT_DENIED}},
      'manager 1/1 refused "take control": MAV_RESULT_DENIED (1 try, 0 ms); '

@@ -21,7 +21,6 @@ import contextlib
 import math
 from pathlib import Path
 import signal
-import time
 from typing import Any
 
 from illuminator_ros.gimbal.messages import (
@@ -64,8 +63,6 @@ from support.waiting import eventually  # noqa: E402
 
 EARTH, VEHICLE = Header(frame_id='map'), Header(frame_id='base_link_stabilized')
 # 45 degrees down and 30 to the left of the vehicle, in ROS and in MAVLink.
-# Before the gimbal and its node.
-BEGAN = time.monotonic()
 ROS_ANGLES = (0.0, math.radians(45), math.radians(30))
 TURNED = Quaternion.from_euler(*ROS_ANGLES)
 NODE_PARAMETERS = ('use_sim_time', 'start_type_description_service')
@@ -350,7 +347,7 @@ def test_diagnostics_name_flags_limits_identity_and_control(
             'yaw_frame': 'vehicle', 'pitch_rad': '0.785398', 'pitch_min_rad': '-0.5',
             'pitch_max_rad': '1.5'}.items() <= shown.items()
     assert 'has yaw lock' in shown['capabilities']
-    assert 0.0 <= float(shown['controller_s']) <= time.monotonic() - BEGAN
+    assert float(shown['controller_s']) >= 0.0
 
     gimbal.failure_flags = (mavlink.GIMBAL_DEVICE_ERROR_FLAGS_MOTOR_ERROR
                             | mavlink.GIMBAL_DEVICE_ERROR_FLAGS_AT_PITCH_LIMIT | 1 << 20)
