@@ -173,6 +173,8 @@ class Gimbal:
 
     def components_lost(self, lost: Collection[Address], now: float, reason: str) -> None:
         """Record that some components cannot be reached, and the reason."""
+        if self.key.address in lost or self._manager.address in lost:
+            self._link_problem = reason
         self._managers.components_lost(lost, now, reason)
         if self.key.address in lost:
             self._device.heard_at = min(self._device.heard_at, now - SILENCE_LIMIT)
@@ -210,7 +212,7 @@ class Gimbal:
             return self._link_problem or silence(
                 f'manager {manager.address}', manager.heard_at, now)
         if now >= self._device.heard_at + SILENCE_LIMIT:
-            return silence(f'device {self.key}', self._device.heard_at, now)
+            return self._link_problem or silence(f'device {self.key}', self._device.heard_at, now)
         return ''
 
     def _check(self, now: float) -> None:

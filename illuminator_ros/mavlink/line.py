@@ -162,7 +162,7 @@ class Line:
     def write(self, frames: Sequence[bytes], peers: Sequence[Peer], now: float) -> None:
         """Send our frames to some of the peers, ahead of those that are forwarded."""
         channel, traffic = self._channel, self.receiver.traffic
-        if channel is None:
+        if channel is None or not frames:
             return
         dropped, size = channel.dropped, sum(map(len, frames))
         try:

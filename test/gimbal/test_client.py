@@ -198,6 +198,19 @@ def test_closed_link_loses_the_gimbal_at_once() -> None:
     assert not rig.run(3.0).gimbal.snapshot(rig.now).unreachable
 
 
+@pytest.mark.parametrize(('lost', 'is_connected'), [
+    (DEVICE, False), (AUTOPILOT, False), (OTHER, True)])
+def test_line_that_is_lost_beside_another_one_takes_the_gimbal_whose_device_or_manager_it_has(
+        lost: Address, is_connected: bool) -> None:
+    rig = Rig(FakeManager()).run(3.0)
+
+    rig.component.components_lost([lost], rig.now, 'cable pulled')
+
+    assert [event.reason for event in rig.all_of(events.GimbalLost)] == (
+        [] if is_connected else ['cable pulled'])
+    assert not rig.run(3.0).gimbal.snapshot(rig.now).unreachable
+
+
 @pytest.mark.parametrize('was_commanded', [False, True])
 def test_silent_gimbal_is_forgotten_unless_it_was_commanded(was_commanded: bool) -> None:
     rig = Rig(FakeManager()).run(3.0)

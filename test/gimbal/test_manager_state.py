@@ -80,6 +80,17 @@ def reached(state: ManagerState) -> ManagerRig:
     return rig
 
 
+@pytest.mark.parametrize('is_device', [False, True])
+def test_line_that_is_lost_beside_another_one_loses_the_device_if_it_has_it(
+        is_device: bool) -> None:
+    rig = reached(ManagerState.ACTIVE)
+    lost = rig.manager.tracker.device if is_device else OTHER
+    assert lost
+    rig.component.components_lost([lost], rig.now, 'cut')
+    assert rig.manager.tracker.state is (
+        ManagerState.NO_DEVICE if is_device else ManagerState.ACTIVE)
+
+
 @pytest.mark.parametrize('input_', ManagerInput)
 @pytest.mark.parametrize('state', ManagerState)
 def test_each_input_leads_to_the_state_of_the_table(

@@ -16,6 +16,7 @@
 
 from __future__ import annotations
 
+import functools
 from typing import Any
 
 from illuminator_ros.illuminator.light import Settings
@@ -73,6 +74,24 @@ def test_a_lost_link_loses_the_light_at_once_and_a_new_one_finds_it(pair: Pair) 
     pair.open()
     pair.run(0.1)
     assert pair.recorder.events[-1] == 'connected'
+
+
+def test_a_line_that_is_lost_beside_another_one_takes_its_lights_and_their_requests_only() -> None:
+    pair = Pair([IlluminatorProperties(address=mav.Address(1, number))
+                 for number in (10, 11)]).settle()
+    first, second = pair.controller.lights.values()
+    results: dict[mav.Address, Any] = {}
+    for light in (first, second):
+        light.enable(True, pair.now, functools.partial(
+            lambda address, result, now: results.update({address: result}), light.address))
+    pair.controller.components_lost([first.address], pair.now, 'unplugged')
+    assert (first.connected, second.connected) == (False, True)
+    assert [(address, result.success) for address, result in results.items()] == [
+        (first.address, False)]
+    assert 'lost' in results[first.address].message
+    pair.run(2.0)
+    assert results[second.address].success
+    assert first.connected
 
 
 def test_a_link_that_is_open_again_is_not_filled_with_requests() -> None:

@@ -142,8 +142,13 @@ def test_a_camera_is_lost_after_3_5_s_and_found_again_re_9() -> None:
     rig.hear(BEAT)
     assert rig.events[2:] == [CameraConnected(NEW)]
 
-    rig.component.link_closed(rig.now, 'unplugged')
+    rig.component.components_lost([ADOPTED], rig.now, 'unplugged')
+    assert rig.events[3:] == []
+    rig.component.components_lost([NEW], rig.now, 'unplugged')
     assert rig.events[3:] == [CameraLost(NEW, 'link lost: unplugged')]
+    rig.hear(BEAT)
+    rig.component.link_closed(rig.now, 'unplugged')
+    assert rig.events[4:] == [CameraConnected(NEW), CameraLost(NEW, 'link lost: unplugged')]
 
 
 def test_two_components_with_the_camera_s_id_are_noticed() -> None:

@@ -19,6 +19,7 @@ from __future__ import annotations
 import math
 import re
 from typing import Any
+from unittest.mock import Mock
 
 from diagnostic_msgs.msg import DiagnosticStatus
 from illuminator_ros.illuminator.events import LightSnapshot
@@ -31,9 +32,10 @@ from illuminator_ros.illuminator.ros.diagnostics import (
     reports,
 )
 from illuminator_ros.mavlink.dialect import mavlink
+from illuminator_ros.mavlink.link_state import LinkState
 from illuminator_ros.mavlink.messages import Address, heartbeat
 from illuminator_ros.mavlink.signing import Signing, SigningMode
-from illuminator_ros.ros.diagnostics import link_diagnostics
+from illuminator_ros.ros.diagnostics import line_reports, link_diagnostics
 import pytest
 from support.client import Client
 from support.fake_light import LIGHT, status_message
@@ -86,6 +88,26 @@ def found(status: DiagnosticStatus) -> tuple[bytes, str]:
 
 def value(status: DiagnosticStatus, key: str) -> str:
     return str({entry.key: entry.value for entry in status.values}[key])
+
+
+def test_each_further_line_has_a_status_and_a_loop_is_a_warning_that_names_both_lines() -> None:
+    reported = Reported()
+    one = reported.link.state()
+    lost = one._replace(state=LinkState.LOST, reason='the device has gone', forwarded=7,
+                        not_forwarded={30: 2, 36: 5, 8: 1})
+    link = Mock(snapshots=lambda now: (one, lost, one), copies=lambda now: {(0, 2): 3, (2, 2): 1})
+    urls = ['udpin://', 'serial:///dev/light:57600', 'tcp://router:5760']
+    second, third = (report.message('/illuminator') for report in line_reports(
+        link_diagnostics(link, reported.client, urls, reported.link.now)))
+
+    assert found(second) == (ERROR, 'not open: the device has gone')
+    assert (second.name, second.hardware_id) == ('illuminator: link 2', urls[1])
+    assert [value(second, key) for key in (
+        'frames_forwarded', 'frames_not_forwarded', 'not_forwarded', 'copies_received')] == [
+            '7', '8', 'SERVO_OUTPUT_RAW 5, ATTITUDE 2, 8 1', '0']
+    assert (third.level, value(third, 'copies_received')) == (WARN, '4')
+    for first in (urls[0], urls[2]):
+        assert f'copies of frames from {first} come over {urls[2]}' in third.message
 
 
 @pytest.mark.parametrize(('fields', 'level', 'text'), [

@@ -42,7 +42,7 @@ from ...ros.qos import STATE_QOS
 
 T = TypeVar('T')
 # Every node can publish topics like those of a device, and more diagnostics than it has.
-MAX_DEVICES, MAX_DIAGNOSES = 256, 4
+MAX_DEVICES, MAX_DIAGNOSES = 256, 10
 # Messages of /diagnostics that one poll takes, values of a diagnosis, bytes of any message.
 MAX_DIAGNOSTICS, MAX_VALUES, MAX_BYTES = 256, 200, 65536
 # One poll of this number queries the graph.
