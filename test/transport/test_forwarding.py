@@ -28,9 +28,13 @@ from illuminator_ros.mavlink.messages import Address, CommandLong, heartbeat, Me
 from illuminator_ros.mavlink.routing_table import EXPIRY
 from illuminator_ros.mavlink.signing import Signing, SigningMode
 from illuminator_ros.mavlink.transport import ChannelLost
+from illuminator_ros.mavlink.url import parse_url
 import pytest
 from support.frames import Codec, frame_of, only, raw_v2, spoilt
+from support.live_link import LiveLink, Run
 from support.network import Leaf, Network, Router
+from support.open_channel import bound_socket, has_nothing
+from support.ports import free_port
 
 OWN, LIGHT, GROUND = Address(1, 194), Address(1, 243), Address(255, 190)
 ALIVE = heartbeat(18)
@@ -298,6 +302,24 @@ def test_a_component_that_moves_to_another_line_is_followed() -> None:
         assert (len(pair.light.received), len(moved.received)) == (old, 1)
         moved.received.clear()
         pair.light.received.clear()
+
+
+def test_a_command_reaches_a_light_that_sends_from_another_port_than_it_listens_on(
+        run: Run) -> None:
+    light_port, near, far = free_port(), free_port(), free_port()
+    with bound_socket() as sender, bound_socket(port=light_port) as light, (
+            bound_socket()) as ground:
+        link = run(LiveLink(f'udp://127.0.0.1:{near}@127.0.0.1:{light_port}', further={
+            'far': parse_url(f'udpin://127.0.0.1:{far}')}))
+        link.wait_open(2)
+        sender.sendto(frame_of(ALIVE, 0, LIGHT), ('127.0.0.1', near))
+        ground.sendto(frame_of(ALIVE, 0, GROUND), ('127.0.0.1', far))
+        link.endpoint.wait_heard(2)
+        command = frame_of(to(LIGHT), 1, GROUND)
+        ground.sendto(command, ('127.0.0.1', far))
+        while command not in light.recv(65536):
+            pass
+        assert has_nothing(sender)
 
 
 def test_a_silent_line_beside_a_live_one_gets_our_last_heartbeat_again() -> None:

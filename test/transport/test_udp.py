@@ -74,6 +74,7 @@ def test_fixed_remote_is_the_only_receiver_and_is_heard_from_any_port_of_its_hos
     send(port, (other, b'x'))
     ((peer, data),) = ours.receive()
     assert (data, ours.channel.heard(peer, 0.0)) == (b'x', False)
+    assert [ours.channel.leads_to(peer)] == list(ours.channel.peers(0.0))
     ours.broadcast(b'frame')
     assert remote.recv(100) == b'frame'
     assert has_nothing(other)
@@ -101,6 +102,7 @@ def test_broadcast_ends_with_the_first_peer_unless_it_is_always_wanted(
         ours.channel.heard(peer.getsockname(), 0.0)
         ours.broadcast(b'second')
         both = [all_hosts, peer]
+        assert ours.channel.has_clients is (kind == 'until_peer')
         assert both[receiver].recv(100) == b'second'
         assert has_nothing(both[1 - receiver])
 
