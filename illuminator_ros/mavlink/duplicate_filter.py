@@ -34,8 +34,8 @@ class DuplicateFilter:
     """
     Remembers the frames that were accepted lately, and the line of each.
 
-    :ivar copies: how many copies have come and when the last came, s, by the index of the line of
-        the original and that of the copy.
+    :ivar copies: how many copies have come and when the last came, s, by the indexes of
+        the lines of the original and of the copy.
     """
 
     def __init__(self) -> None:
@@ -49,7 +49,7 @@ class DuplicateFilter:
         return len(self._frames)
 
     def has(self, frame: Frame, now: float) -> bool:
-        """Return whether a frame is a copy of one that was accepted."""
+        """Return whether a frame is a copy of an accepted frame."""
         found = self._frames.get(hash(frame.data))
         return (found is not None and now - found[0] < MEMORY
                 and self._counts.get(frame.source, 0) - found[1] < WRAP)

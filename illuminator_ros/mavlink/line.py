@@ -160,7 +160,7 @@ class Line:
         return [one for one in channel.peers(now) if one != peer]
 
     def write(self, frames: Sequence[bytes], peers: Sequence[Peer], now: float) -> None:
-        """Send our frames to some of the peers, ahead of those that are forwarded."""
+        """Send our frames to some of the peers, ahead of forwarded frames."""
         channel, traffic = self._channel, self.receiver.traffic
         if channel is None or not frames:
             return

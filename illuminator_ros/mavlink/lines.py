@@ -98,7 +98,7 @@ class Lines(LineUser):
 
         They come in a loop, or over several lines from one component.
 
-        :return: by the index of the line of the original, and that of the copy.
+        :return: by the indexes of the lines of the original and of the copy.
         """
         if self._duplicates is None:
             return {}

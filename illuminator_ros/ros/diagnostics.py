@@ -145,7 +145,7 @@ def loops(
     """
     Return texts on copies of frames, for people.
 
-    :param copies: their numbers, by the index of the line of the original and that of the copy.
+    :param copies: their numbers, by the indexes of the lines of the original and of the copy.
     """
     return {
         (first, second): f'copies of frames from {urls[first]} come over {urls[second]}: there is '

@@ -106,7 +106,7 @@ class DiagnosticsPublisher:
         except queue.Empty:
             return
         for source, make_reports in zip(sources, snapshots, strict=True):
-            # The status of each further line is that of the process, and not of each node.
+            # The first node alone reports the further lines.
             reports = [*make_reports(link), *(line_reports(link) if source is sources[0] else ())]
             levels = [report.level for report in reports]
             due, published = self._sources.get(source, (0.0, levels))

@@ -165,7 +165,7 @@ class LinkParameters(NamedTuple):
     """
     The link parameters, checked; :data:`LINK_PARAMETERS` has their units and ranges.
 
-    :param urls: that of the connection, and those to forward to, by their texts.
+    :param urls: the connection URL, and the URLs to forward to, by their texts.
     """
 
     urls: Mapping[str, Url]

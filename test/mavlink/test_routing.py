@@ -25,7 +25,8 @@ from support.frames import frame_of, LIGHT, only, raw_v2
 OWN = Address(1, 194)
 GIMBAL, AUTOPILOT, GROUND = Address(1, 154), Address(1, 1), Address(255, 190)
 # The light is on line 0, the autopilot on 0 and 1, the gimbal on 1, and the ground station on 2.
-HEARD = ((LIGHT, 0), (AUTOPILOT, 0), (AUTOPILOT, 1), (GIMBAL, 1), (GROUND, 2))
+# Another sender with our address is on 1.
+HEARD = ((LIGHT, 0), (AUTOPILOT, 0), (AUTOPILOT, 1), (GIMBAL, 1), (GROUND, 2), (OWN, 1))
 UNKNOWN_TARGET = 8  # LINK_NODE_STATUS: the dialect has its seed, and no class.
 
 

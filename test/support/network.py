@@ -31,7 +31,7 @@ from illuminator_ros.mavlink.transport import Channel, Peer
 from illuminator_ros.mavlink.url import MemoryUrl
 from support.frames import Codec
 
-# Frames that a network carries for one that is sent; with more they would circulate.
+# Frames that a network carries for each sent frame; with more they would circulate.
 MAX_HOPS = 200
 
 
