@@ -118,8 +118,9 @@ def test_a_saturated_line_carries_the_newest_telemetry_within_its_rate_and_count
     for number in range(2000):
         line.forward(telemetry(number, 1 + number % 3))
         written += line.run(0.001)
-    assert line.bytes <= 2.0 * RATE + 2 * MAX_FRAME
-    assert line.bytes >= 0.98 * 2.0 * RATE
+    # Less than the nominal rate, so that a port with a slower clock keeps up.
+    assert line.bytes <= 0.96 * 2.0 * RATE + MAX_FRAME
+    assert line.bytes >= 0.94 * 2.0 * RATE
     # Each of the six kinds gets its share, and none is old: the number is the time in ms.
     kinds = Counter((frame.message_id, frame.source) for _, frame in written)
     assert len(kinds) == 6

@@ -47,6 +47,9 @@ MAX_READS = 2
 # then: our own messages wait behind them.
 FORWARD_SIZE = 2 * 1024
 FORWARD_AHEAD = 0.002
+# Share of the rate of a line that frames of others use at most. The clocks of serial ports differ
+# by up to 2 % each; at the full rate the bytes that wait in a slower port become ever more.
+FORWARD_SHARE = 0.95
 
 
 class ChannelLost(OSError):
@@ -280,7 +283,7 @@ class StreamChannel(Channel):
                     and (frame := self._forwarded.take(now))):
                 frames.append(frame)
                 size += len(frame)
-                self.free_at = max(now, self.free_at) + len(frame) / self.rate
+                self.free_at = max(now, self.free_at) + len(frame) / (FORWARD_SHARE * self.rate)
             self.send(frames, ())
 
     def next_deadline(self) -> float:
