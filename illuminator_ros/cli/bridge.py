@@ -91,10 +91,12 @@ def usage(executable: Executable) -> str:
         return (f'  {spec.name:22} {default:27} {spec.description}'
                 + (f' ({limits})' if limits else ''))
 
-    fixed = '\n'.join(
-        row(spec, spec._replace(default=defaults.get(spec.name, spec.default)).shown_default)
-        for spec in (*LINK_PARAMETERS, *kind.parameters))
-    variable = ''.join(row(spec, '') + '\n' for spec in kind.device_parameters)
+    fixed, changeable = (
+        ''.join(row(spec, spec._replace(
+                    default=defaults.get(spec.name, spec.default)).shown_default) + '\n'
+                for spec in (*LINK_PARAMETERS, *kind.parameters) if spec.changeable is may)
+        for may in (False, True))
+    variable = ''.join(row(spec, '') + '\n' for spec in kind.device_parameters) + changeable
     variable = variable and f'parameters that may be set at any time:\n{variable}\n'
     examples = ''.join(f'  {line}\n' for line in kind.examples)
     examples = examples and f'{examples}\n'
@@ -118,7 +120,6 @@ connection URLs, with their meanings in MAVROS, MAVSDK and pymavlink:
 
 {variable}parameters that are fixed at the start, with their defaults:
 {fixed}
-
 Each further kind in payloads has a node of its own, with the parameters that --help of its
 executable shows: -p gimbal:setpoint_timeout:=0.2 sets that of the node gimbal.
 

@@ -87,6 +87,12 @@ class GimbalClient(Payload):
         self._queries: DeadlineQueue[Address] = DeadlineQueue()
         self._next_query = -math.inf
 
+    def change_settings(self, settings: GimbalSettings, now: float) -> None:
+        """Take other settings, see :meth:`Gimbal.change_settings`."""
+        self.settings = settings
+        for gimbal in self._gimbals.values():
+            gimbal.change_settings(settings, now)
+
     # Link
 
     def link_closed(self, now: float, reason: str) -> None:

@@ -356,6 +356,14 @@ class Gimbal:
         """Answer all requests; :meth:`release_control` is still possible."""
         self._managers.close(self._commands.refusal, now)
 
+    def change_settings(self, settings: GimbalSettings, now: float) -> None:
+        """Take other settings: ``setpoint_timeout`` and the time-out of ``sources`` may differ."""
+        self._settings = settings
+        self._setpoints.change_timeout(settings.setpoint_timeout, now)
+        if settings.sources:
+            self._sources.set_lease(settings.sources.timeout)
+            self._change_holder(self._sources.poll(now), now)
+
     # Sources
 
     def claim(self, source: str, now: float) -> str:

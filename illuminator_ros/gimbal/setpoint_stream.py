@@ -115,6 +115,12 @@ class SetpointStream:
         # An attitude of a device that reports no rates, and its time; a later one is compared.
         self._seen: tuple[MountAttitude, float] | None = None
 
+    def change_timeout(self, timeout: float, now: float) -> None:
+        """Replace the time-out; a rate that lasts ends after it at the latest."""
+        self._timeout = timeout
+        if self._last is not None and self._last.kind is Kind.RATE:
+            self._last.due = [min(due, now + timeout) for due in self._last.due]
+
     @property
     def may_turn(self) -> bool:
         """Whether the gimbal may turn at a rate, or towards a place."""

@@ -94,6 +94,12 @@ class IlluminatorClient(Payload):
         """Return whether there are more lights than the client takes."""
         return self._discovery.limit_reached
 
+    def change_settings(self, settings: Settings, now: float) -> None:
+        """Take other settings, see :meth:`Light.change_settings`."""
+        self.settings = settings
+        for light in self._discovery:
+            light.change_settings(settings, now)
+
     def _make(self, address: Address) -> Light:
         def emit(event: LightEvent) -> None:
             if address in self._discovery.devices:

@@ -359,6 +359,26 @@ class Light:
             query.identity, query.is_settled(now), self._tracker.conflict.detected,
             self.unreachable(now), self._sources.shown_holder, self._sources.since)
 
+    def change_settings(self, settings: Settings, now: float) -> None:
+        """
+        Take other settings.
+
+        Only ``limits``, ``off_after_silence``, ``reassert`` and the time-out of ``sources`` may
+        differ. The silence begins again if ``off_after_silence`` differs.
+        """
+        before, self._settings = self._settings, settings
+        if settings.limits != before.limits:
+            self._configuration.change_limits(settings.limits, now)
+        if settings.off_after_silence != before.off_after_silence:
+            self._forget_silenced(now)
+            self._switch.change_silence(settings.off_after_silence, now)
+        if settings.reassert != before.reassert:
+            self._configuration.change_reassert(settings.reassert)
+            self._switch.change_reassert(settings.reassert, now)
+        if settings.sources:
+            self._sources.set_lease(settings.sources.timeout)
+        self._changed(self, now)
+
     # Requests
 
     def _can_reach(self, now: float, done: Done, refusal: str = '') -> bool:

@@ -120,6 +120,11 @@ class _Unapplied:
     failure: str
 
 
+def undoing_limit(reassert: bool) -> RepeatLimit | None:
+    """Return the limit on undoing changes by other senders, None if these are followed."""
+    return RepeatLimit(REPEATS, REPEAT_INTERVAL) if reassert else None
+
+
 class LimitGuard:
     """
     Whether a light exceeds the limits that the operator has set.
@@ -131,10 +136,14 @@ class LimitGuard:
     def __init__(self, limits: SafetyLimits, emit: Callable[[events.LightEvent], None],
                  exceeded: events.LimitExceeded) -> None:
         self.limits = limits
-        self.is_limiting = limits != SafetyLimits()
         self.exceeded = exceeded
         self._emit = emit
         self.renew()
+
+    @property
+    def is_limiting(self) -> bool:
+        """Return whether there is a limit."""
+        return self.limits != SafetyLimits()
 
     def renew(self) -> None:
         """Bring the light back within the limits once more."""
@@ -184,8 +193,7 @@ class LightConfiguration:
         self._emit = emit
         self._restores = restore
         self._must_wait = must_wait
-        # The limit on undoing changes by other senders, None where these are followed.
-        self._undoing = RepeatLimit(REPEATS, REPEAT_INTERVAL) if reassert else None
+        self._undoing = undoing_limit(reassert)
         self._reconciler: Reconciler[Status] = Reconciler(target, self._ended)
         self._report: StatusReport[Status] | None = None
         self._setpoint: float | None = None
@@ -240,6 +248,34 @@ class LightConfiguration:
     @property
     def _strobe_range(self) -> StrobeRange:
         return self._report.status.strobe_range if self._report else StrobeRange()
+
+    # Settings
+
+    def change_limits(self, limits: SafetyLimits, now: float) -> None:
+        """Replace the limits, and bring a light that exceeds them back within them."""
+        self.guard.limits = limits
+        self.guard.renew()
+        if self._required and self._required.requirement is Requirement.LIMIT:
+            self._required = None
+        desired = self._reconciler.desired
+        if desired is not None and isinstance(desired.change, Configure):
+            goal = desired.change.configuration
+            limited = limits.clipped(goal, self._strobe_range)
+            if limited != goal:
+                # A resend would exceed the limits. The newest setpoint is sent as the limit.
+                if self._is_stream and self._setpoint is None:
+                    self._setpoint = limited.brightness
+                self._reconciler.cancel(
+                    ', '.join(limits.excess(goal)) or 'a limit was changed', now,
+                    superseded=desired.reason == _SETPOINT)
+        if self._status is not None and (self.confirmed or self._status.complete):
+            self._keep_limits(self._status.configuration(self.confirmed or NOTHING), now)
+
+    def change_reassert(self, reassert: bool) -> None:
+        """Undo changes by other senders from now on, or follow them."""
+        self._undoing = undoing_limit(reassert)
+        if self._required and self._required.requirement is Requirement.OTHER_SENDER:
+            self._required = None
 
     # Requests
 

@@ -32,7 +32,7 @@ from .light_configuration import (
     LATE_TIME,
     LightConfiguration,
     REPEAT_INTERVAL,
-    REPEATS,
+    undoing_limit,
 )
 from .model import DIMMING_FLAGS, Mode, Status
 from ..mavlink.command_sender import format_seconds
@@ -40,7 +40,6 @@ from ..mavlink.dialect import mavlink
 from ..payload.attempt import Change, Done, Result, StatusReport, Target
 from ..payload.last_change import LastChange
 from ..payload.reconciler import decide, Desired, Reconciler, Rule
-from ..payload.repeat_limit import RepeatLimit
 
 # s after an ON in which an OFF may overtake it on the way to the light.
 OVERTAKING_TIME = 0.2
@@ -171,7 +170,7 @@ class LightSwitch:
         # it on, and it was neither lost nor restarted since.
         self._undoes_off = False
         # The limit on undoing switches by other senders, None where these are followed.
-        self._undoing = RepeatLimit(REPEATS, REPEAT_INTERVAL) if reassert else None
+        self._undoing = undoing_limit(reassert)
         # Whether a status has shown it on since the last OFF that was confirmed.
         self._was_on = False
         # The newest status and whether several lights send from the address.
@@ -180,6 +179,20 @@ class LightSwitch:
         self._settled_at = -math.inf
         # When another rule may come into force, s; at once after a change of the state.
         self._due = -math.inf
+
+    # Settings
+
+    def change_silence(self, off_after_silence: float, now: float) -> None:
+        """Replace the time of ``off_after_silence``; the silence begins again."""
+        self.state.off_after_silence = off_after_silence
+        self.note_request(now)
+
+    def change_reassert(self, reassert: bool, now: float) -> None:
+        """Undo switches by other senders from now on, or follow them."""
+        self._undoing = undoing_limit(reassert)
+        undone, self.state.undoing = self.state.undoing, None
+        if undone is not None and self._reconciler.desired == undone:
+            self._reconciler.cancel('superseded by external_changes', now, superseded=True)
 
     # Desired values
 

@@ -108,6 +108,10 @@ class Link:
         """Have ``function(now)`` called in the link's thread, unless the thread has ended."""
         self._thread.call(function)
 
+    def do(self, function: Callable[[float], None]) -> None:
+        """Call ``function(now)`` at once if this is the link's thread, else have it called."""
+        self._thread.do(function)
+
     # In the link's thread
 
     def snapshot(self, now: float) -> LinkSnapshot:

@@ -108,6 +108,13 @@ class LinkThread:
         self._calls.append(function)
         self._wake()
 
+    def do(self, function: Callable[[float], None]) -> None:
+        """Call ``function(now)`` at once if this is the thread, otherwise see :meth:`call`."""
+        if threading.current_thread() is self._thread:
+            function(self._clock())
+        else:
+            self.call(function)
+
     def _wake(self) -> None:
         # A full buffer has woken the thread already; a closed one has no thread to wake.
         with contextlib.suppress(OSError):

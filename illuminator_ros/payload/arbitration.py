@@ -94,6 +94,10 @@ class Arbiter(Generic[K]):
         # The time of the last claim or renewal of each source that claims the device.
         self._claims: dict[K, float] = {}
 
+    def set_lease(self, lease: float) -> None:
+        """Replace the lease, also of the claims that exist."""
+        self._lease = lease
+
     def claim(self, source: K, now: float) -> HolderChanged[K] | None:
         """Take a claim of a source; it is granted if the source is :attr:`holder` afterwards."""
         granted = self.may_hold(source)

@@ -95,6 +95,8 @@ class OrientationFeeder:
         self._fixed_since = -math.inf
         # When mount angles were sent last, s; infinity while the link is closed.
         self._mount_sent_at = math.inf
+        # The least time between two pairs, s.
+        self._interval = 1 / settings.attitude_rate
         self._pair_due = -math.inf
         self._pair_time = 0
 
@@ -177,11 +179,16 @@ class OrientationFeeder:
                 conversions.in_vehicle(mount.rotation, self._mount_parent, sample.rotation),
                 self._settings.mount_frame)
         self._pair_time = time
-        interval = 1 / self._settings.attitude_rate
+        interval = self._interval
         self._pair_due = max(self._pair_due + interval, now + interval / 2)
         self._send(conversions.attitude(sample.rotation, sample.rates, time_boot_ms(now)))
         self._send_mount(angles, now)
         self.sent += self._link_open
+
+    def change_rate(self, attitude_rate: float, now: float) -> None:
+        """Replace the highest rate of attitudes, Hz."""
+        self._interval = 1 / attitude_rate
+        self._pair_due = min(self._pair_due, now + self._interval)
 
     def _send_mount(self, angles: Vector, now: float) -> None:
         self._send(conversions.mount_status(angles, self._target()))

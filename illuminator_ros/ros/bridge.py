@@ -35,9 +35,9 @@ from .graph import unheard_publishers
 from .ignored_parameters import ignored_parameters
 from .node_manager import NodeManager, without_node_name
 from .parameters import (
+    declare_given,
     declare_link_parameters,
     declare_payloads,
-    declare_read_only,
     given_parameters,
     LINK_PARAMETERS,
     LinkParameters,
@@ -96,7 +96,7 @@ class Bridge:
             for kind in kinds[1:])]
         _refuse_same_names(self._own_nodes)
         parameters = _link_parameters(node, kinds, url)
-        values = [declare_read_only(own, kind.parameters)
+        values = [declare_given(own, kind.parameters)
                   for own, kind in zip(self._own_nodes, kinds, strict=True)]
         commands = CommandSender(
             parameters.address, parameters.command_timeout, parameters.command_retries)

@@ -34,7 +34,7 @@ SOURCE_PARAMETERS = (
                   'sources of commands, the highest first; empty = commands have no sources'),
     ParameterSpec('source_timeout', 0.0,
                   'silence after which a source loses the device; 0 = never',
-                  's', 0.0, 3600.0),
+                  's', 0.0, 3600.0, changeable=True),
 )
 
 

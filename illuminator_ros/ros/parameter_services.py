@@ -36,7 +36,7 @@ from rclpy.qos import qos_profile_services_default, QoSProfile
 
 from .executor import DeferredService, Respond, Take
 from .link_call import LinkCalls
-from .parameters import DeviceParameters, Values
+from .parameters import ChangeableParameters, DeviceParameters, Values
 from .throttled_log import NodeLog
 from ..mavlink.link import Link
 
@@ -63,12 +63,14 @@ class ParameterServices:
 
     :param device: the parameters that the device accepts or refuses, None if it has none.
     :param check: by default as the specification of each parameter.
+    :param changeable: the parameters of the node itself that may be set, None if it has none.
     """
 
     def __init__(
         self, node: Node, link: Link, log: NodeLog, device: DeviceParameters | None = None,
         check: Check | None = None,
         configure: Configure = lambda changes, now, answer: answer(''),
+        changeable: ChangeableParameters | None = None,
     ) -> None:
         self._node = node
         self._log = log
@@ -76,6 +78,7 @@ class ParameterServices:
         specs = self._device.specs
         self._check_value = check or (lambda name, value: specs[name].check(value))
         self._configure = configure
+        self._changeable = changeable
         self._calls = LinkCalls(link, log)
         qos = QoSProfile(depth=QUEUE_DEPTH,
                          reliability=qos_profile_services_default.reliability)
@@ -208,8 +211,16 @@ class ParameterServices:
 
     def _set_local(self, messages: Messages) -> str:
         result = self._node.set_parameters_atomically(
-            [Parameter.from_parameter_msg(message) for message in messages])
+            [self._parameter(message) for message in messages])
         return '' if result.successful else str(result.reason)
+
+    def _parameter(self, message: ParameterMessage) -> Parameter:
+        """Return a parameter to set; an integer is taken for a double."""
+        parameter: Parameter = Parameter.from_parameter_msg(message)
+        if (parameter.type_ is Parameter.Type.INTEGER
+                and self._node.get_parameter(message.name).type_ is Parameter.Type.DOUBLE):
+            return Parameter(message.name, value=float(parameter.value))
+        return parameter
 
     def _check(self, message: ParameterMessage) -> str:
         """Return why a parameter cannot be set, '' if the device or rclpy decides that."""
@@ -220,13 +231,15 @@ class ParameterServices:
             value = _value(message)
         except ValueError:
             return f'{name}: {message.value.type} is not a parameter type'
-        if name in self._device.specs:
-            if value is None:
-                return f'{name} cannot be deleted'
-            try:
+        if name in self._device.specs and value is None:
+            return f'{name} cannot be deleted'
+        try:
+            if name in self._device.specs:
                 self._check_value(name, value)
-            except ValueError as error:
-                return str(error)
+            elif self._changeable:
+                self._changeable.check(name, value)
+        except ValueError as error:
+            return str(error)
         return ''
 
 

@@ -16,7 +16,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 import math
 import threading
 import time
@@ -57,6 +57,8 @@ class ParameterSpec(NamedTuple):
     :param choices: the permitted values of a string.
     :param constraints: other conditions on the value, for people.
     :param restricts: whether it limits or protects something, so that a misspelt name is an error.
+    :param changeable: whether it may be set while the node runs, see
+        :class:`ChangeableParameters`.
     """
 
     name: str
@@ -68,6 +70,7 @@ class ParameterSpec(NamedTuple):
     choices: tuple[str, ...] = ()
     constraints: str = ''
     restricts: bool = False
+    changeable: bool = False
 
     @property
     def type(self) -> Parameter.Type:  # noqa: A003
@@ -192,12 +195,12 @@ class LinkParameters(NamedTuple):
 
 def declare_payloads(node: Node, default: str) -> tuple[str, ...]:
     """
-    Declare the parameter ``payloads``, read-only, and return it.
+    Declare the parameter ``payloads`` and return it.
 
     :raises ParameterError: if it is wrong.
     """
     specs = [spec for spec in LINK_PARAMETERS if spec.name == 'payloads']
-    payloads = tuple(declare_read_only(node, specs, {'payloads': [default]})['payloads'])
+    payloads = tuple(declare_given(node, specs, {'payloads': [default]})['payloads'])
     if not payloads or len(set(payloads)) < len(payloads):
         raise ParameterError(f'payloads: {list(payloads)} is empty or names one twice')
     return payloads
@@ -205,12 +208,12 @@ def declare_payloads(node: Node, default: str) -> tuple[str, ...]:
 
 def declare_link_parameters(node: Node, defaults: Values | None = None) -> LinkParameters:
     """
-    Declare the other parameters of the link, read-only, and return them.
+    Declare the other parameters of the link and return them.
 
     :param defaults: replace those of :data:`LINK_PARAMETERS`.
     :raises ParameterError: if one is wrong.
     """
-    values = dict(declare_read_only(
+    values = dict(declare_given(
         node, [spec for spec in LINK_PARAMETERS if spec.name != 'payloads'], defaults))
     return LinkParameters(
         urls=_urls(values.pop('connection_url'), values.pop('forward_urls')),
@@ -235,11 +238,13 @@ def _urls(first: str, further: list[str]) -> Mapping[str, Url]:
     return urls
 
 
-def declare_read_only(
+def declare_given(
     node: Node, specs: Iterable[ParameterSpec], defaults: Values | None = None,
 ) -> Values:
     """
-    Declare parameters as they are given, read-only, and return their values.
+    Declare parameters as they are given, and return their values.
+
+    They are read-only unless they are changeable.
 
     :param defaults: replace those of the specifications.
     :raises ParameterError: if a value is wrong.
@@ -255,7 +260,7 @@ def declare_read_only(
         # The type of an empty list cannot be inferred.
         node.declare_parameter(
             spec.name, spec.type if value == [] else value,
-            spec.descriptor(read_only=value != []), ignore_override=True)
+            spec.descriptor(read_only=value != [] and not spec.changeable), ignore_override=True)
         if value == []:
             node.set_parameters_atomically([Parameter(spec.name, spec.type, [])])
             node.set_descriptor(spec.name, spec.descriptor(read_only=True))
@@ -277,6 +282,55 @@ def given_parameters(node: Node) -> Mapping[str, Parameter]:
         raise RuntimeError(
             'this version of rclpy is not supported: it has no Node._parameter_overrides, which '
             'holds the parameters given on the command line') from None
+
+
+class ChangeableParameters:
+    """
+    Parameters of a node that may be set while it runs.
+
+    :param specs: of the parameters of the node; only the changeable ones count.
+    :param values: of all these parameters.
+    :param check: takes the values that they would have; raises ParameterError if they are wrong.
+    :param change: takes the new values. It is called in the thread that sets a parameter.
+    """
+
+    def __init__(
+        self, node: Node, specs: Iterable[ParameterSpec], values: Values, *,
+        check: Callable[[Values], object], change: Callable[[Values], None],
+    ) -> None:
+        self._specs = {spec.name: spec for spec in specs if spec.changeable}
+        self._values = values
+        self._check = check
+        self._change = change
+        node.add_on_set_parameters_callback(self._may_set)
+        node.add_post_set_parameters_callback(self._set)
+
+    def check(self, name: str, value: object) -> None:
+        """
+        Check the value of one parameter; others are not checked.
+
+        :raises ParameterError: if it is of another type or out of range.
+        """
+        if spec := self._specs.get(name):
+            spec.check(value)
+
+    def _with(self, parameters: list[Parameter]) -> Values:
+        return {**self._values, **{
+            parameter.name: self._specs[parameter.name].check(parameter.value)
+            for parameter in parameters if parameter.name in self._specs}}
+
+    def _may_set(self, parameters: list[Parameter]) -> msg.SetParametersResult:
+        try:
+            self._check(self._with(parameters))
+        except ParameterError as error:
+            return msg.SetParametersResult(successful=False, reason=str(error))
+        return msg.SetParametersResult(successful=True)
+
+    def _set(self, parameters: list[Parameter]) -> None:
+        values = self._with(parameters)
+        if values != self._values:
+            self._values = values
+            self._change(values)
 
 
 class DeviceParameters:
@@ -302,6 +356,10 @@ class DeviceParameters:
         """Return the values that the command line or a parameter file gives, unchecked."""
         given = given_parameters(self._node)
         return {name: given[name].value for name in self.specs if name in given}
+
+    def respecify(self, specs: Iterable[ParameterSpec]) -> None:
+        """Replace the specifications, which the next :meth:`set_high` shows."""
+        self.specs = {spec.name: spec for spec in specs}
 
     def show(self, values: Values) -> str:
         """Set parameters to the reported values; return why that failed, '' if it did not."""

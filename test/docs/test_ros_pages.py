@@ -49,6 +49,13 @@ URL, CAMERA_URL = (
 PARAMETERS = (*LINK_PARAMETERS, *DEVICE_PARAMETERS)
 
 
+def test_the_reference_has_each_parameter_that_may_change() -> None:
+    specs = (*LINK_PARAMETERS, *GIMBAL_PARAMETERS, *MANAGER_PARAMETERS, *camera.PARAMETERS)
+
+    assert [row[0].strip('`') for row in table(REFERENCE, 'may be set at any time')] == [
+        *dict.fromkeys(spec.name for spec in specs if spec.changeable)]
+
+
 # While geoid_separation is not set, the diagnostics of the camera warn.
 @pytest.mark.parametrize(('file', 'specs'), [
     ('bridge', LINK_PARAMETERS), ('gimbal', (URL, *GIMBAL_PARAMETERS)),

@@ -295,6 +295,21 @@ def test_rate_is_sent_and_zero_follows_once_after_the_time_out(
         (0.0, pytest.approx(-0.2), pytest.approx(0.1)), (0.0, 0.0, 0.0)]
 
 
+def test_timeout_of_rates_may_be_set_while_the_node_runs(
+        ros: Ros, gimbal: FakeManager) -> None:
+    parameters = Parameters(ros, '/gimbal')
+    assert parameters.set(setpoint_timeout=60)[0].successful
+    gimbal.rates = (0.0, 0.0, 0.0)
+    take_control(ros, gimbal)
+    publish(ros, 'cmd/rate', Vector3Stamped(vector=Vector3(y=0.2)))
+    eventually(lambda: len(gimbal.received) == 1)
+
+    assert parameters.set(setpoint_timeout=0.2)[0].successful
+    eventually(lambda: len(gimbal.received) == 2)
+
+    assert gimbal.received[1].angular_velocity_y == 0.0
+
+
 @pytest.mark.parametrize(('topic', 'message', 'text'), [
     ('cmd/attitude', QuaternionStamped(header=Header(frame_id='odom')),
      "frame_id 'odom' is neither 'map' nor 'base_link_stabilized'"),

@@ -19,6 +19,7 @@ from __future__ import annotations
 from collections.abc import Callable
 import math
 
+from illuminator_ros.gimbal.gimbal import GimbalSettings
 from illuminator_ros.gimbal.messages import DEVICE_ID_PARAM, GimbalManagerSetAttitude
 from illuminator_ros.gimbal.setpoint_stream import REPEATS
 from illuminator_ros.mavlink.dialect import mavlink, replaced
@@ -93,6 +94,20 @@ def test_rate_is_a_message_in_rad_per_s_and_ends_with_one_zero() -> None:
     assert [(one.angular_velocity_x, one.angular_velocity_y, one.angular_velocity_z)
             for _, one in sent] == [(0.0, -0.2, 0.1)] * 3 + [(0.0, 0.0, 0.0)]
     assert all(map(math.isnan, setpoints(rig)[0][1].q))
+
+
+@pytest.mark.parametrize(('timeout', 'zero_at'), [(0.3, 1.3), (60.0, 5.0)])
+def test_a_rate_that_lasts_ends_after_a_shorter_timeout_and_never_later_than_it_would(
+        timeout: float, zero_at: float) -> None:
+    rig = in_control(setpoint_timeout=5.0)
+    start = rig.now
+    rig.gimbal.set_rates((0.0, 0.2, 0.0), rig.now)
+    rig.run(1.0)
+
+    rig.gimbal.change_settings(GimbalSettings(setpoint_timeout=timeout), rig.now)
+    rig.run(10.0)
+
+    assert [at - start for at, _ in setpoints(rig)] == approx([0.0, zero_at], abs=0.03)
 
 
 def test_gm_14_setpoint_that_comes_before_the_poll_after_a_pause_is_not_sent() -> None:

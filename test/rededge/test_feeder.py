@@ -360,6 +360,15 @@ def test_pairs_have_the_given_rate_and_no_attitude_is_sent_twice_re_21_re_29(
     assert not any(isinstance(one, Attitude) for one in rig.run(5.0))
 
 
+def test_pairs_have_a_rate_that_is_set_later_from_then_on() -> None:
+    rig = Rig(attitude_rate=5.0)
+    counts = []
+    for rate in (5.0, 50.0):
+        rig.feeder.orientation.change_rate(rate, rig.now)
+        counts.append(sum(len(rig.imu() + rig.run(0.02)) for _ in range(100)) / 2)
+    assert counts == pytest.approx([10, 100], abs=1)
+
+
 def test_a_fixed_mount_is_sent_each_second_without_attitude_and_after_a_change_re_23_re_27() -> (
         None):
     rig = Rig()

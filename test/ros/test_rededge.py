@@ -231,6 +231,17 @@ def test_fixed_mount_is_set_at_run_time_and_gives_way_to_the_topic_re_23_re_27(
         assert is_fed_no_angles() or is_fed_no_angles()
 
 
+def test_rate_of_attitudes_may_be_set_while_the_node_runs(own_ros: Ros) -> None:
+    with running_camera() as camera, running_node(own_ros, camera, attitude_rate=1), Robot(
+            own_ros):
+        camera.wait('ATTITUDE')
+        assert Parameters(own_ros, '/rededge').set(attitude_rate=200)[0].successful
+
+        eventually(lambda: any(
+            newer.time_boot_ms - older.time_boot_ms < 300
+            for older, newer in itertools.pairwise(camera.messages('ATTITUDE'))))
+
+
 def test_no_fixed_mount_is_sent_where_the_topic_has_had_a_publisher_since_the_start_re_27(
         own_ros: Ros) -> None:
     own_ros.node.create_publisher(geometry.QuaternionStamped, '/rededge/mount', 10)

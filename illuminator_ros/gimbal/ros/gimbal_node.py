@@ -42,6 +42,7 @@ from ...ros.command_sources import prefixes, release_services
 from ...ros.conversions import quaternion_message
 from ...ros.diagnostics_publisher import DiagnosticsSource, MakeReports
 from ...ros.parameter_services import ParameterServices
+from ...ros.parameters import ChangeableParameters
 from ...ros.payload import Host
 from ...ros.qos import STREAM_QOS
 from ...ros.throttled_log import NodeLog
@@ -71,12 +72,13 @@ class GimbalNode:
     """
     Serves one gimbal with a node; all methods are for the link's thread.
 
+    :param changeable: the parameters of the node that may be set while it runs.
     :ivar key: of the gimbal, None while there is none.
     """
 
     def __init__(
         self, node: Node, host: Host, log: NodeLog, client: GimbalClient,
-        why_none: Callable[[], str],
+        why_none: Callable[[], str], changeable: ChangeableParameters | None = None,
     ) -> None:
         self.key: events.GimbalKey | None = None
         self._host = host
@@ -100,7 +102,7 @@ class GimbalNode:
                 *release_services(sources, self._release)),
             commands=(topic for way in prefixes(sources).items()
                       for topic in self._command_topics(*way)))
-        ParameterServices(node, host.link, log)
+        ParameterServices(node, host.link, log, changeable=changeable)
         if sources:
             self._interface.publish('source', '')
         self._interface.publish('connected', False)

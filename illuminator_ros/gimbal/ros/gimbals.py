@@ -30,7 +30,7 @@ from ...payload.attempt import Result
 from ...ros.command_sources import SOURCE_PARAMETERS, source_settings
 from ...ros.conversions import GEOID_SEPARATION
 from ...ros.device_nodes import DeviceNodes
-from ...ros.parameters import ParameterSpec, Values
+from ...ros.parameters import ChangeableParameters, ParameterSpec, Values
 from ...ros.payload import Host, RosPayload, ServedPayload, ShutdownReport
 
 GIMBAL_PARAMETERS = (
@@ -39,7 +39,7 @@ GIMBAL_PARAMETERS = (
     ParameterSpec('auto_take_control', False,
                   'take control of a gimbal that no component controls when it connects'),
     ParameterSpec('setpoint_timeout', 0.5, 'silence of ~/cmd/rate after which zero is sent', 's',
-                  0.05, 60.0),
+                  0.05, 60.0, changeable=True),
     *FRAME_PARAMETERS,
     GEOID_SEPARATION,
     ParameterSpec('attitude_interval', 0.0, "period of the attitude; 0 = the device's own", 's',
@@ -73,10 +73,18 @@ class Gimbals(ServedPayload):
         self._client = client
         self._host = host
         self._nodes = DeviceNodes[GimbalKey, GimbalNode](
-            host, 'gimbal', GimbalNode(host.node, host, host.log, client, why_none),
+            host, 'gimbal', GimbalNode(
+                host.node, host, host.log, client, why_none, ChangeableParameters(
+                    host.node, GIMBAL_PARAMETERS, host.values, check=settings,
+                    change=self._change_parameters)),
             lambda node, log: GimbalNode(node, host, log, client, why_none),
             GimbalNode.bind)
         client.events.subscribe(self._take)
+
+    def _change_parameters(self, values: Values) -> None:
+        """Take parameters that were set, in any thread."""
+        self._host.link.do(
+            functools.partial(self._client.change_settings, settings(values)))
 
     def _take(self, event: GimbalEvent) -> None:
         if isinstance(event, GimbalForgotten):

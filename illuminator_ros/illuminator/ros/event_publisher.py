@@ -25,6 +25,7 @@ from sensor_msgs.msg import Temperature
 from std_msgs.msg import Bool, Float32, Float64, String, UInt32
 
 from .diagnostics import FlagLog
+from .parameters import device_parameters
 from .. import events, model
 from ...payload.command_sources import DEFAULT, describe
 from ...ros.diagnostics import ERROR, WARN
@@ -74,13 +75,22 @@ class EventPublisher:
         self._frame_id = frame_id
         self._check_diagnostics = check_diagnostics
         self._identity: object = None
-        self._max_brightness = limits.max_brightness
+        self._limits = limits
         # The source of setpoints, as a prefix of its topics.
         self._source = ''
         self._strobe_range = model.StrobeRange()
         self._condition: tuple[object, ...] = ()
         self._flags = FlagLog()
         interface.publish('connected', False)
+
+    def change_limits(self, limits: model.SafetyLimits) -> None:
+        """Show other limits in the descriptions of the parameters."""
+        if limits == self._limits:
+            return
+        self._limits = limits
+        self._parameters.respecify(device_parameters(limits))
+        self._fit(0.0)
+        self._parameters.set_high('brightness', limits.max_brightness)
 
     def take(self, event: events.LightEvent) -> None:
         """Publish an event."""
@@ -193,8 +203,9 @@ class EventPublisher:
 
     def _fit_brightness(self, brightness: float) -> None:
         """Show the limit of the brightness, or more where the light shines brighter."""
-        if self._max_brightness < 100.0:
-            self._parameters.set_high('brightness', max(self._max_brightness, brightness))
+        highest = self._limits.max_brightness
+        if highest < 100.0:
+            self._parameters.set_high('brightness', max(highest, brightness))
 
     def _fit(self, period: float) -> None:
         """

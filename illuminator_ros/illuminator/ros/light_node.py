@@ -40,7 +40,7 @@ from ...ros.command_sources import prefixes, release_services
 from ...ros.diagnostics import DISCOVERY_GRACE
 from ...ros.diagnostics_publisher import DiagnosticsSource, MakeReports
 from ...ros.parameter_services import ParameterServices
-from ...ros.parameters import DeviceParameters, ParameterError
+from ...ros.parameters import ChangeableParameters, DeviceParameters, ParameterError
 from ...ros.payload import Host
 from ...ros.throttled_log import NodeLog
 
@@ -56,15 +56,19 @@ class LightNode:
 
     All methods but :meth:`close` are for the link's thread.
 
+    :param limits: those of the start, which the values given for parameters must observe.
     :param services: and ``commands``, of the node in addition to those of its light.
+    :param changeable: the parameters of the node that may be set while it runs.
     :ivar address: of the light, None while there is none.
     :raises ParameterError: if the value given for a parameter of the light is wrong.
     """
 
     def __init__(
         self, node: Node, host: Host, log: NodeLog, client: IlluminatorClient,
-        geometry: BeamGeometry, *, services: tuple[ros_node.RequestService, ...] = (),
+        geometry: BeamGeometry, limits: SafetyLimits, *,
+        services: tuple[ros_node.RequestService, ...] = (),
         commands: tuple[ros_node.AnyCommand, ...] = (),
+        changeable: ChangeableParameters | None = None,
     ) -> None:
         self.name = node.get_name()
         self.address: Address | None = None
@@ -74,7 +78,6 @@ class LightNode:
         self._started = self._bound_at = host.link.clock()
         self._mount_reported = False
         self._hardware_id = ''
-        limits = client.settings.limits
         parameters = DeviceParameters(node, device_parameters(limits))
         self._overrides = _checked(parameters.overrides(), limits)
         sources = client.settings.sources
@@ -93,7 +96,7 @@ class LightNode:
         if sources:
             interface.publish('source', '')
         ParameterServices(
-            node, host.link, log, parameters, self._check_value, self._configure)
+            node, host.link, log, parameters, self._check_value, self._configure, changeable)
         self._publishers = EventPublisher(
             node, interface, parameters, log, limits=limits, frame_id=geometry.frame_id,
             check_diagnostics=host.check_diagnostics)
@@ -105,6 +108,7 @@ class LightNode:
         """Serve a light from now on, and publish its known state."""
         self.address, self._bound_at = address, now
         self._host.frame_log.assign(address, self._log)
+        self.limits_changed()
         light = self._client.lights.get(address)
         if light is not None:
             for event in light.snapshot(now).events():
@@ -123,6 +127,10 @@ class LightNode:
         self._publishers.take(event)
         if self._beam is not None:
             self._beam.take(event)
+
+    def limits_changed(self) -> None:
+        """Show the limits of the client in the descriptions of the parameters."""
+        self._publishers.change_limits(self._client.settings.limits)
 
     def mount_moved(self) -> None:
         """Note that a gimbal of the vehicle has sent its attitude."""

@@ -33,7 +33,7 @@ from ...mavlink.messages import Address
 from ...payload.attempt import Done, Result
 from ...ros.device_nodes import DeviceNodes
 from ...ros.node import Answer, CommandTopic, RequestService, SWITCH_QOS
-from ...ros.parameters import Values
+from ...ros.parameters import ChangeableParameters, Values
 from ...ros.payload import Host, RosPayload, ServedPayload, ShutdownReport
 
 # s from the first light to the warnings on unused names: lights that start together are heard by
@@ -54,13 +54,17 @@ class Lights(ServedPayload):
         self._selection = parameters.Selection(host.values)
         self._names = parameters.NodeNames(host.values, host.node.get_name())
         geometry = parameters.BeamGeometry.of(host.values)
+        limits = client.settings.limits
         self._nodes = DeviceNodes[Address, LightNode](
             host, 'light', LightNode(
-                host.node, host, host.log, client, geometry,
+                host.node, host, host.log, client, geometry, limits,
                 services=(RequestService('enable_all', SetBool, self._enable_all),),
                 commands=(CommandTopic(
-                    'cmd/enable_all', Bool, self._switch_all, qos=SWITCH_QOS),)),
-            lambda node, log: LightNode(node, host, log, client, geometry.declare(node)),
+                    'cmd/enable_all', Bool, self._switch_all, qos=SWITCH_QOS),),
+                changeable=ChangeableParameters(
+                    host.node, parameters.LIGHT_PARAMETERS, host.values,
+                    check=self._check_parameters, change=self._change_parameters)),
+            lambda node, log: LightNode(node, host, log, client, geometry.declare(node), limits),
             LightNode.bind)
         self._second_reported = False
         self._names_due = math.inf
@@ -100,6 +104,23 @@ class Lights(ServedPayload):
                 f'a second light, {address}, was found; {nodes.first.source.node} serves '
                 f'{nodes.first.address}. After a restart the order may differ: set '
                 'target_system and target_component')
+
+    # Parameters, in any thread
+
+    def _check_parameters(self, values: Values) -> None:
+        parameters.settings(values)
+        parameters.check_not_loosened(values, self._host.values)
+
+    def _change_parameters(self, values: Values) -> None:
+        settings = parameters.settings(values)
+
+        def change(now: float) -> None:
+            self._client.change_settings(settings, now)
+            for node in {self._nodes.first, *self._nodes}:
+                node.limits_changed()
+
+        # At once, so that the other values of an atomic set are checked against the new limits.
+        self._host.link.do(change)
 
     # Requests to all lights
 

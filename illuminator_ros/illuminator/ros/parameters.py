@@ -18,6 +18,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 import functools
+import math
 import re
 import reprlib
 from typing import NamedTuple
@@ -29,7 +30,7 @@ from ..model import MAX_STROBE_PERIOD, MODES, SafetyLimits
 from ...mavlink.messages import Address
 from ...ros.command_sources import SOURCE_PARAMETERS, source_settings
 from ...ros.parameters import (
-    declare_read_only,
+    declare_given,
     ParameterError,
     ParameterSpec,
     Values,
@@ -61,15 +62,15 @@ LIGHT_PARAMETERS = (
     ParameterSpec('on_release', 'keep', 'state of a light that no source holds any more',
                   choices=('keep', 'off')),
     ParameterSpec('max_brightness', 100.0, 'limit of the brightness that is sent', '%', 0.0,
-                  100.0, restricts=True),
+                  100.0, restricts=True, changeable=True),
     ParameterSpec('min_strobe_period', 0.0,
                   'limit of the strobe period that is sent; 0 = none', 's', 0.0,
-                  MAX_STROBE_PERIOD, restricts=True),
+                  MAX_STROBE_PERIOD, restricts=True, changeable=True),
     ParameterSpec('off_after_silence', 0.0,
                   'silence of all sources that switches a light off; 0 = never', 's',
-                  0.0, 3600.0, restricts=True),
+                  0.0, 3600.0, restricts=True, changeable=True),
     ParameterSpec('external_changes', 'follow', 'answer to changes by other senders',
-                  choices=('follow', 'reassert')),
+                  choices=('follow', 'reassert'), changeable=True),
 )
 
 DEVICE_PARAMETERS = (
@@ -108,11 +109,11 @@ class BeamGeometry(NamedTuple):
 
     def declare(self, node: Node) -> BeamGeometry:
         """
-        Declare the geometry of a further light, read-only, and return it.
+        Declare the geometry of a further light and return it.
 
         :raises ParameterError: if a parameter is wrong.
         """
-        return BeamGeometry.of(declare_read_only(
+        return BeamGeometry.of(declare_given(
             node, (spec for spec in LIGHT_PARAMETERS if spec.name in _GEOMETRY), self._asdict()))
 
 
@@ -130,6 +131,23 @@ def settings(values: Values) -> Settings:
                     SafetyLimits(values['max_brightness'], values['min_strobe_period']),
                     values['off_after_silence'], values['external_changes'] == 'reassert',
                     sources, off)
+
+
+def check_not_loosened(values: Values, start: Values) -> None:
+    """
+    Check that no protection is weaker than at the start of the node.
+
+    :raises ParameterError: if one is.
+    """
+    for name, is_weaker in (
+            ('max_brightness', values['max_brightness'] > start['max_brightness']),
+            ('min_strobe_period', values['min_strobe_period'] < start['min_strobe_period']),
+            ('off_after_silence', 0 < start['off_after_silence'] < (
+                values['off_after_silence'] or math.inf))):
+        if is_weaker:
+            raise ParameterError(
+                f'{name}: {values[name]:g} is a weaker limit than {start[name]:g}, which was '
+                f'given at the start: restart the node with -p {name}:=VALUE')
 
 
 @functools.cache

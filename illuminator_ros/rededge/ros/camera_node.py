@@ -51,6 +51,7 @@ from ...ros.diagnostics_publisher import DiagnosticsSource, MakeReports
 from ...ros.node import Answer, NodeInterface, Publication, RequestService
 from ...ros.parameter_services import ParameterServices
 from ...ros.parameters import (
+    ChangeableParameters,
     DeviceParameters,
     given_parameters,
     ParameterError,
@@ -74,7 +75,8 @@ PARAMETERS = (
     ParameterSpec('mount_frame', 'camera', 'the camera in ~/mount: x out of the lens and z to the '
                   'top of the image, or z out of the lens',
                   choices=tuple(frame.value for frame in MountFrame)),
-    ParameterSpec('attitude_rate', 20.0, 'highest rate of attitudes', 'Hz', 1.0, 200.0),
+    ParameterSpec('attitude_rate', 20.0, 'highest rate of attitudes', 'Hz', 1.0, 200.0,
+                  changeable=True),
     # The camera uses received values for 5 s.
     ParameterSpec('position_timeout', 1.0, 'age at which position and velocity are stale', 's',
                   0.05, 5.0),
@@ -128,7 +130,10 @@ class CameraNode(ServedPayload):
         client.feeder.orientation.set_fixed_mount(
             _angles(angles), host.link.clock() + DISCOVERY_TIME)
         ParameterServices(
-            host.node, host.link, host.log, self._parameters, configure=self._set_mount)
+            host.node, host.link, host.log, self._parameters, configure=self._set_mount,
+            changeable=ChangeableParameters(
+                host.node, PARAMETERS, host.values, check=lambda values: None,
+                change=self._change_parameters))
         host.diagnostics.add(DiagnosticsSource(
             host.node.get_fully_qualified_name(), self._take_snapshot))
         client.events.subscribe(self._take)
@@ -163,6 +168,13 @@ class CameraNode(ServedPayload):
                   for name in specs}
         orientation.set_fixed_mount(_angles(angles), now)
         answer(self._parameters.show(angles))
+
+    def _change_parameters(self, values: Values) -> None:
+        """Take parameters that were set, in any thread."""
+        def change(now: float) -> None:
+            self._client.feeder.orientation.change_rate(values['attitude_rate'], now)
+
+        self._host.link.do(change)
 
     def poll(self, now: float) -> None:
         """See :meth:`ServedPayload.poll`."""

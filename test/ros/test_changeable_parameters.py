@@ -1,0 +1,136 @@
+# Copyright 2026 The illuminator_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Parameters that may be set while the node runs, and those that may not."""
+
+from collections.abc import Iterator
+import math
+from typing import Any
+
+from illuminator_ros.illuminator.ros.parameters import LIGHT_PARAMETERS
+from illuminator_ros.mavlink.messages import Address
+import pytest
+from support.light import CONFIGURE, free_port, ServedLight
+from support.ros import Parameters, Ros, running_bridge
+
+START: dict[str, Any] = {
+    'max_brightness': 90.0, 'min_strobe_period': 0.1, 'off_after_silence': 600.0}
+
+
+@pytest.fixture(scope='module')
+def guarded(ros: Ros) -> Iterator[Parameters]:
+    """Return the parameters of a bridge that was started with limits."""
+    with running_bridge(ros.domain, 0, '-r', '__node:=guarded', connection_url='memory://none',
+                        **START):
+        yield Parameters(ros, '/guarded')
+
+
+def test_a_lower_limit_dims_the_light_at_once_and_is_shown(own_ros: Ros) -> None:
+    parameters, port = Parameters(own_ros), free_port()
+    with (running_bridge(own_ros.domain, port),
+          ServedLight(port, brightness=80.0) as light):
+        parameters.wait(brightness=80.0)
+
+        [accepted] = parameters.set(max_brightness=50)
+
+        assert accepted.successful
+        assert parameters.get('max_brightness') == [50.0]
+        parameters.wait(brightness=50.0)
+        assert [command.param2 for command in light.commands(CONFIGURE)] == [50.0]
+        parameters.wait_range('brightness', 50.0)
+        [descriptor] = parameters.describe('brightness')
+        assert descriptor.additional_constraints == 'at most 50 %, which is max_brightness'
+        [refused] = parameters.set(brightness=60.0)
+        assert refused.reason == 'brightness 60 % is above max_brightness 50 %'
+        # All or none, and the limit is put back.
+        result = parameters.set_atomically(max_brightness=40.0, brightness=45.0)
+        assert result.reason == 'brightness 45 % is above max_brightness 40 %'
+        own_ros.synchronize()
+        assert parameters.get('max_brightness', 'brightness') == [50.0, 50.0]
+        assert [command.param2 for command in light.commands(CONFIGURE)] == [50.0]
+
+        assert parameters.set(max_brightness=100.0)[0].successful
+        parameters.wait_range('brightness', 100.0)
+        assert parameters.set(brightness=60.0)[0].successful
+
+
+@pytest.mark.parametrize(('name', 'weaker', 'tighter'), [
+    ('max_brightness', 90.1, 20.0), ('min_strobe_period', 0.05, 0.34),
+    ('off_after_silence', 601.0, 60.0), ('off_after_silence', 0.0, 60.0)])
+def test_a_protection_is_never_weaker_than_at_the_start(
+    guarded: Parameters, name: str, weaker: float, tighter: float,
+) -> None:
+    assert guarded.set(**{name: tighter})[0].successful
+
+    [refused] = guarded.set(**{name: weaker})
+
+    assert not refused.successful
+    assert refused.reason == (
+        f'{name}: {weaker:g} is a weaker limit than {START[name]:g}, which was given at the '
+        f'start: restart the node with -p {name}:=VALUE')
+    assert guarded.get(name) == [tighter]
+    assert guarded.set(**{name: START[name]})[0].successful
+
+
+@pytest.mark.parametrize(('name', 'value', 'reason'), [
+    ('max_brightness', math.nan, 'max_brightness: nan % is out of range: 0 to 100 %'),
+    ('max_brightness', 'bright', "max_brightness: 'bright' is not a number"),
+    ('max_brightness', None, 'max_brightness: None is not a number'),
+    ('external_changes', 'ignore', "external_changes: 'ignore' is not one of follow, reassert"),
+    ('source_timeout', 5.0, 'source_timeout: is given, but sources is empty')])
+@pytest.mark.parametrize('atomically', [False, True])
+def test_a_wrong_value_is_refused_with_the_reason_and_changes_nothing(
+    guarded: Parameters, name: str, value: object, reason: str, atomically: bool,
+) -> None:
+    before = guarded.get(name)
+
+    if atomically:
+        result = guarded.set_atomically(**{name: value})
+    else:
+        [result] = guarded.set(**{name: value})
+
+    assert (result.successful, result.reason) == (False, reason)
+    assert guarded.get(name) == before
+
+
+def test_the_descriptors_show_which_parameters_may_be_set(guarded: Parameters) -> None:
+    names = [spec.name for spec in LIGHT_PARAMETERS]
+
+    assert [descriptor.read_only for descriptor in guarded.describe(*names)] == [
+        not spec.changeable for spec in LIGHT_PARAMETERS]
+
+
+def test_changes_by_others_are_undone_from_the_moment_at_which_the_parameter_is_set(
+        own_ros: Ros) -> None:
+    parameters, port = Parameters(own_ros), free_port()
+    with running_bridge(own_ros.domain, port) as bridge, ServedLight(port) as light:
+        parameters.wait(mode='internal_control')
+        assert parameters.set(external_changes='reassert')[0].successful
+        light.report(enable=1)
+
+        bridge.wait_for('is switched off by external_changes: another sender switched it on')
+
+
+def test_a_further_light_is_served_within_a_limit_that_was_set_later(own_ros: Ros) -> None:
+    port = free_port()
+    with (running_bridge(own_ros.domain, port, '-p', 'illuminator_1_244:brightness:=70.0')
+          as bridge, ServedLight(port) as light):
+        Parameters(own_ros).wait(mode='internal_control')
+        assert Parameters(own_ros).set(max_brightness=50.0)[0].successful
+        with ServedLight(port, Address(1, 244), brightness=30.0) as other:
+            bridge.wait_for('light 1/244 is served by /illuminator_1_244')
+            further = Parameters(own_ros, '/illuminator_1_244')
+            further.wait(brightness=50.0)
+            further.wait_range('brightness', 50.0)
+            assert other.fake.fields['brightness'] == light.fake.fields['brightness'] == 50.0
