@@ -335,6 +335,16 @@ def mount_angles(mount: Quaternion, frame: MountFrame) -> Vector:
         (rest.x, rest.w) if rest.w >= 0 else (-rest.x, -rest.w)))), pitch, yaw
 
 
+def fixed_mount(angles: Vector, frame: MountFrame) -> Quaternion:
+    """
+    Return the orientation of the camera's frame in ``base_link``.
+
+    :param angles: as :func:`mount_angles` returns them.
+    """
+    mount = flip(_ZERO_POSE * Quaternion.from_euler(*map(math.radians, angles)))
+    return mount * _FROM_OPTICAL if frame is MountFrame.OPTICAL else mount
+
+
 def mount_status(angles: Vector, target: tuple[int, int]) -> MountStatus:
     """
     Return MOUNT_STATUS.

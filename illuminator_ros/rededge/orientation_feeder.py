@@ -75,6 +75,8 @@ class OrientationFeeder:
 
     :param send: sends a message.
     :param target: returns the address of the camera.
+    :ivar fixed_mount: roll, pitch and yaw of a fixed mount, degrees; None if ~/mount has a
+        publisher.
     :ivar sent: sent pairs; pairs that are made while the link is closed are dropped.
     """
 
@@ -90,8 +92,7 @@ class OrientationFeeder:
         self._histories = {name: _History(settings.attitude_timeout)
                            for name in (Input.IMU, Input.ATTITUDE, Input.MOUNT)}
         self._mount_parent = MountParent.VEHICLE
-        # Roll, pitch and yaw of a fixed mount, degrees; None if ~/mount has a publisher.
-        self._fixed_mount: Vector | None = (0.0, 0.0, 0.0)
+        self.fixed_mount: Vector | None = (0.0, 0.0, 0.0)
         self._fixed_since = -math.inf
         # When mount angles were sent last, s; infinity while the link is closed.
         self._mount_sent_at = math.inf
@@ -138,11 +139,11 @@ class OrientationFeeder:
     @property
     def mount_is_fixed(self) -> bool:
         """Return whether the mount is given by parameters, and not by ``~/mount``."""
-        return self._fixed_mount is not None
+        return self.fixed_mount is not None
 
     def expect_mount(self) -> None:
         """Stop sending the fixed mount, since ``~/mount`` has a publisher."""
-        self._fixed_mount = None
+        self.fixed_mount = None
 
     def set_fixed_mount(self, angles: Vector, since: float) -> None:
         """
@@ -150,8 +151,8 @@ class OrientationFeeder:
 
         :param since: when it may be sent first, s.
         """
-        if self._fixed_mount is not None:
-            self._fixed_mount, self._fixed_since = angles, since
+        if self.fixed_mount is not None:
+            self.fixed_mount, self._fixed_since = angles, since
             if self._link_open:
                 self._mount_sent_at = -math.inf
 
@@ -162,7 +163,7 @@ class OrientationFeeder:
         history = self._histories[name]
         if now < self._pair_due or not (is_fresh(name, now) and history.samples):
             return
-        time, angles = history.samples[-1].time, self._fixed_mount
+        time, angles = history.samples[-1].time, self.fixed_mount
         if angles is None:
             if not (is_fresh(Input.MOUNT, now) and mounts.samples):
                 return
@@ -217,10 +218,10 @@ class OrientationFeeder:
 
     def poll(self, now: float) -> None:
         """See :meth:`Payload.poll`."""
-        if self._fixed_mount is not None and now >= self.next_deadline():
-            self._send_mount(self._fixed_mount, now)
+        if self.fixed_mount is not None and now >= self.next_deadline():
+            self._send_mount(self.fixed_mount, now)
 
     def next_deadline(self) -> float:
         """See :meth:`Payload.next_deadline`."""
-        return math.inf if self._fixed_mount is None else max(
+        return math.inf if self.fixed_mount is None else max(
             self._fixed_since, self._mount_sent_at + MOUNT_INTERVAL)

@@ -37,6 +37,7 @@ from ...mavlink.dialect import flag_names, mavlink
 from ...payload.attempt import Done, Result
 from ...payload.command_sources import DEFAULT, describe
 from ...payload.messages import GeoPoint
+from ...payload.mount_attitude import YawFrame
 from ...ros import node as ros_node
 from ...ros.command_sources import prefixes, release_services
 from ...ros.conversions import quaternion_message
@@ -46,6 +47,7 @@ from ...ros.parameters import ChangeableParameters
 from ...ros.payload import Host
 from ...ros.qos import STREAM_QOS
 from ...ros.throttled_log import NodeLog
+from ...ros.transforms import TransformPublisher
 
 T = TypeVar('T')
 
@@ -72,19 +74,23 @@ class GimbalNode:
     """
     Serves one gimbal with a node; all methods are for the link's thread.
 
+    :param transforms: publishes the frame of the gimbal, None for no frame.
     :param changeable: the parameters of the node that may be set while it runs.
     :ivar key: of the gimbal, None while there is none.
     """
 
     def __init__(
         self, node: Node, host: Host, log: NodeLog, client: GimbalClient,
-        why_none: Callable[[], str], changeable: ChangeableParameters | None = None,
+        why_none: Callable[[], str], transforms: TransformPublisher | None = None,
+        changeable: ChangeableParameters | None = None,
     ) -> None:
         self.key: events.GimbalKey | None = None
         self._host = host
         self._log = log
         self._client = client
         self._why_none = why_none
+        self._transforms = transforms
+        self._frame = node.get_name()
         self._frames = conversions.Frames.of(host.values)
         self._clock = node.get_clock()
         self._started = host.link.clock()
@@ -192,6 +198,9 @@ class GimbalNode:
                             frame_id=self._frames.name(attitude.frame))
             rotation, rates = attitude.rotation, attitude.rates
             publish('attitude', lambda: quaternion_message(header, rotation))
+            # A frame has one parent, whatever the yaw is relative to (REP 105).
+            if self._transforms and (level := attitude.seen_from(YawFrame.VEHICLE)):
+                self._transforms.move(self._frames.vehicle, self._frame, level, header.stamp)
             publish('angles', lambda: conversions.vector_message(header, rotation.euler()))
             if rates is not None:
                 publish('angular_velocity', lambda: conversions.vector_message(header, rates))

@@ -32,6 +32,7 @@ from ...ros.conversions import GEOID_SEPARATION
 from ...ros.device_nodes import DeviceNodes
 from ...ros.parameters import ChangeableParameters, ParameterSpec, Values
 from ...ros.payload import Host, RosPayload, ServedPayload, ShutdownReport
+from ...ros.transforms import PUBLISH_TF, TransformPublisher
 
 GIMBAL_PARAMETERS = (
     ParameterSpec('gimbal_device_id', 0, 'gimbal device id of the gimbal to serve; 0 = the first',
@@ -41,6 +42,7 @@ GIMBAL_PARAMETERS = (
     ParameterSpec('setpoint_timeout', 0.5, 'silence of ~/cmd/rate after which zero is sent', 's',
                   0.05, 60.0, changeable=True),
     *FRAME_PARAMETERS,
+    PUBLISH_TF,
     GEOID_SEPARATION,
     ParameterSpec('attitude_interval', 0.0, "period of the attitude; 0 = the device's own", 's',
                   0.0, 3600.0),
@@ -72,12 +74,13 @@ class Gimbals(ServedPayload):
     ) -> None:
         self._client = client
         self._host = host
+        transforms = TransformPublisher.of(host.node, host.values, host.log)
         self._nodes = DeviceNodes[GimbalKey, GimbalNode](
             host, 'gimbal', GimbalNode(
-                host.node, host, host.log, client, why_none, ChangeableParameters(
+                host.node, host, host.log, client, why_none, transforms, ChangeableParameters(
                     host.node, GIMBAL_PARAMETERS, host.values, check=settings,
                     change=self._change_parameters)),
-            lambda node, log: GimbalNode(node, host, log, client, why_none),
+            lambda node, log: GimbalNode(node, host, log, client, why_none, transforms),
             GimbalNode.bind)
         client.events.subscribe(self._take)
 

@@ -28,6 +28,7 @@ from ..events import LightEvent, LightLost, StatusReceived
 from ..model import Mode, Status
 from ...payload.rotation import Quaternion
 from ...ros.qos import STATE_QOS
+from ...ros.transforms import TransformPublisher
 
 Point = tuple[float, float, float]
 
@@ -100,6 +101,40 @@ class Beam:
         a second, and the moment of a flash is not known.
         """
         return MAX_ALPHA * self.brightness / 100 * self.duty_cycle / 100 if self.on else 0.0
+
+
+class BeamFrame:
+    """
+    Publishes the frame of a beam, which has the beam along +x, in the link's thread.
+
+    :param direction: as of :class:`BeamPublisher`.
+    """
+
+    def __init__(
+        self, transforms: TransformPublisher, geometry: BeamGeometry, name: str,
+        direction: Callable[[int], Quaternion | None],
+    ) -> None:
+        self._transforms = transforms
+        self._parent = geometry.frame_id
+        self._name = name
+        self._mounted_on = geometry.mounted_on
+        self._direction = direction
+        # Whether the frame is static; None until a status shows that.
+        self._is_fixed: bool | None = None
+        self._device_id = 0
+
+    def take(self, event: LightEvent) -> None:
+        """Take an event of the light."""
+        if isinstance(event, StatusReceived) and self._is_fixed is None:
+            self._device_id = self._mounted_on or event.status.gimbal_device_id
+            self._is_fixed = not self._device_id
+            if self._is_fixed:
+                self._transforms.fix(self._parent, self._name, Quaternion())
+
+    def mount_moved(self) -> None:
+        """Publish the direction: a gimbal has sent its attitude."""
+        if self._device_id and (rotation := self._direction(self._device_id)):
+            self._transforms.move(self._parent, self._name, rotation)
 
 
 class BeamPublisher:

@@ -24,7 +24,7 @@ from rclpy.node import Node
 from std_msgs.msg import Bool, Float32, String
 from std_srvs.srv import SetBool, Trigger
 
-from .beam import BeamPublisher
+from .beam import BeamFrame, BeamPublisher
 from .diagnostics import hardware_id, LightsHeard, reports, why_no_light
 from .event_publisher import EventPublisher, PUBLICATIONS
 from .parameters import BeamGeometry, device_parameters
@@ -43,6 +43,7 @@ from ...ros.parameter_services import ParameterServices
 from ...ros.parameters import ChangeableParameters, DeviceParameters, ParameterError
 from ...ros.payload import Host
 from ...ros.throttled_log import NodeLog
+from ...ros.transforms import TransformPublisher
 
 # Refreshes that may wait for their answers: each is two messages of the light.
 MAX_REFRESHES = 16
@@ -59,6 +60,7 @@ class LightNode:
     :param limits: those of the start, which the values given for parameters must observe.
     :param services: and ``commands``, of the node in addition to those of its light.
     :param changeable: the parameters of the node that may be set while it runs.
+    :param transforms: publishes the frame of the beam, None for no frame.
     :ivar address: of the light, None while there is none.
     :raises ParameterError: if the value given for a parameter of the light is wrong.
     """
@@ -69,6 +71,7 @@ class LightNode:
         services: tuple[ros_node.RequestService, ...] = (),
         commands: tuple[ros_node.AnyCommand, ...] = (),
         changeable: ChangeableParameters | None = None,
+        transforms: TransformPublisher | None = None,
     ) -> None:
         self.name = node.get_name()
         self.address: Address | None = None
@@ -102,6 +105,9 @@ class LightNode:
             check_diagnostics=host.check_diagnostics)
         self._beam = (BeamPublisher(node, geometry, self._direction)
                       if geometry.beam_range else None)
+        self._frame = (
+            BeamFrame(transforms, geometry, f'{self.name}_beam', self._direction)
+            if transforms else None)
         self.source = DiagnosticsSource(node.get_fully_qualified_name(), self._take_snapshot)
 
     def bind(self, address: Address, now: float) -> None:
@@ -127,6 +133,8 @@ class LightNode:
         self._publishers.take(event)
         if self._beam is not None:
             self._beam.take(event)
+        if self._frame is not None:
+            self._frame.take(event)
 
     def limits_changed(self) -> None:
         """Show the limits of the client in the descriptions of the parameters."""
@@ -136,6 +144,8 @@ class LightNode:
         """Note that a gimbal of the vehicle has sent its attitude."""
         if self._beam is not None:
             self._beam.mount_moved()
+        if self._frame is not None:
+            self._frame.mount_moved()
 
     def _direction(self, device_id: int) -> Quaternion | None:
         return self.address and self._client.mounts.direction(

@@ -35,6 +35,7 @@ from ...ros.device_nodes import DeviceNodes
 from ...ros.node import Answer, CommandTopic, RequestService, SWITCH_QOS
 from ...ros.parameters import ChangeableParameters, Values
 from ...ros.payload import Host, RosPayload, ServedPayload, ShutdownReport
+from ...ros.transforms import TransformPublisher
 
 # s from the first light to the warnings on unused names: lights that start together are heard by
 # then.
@@ -55,6 +56,7 @@ class Lights(ServedPayload):
         self._names = parameters.NodeNames(host.values, host.node.get_name())
         geometry = parameters.BeamGeometry.of(host.values)
         limits = client.settings.limits
+        transforms = TransformPublisher.of(host.node, host.values, host.log)
         self._nodes = DeviceNodes[Address, LightNode](
             host, 'light', LightNode(
                 host.node, host, host.log, client, geometry, limits,
@@ -63,8 +65,10 @@ class Lights(ServedPayload):
                     'cmd/enable_all', Bool, self._switch_all, qos=SWITCH_QOS),),
                 changeable=ChangeableParameters(
                     host.node, parameters.LIGHT_PARAMETERS, host.values,
-                    check=self._check_parameters, change=self._change_parameters)),
-            lambda node, log: LightNode(node, host, log, client, geometry.declare(node), limits),
+                    check=self._check_parameters, change=self._change_parameters),
+                transforms=transforms),
+            lambda node, log: LightNode(node, host, log, client, geometry.declare(node), limits,
+                                        transforms=transforms),
             LightNode.bind)
         self._second_reported = False
         self._names_due = math.inf
@@ -192,7 +196,8 @@ class Lights(ServedPayload):
 def _make_client(commands: CommandSender, values: Values) -> IlluminatorClient:
     return IlluminatorClient(
         commands, parameters.settings(values), wanted=parameters.Selection(values).is_served,
-        needs_mounts=bool(values['beam_range'] or values['mounted_on']))
+        needs_mounts=bool(
+            values['beam_range'] or values['mounted_on'] or values['publish_tf']))
 
 
 ILLUMINATOR = RosPayload(

@@ -35,6 +35,7 @@ from ...ros.parameters import (
     ParameterSpec,
     Values,
 )
+from ...ros.transforms import PUBLISH_TF
 
 LIGHT_PARAMETERS = (
     ParameterSpec('target_system', 0, 'system id of the light to serve; 0 = any', low=0,
@@ -54,6 +55,7 @@ LIGHT_PARAMETERS = (
                   3.0),
     ParameterSpec('mounted_on', 0, 'gimbal device id of the mount; 0 = as the light reports',
                   low=0, high=255),
+    PUBLISH_TF,
     ParameterSpec('off_on_shutdown', False, 'switch the lights off when the node ends',
                   restricts=True),
     ParameterSpec('restore_configuration', True,

@@ -32,7 +32,7 @@ from .diagnostics import reports, topics, why_no_camera
 from .inputs import subscriptions
 from ..camera import CameraConnected, CameraEvent, CameraLost, ImageTaken
 from ..client import RedEdgeClient, Settings
-from ..conversions import image_attitude, image_position, MountFrame
+from ..conversions import fixed_mount, image_attitude, image_position, MountFrame, MountParent
 from ..input_states import (
     FeederSettings,
     Input,
@@ -60,6 +60,7 @@ from ...ros.parameters import (
 )
 from ...ros.payload import Host, RosPayload, ServedPayload
 from ...ros.qos import STREAM_QOS
+from ...ros.transforms import PUBLISH_TF, TransformPublisher
 
 # The frame of ~/image/attitude: its axes point to east, north and up (REP-105).
 EARTH_FRAME = 'map'
@@ -86,6 +87,7 @@ PARAMETERS = (
     ParameterSpec('heartbeat_timeout', 3.5, 'silence after which the camera is lost', 's', 1.1,
                   3600.0),
     ParameterSpec('frame_id', 'rededge', 'frame of ~/image/fix'),
+    PUBLISH_TF,
 )
 MOUNT_PARAMETERS = tuple(
     ParameterSpec(f'mount_{name}', 0.0, f'{name} of a fixed camera in its own axes; 0 at first',
@@ -127,6 +129,8 @@ class CameraNode(ServedPayload):
         angles = {spec.name: spec.check(given.get(spec.name, spec.default))
                   for spec in MOUNT_PARAMETERS}
         self._parameters.show(angles)
+        self._transforms = TransformPublisher.of(host.node, host.values, host.log)
+        self._frame_due = self._started + DISCOVERY_TIME
         client.feeder.orientation.set_fixed_mount(
             _angles(angles), host.link.clock() + DISCOVERY_TIME)
         ParameterServices(
@@ -167,6 +171,7 @@ class CameraNode(ServedPayload):
         angles = {name: specs[name].check(changes.get(name, node.get_parameter(name).value))
                   for name in specs}
         orientation.set_fixed_mount(_angles(angles), now)
+        self._frame_due = now
         answer(self._parameters.show(angles))
 
     def _change_parameters(self, values: Values) -> None:
@@ -187,6 +192,11 @@ class CameraNode(ServedPayload):
         if orientation.mount_is_fixed and self._host.node.count_publishers(self._mount_topic):
             orientation.expect_mount()
             self._host.log.info('~/mount has a publisher: the mount is not fixed')
+        if self._transforms and orientation.fixed_mount and now >= self._frame_due:
+            self._frame_due = math.inf
+            self._transforms.fix(
+                MountParent.VEHICLE.value, self._host.values['frame_id'],
+                fixed_mount(orientation.fixed_mount, self._client.settings.feeder.mount_frame))
 
     # Events
 
