@@ -51,8 +51,10 @@ setup(
         'yaml': ['pyyaml>=5.4'],
         # "colcon test" looks here for pytest.
         # scipy is the oracle for rotations; mavsdk is another player at a gimbal.
+        # mcap reads recordings without ROS.
         'test': ['pytest', 'pytest-timeout', 'hypothesis', 'pyserial', 'pyyaml', 'scipy',
-                 'mavsdk>=4.1', 'textual>=8', 'textual-serve>=1.1'],
+                 'mavsdk>=4.1', 'mcap>=1.2', 'mcap-ros2-support>=0.5', 'textual>=8',
+                 'textual-serve>=1.1'],
     },
     zip_safe=True,
     maintainer='The illuminator_ros developers',
