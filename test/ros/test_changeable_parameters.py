@@ -18,14 +18,20 @@ from collections.abc import Iterator
 import math
 from typing import Any
 
-from illuminator_ros.illuminator.ros.parameters import LIGHT_PARAMETERS
+from illuminator_ros.gimbal.ros.gimbals import GIMBAL_PARAMETERS
+from illuminator_ros.gimbal.ros.manager_node import MANAGER_PARAMETERS
+from illuminator_ros.illuminator.ros.parameters import DEVICE_PARAMETERS, LIGHT_PARAMETERS
 from illuminator_ros.mavlink.messages import Address
+from illuminator_ros.rededge.ros.camera_node import MOUNT_PARAMETERS, PARAMETERS
+from illuminator_ros.ros.parameters import LINK_PARAMETERS, ParameterSpec
 import pytest
 from support.light import CONFIGURE, free_port, ServedLight
 from support.ros import Parameters, Ros, running_bridge
 
 START: dict[str, Any] = {
     'max_brightness': 90.0, 'min_strobe_period': 0.1, 'off_after_silence': 600.0}
+SPECS = (*LINK_PARAMETERS, *LIGHT_PARAMETERS, *DEVICE_PARAMETERS, *GIMBAL_PARAMETERS,
+         *MANAGER_PARAMETERS, *PARAMETERS, *MOUNT_PARAMETERS)
 
 
 @pytest.fixture(scope='module')
@@ -109,6 +115,19 @@ def test_the_descriptors_show_which_parameters_may_be_set(guarded: Parameters) -
 
     assert [descriptor.read_only for descriptor in guarded.describe(*names)] == [
         not spec.changeable for spec in LIGHT_PARAMETERS]
+
+
+@pytest.mark.parametrize('spec', SPECS, ids=lambda spec: spec.name)
+def test_the_range_of_a_number_fits_a_slider_of_rqt_reconfigure(spec: ParameterSpec) -> None:
+    """Its sliders have an int of 32 bits, a finite range, and the default in it."""
+    descriptor = spec.descriptor(read_only=False)
+    ranges = [*descriptor.integer_range, *descriptor.floating_point_range]
+
+    assert len(ranges) == (type(spec.default) in (int, float))
+    for one in ranges:
+        assert isinstance(spec.default, int | float)
+        assert -2**31 <= one.from_value <= spec.default <= one.to_value < 2**31
+        assert (one.from_value < one.to_value, one.step) == (True, 0)
 
 
 def test_changes_by_others_are_undone_from_the_moment_at_which_the_parameter_is_set(
