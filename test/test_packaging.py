@@ -15,16 +15,18 @@
 """The package's metadata, as the tools of ROS and pip read it."""
 
 import ast
+import importlib
 from pathlib import Path
 import shutil
 import subprocess
 import sys
 
+from catkin_pkg.changelog import get_changelog_from_path
 from catkin_pkg.package import parse_package
-from catkin_pkg.package_version import (
-    update_versions,
-)
+from catkin_pkg.package_version import update_changelog_sections, update_versions
 import pytest
+from support.ports import free_port
+from support.processes import Program
 
 ROOT = Path(__file__).parents[1]
 PACKAGE = 'illuminator_ros'
@@ -121,3 +123,54 @@ def test_pip_installs_executables_with_names_that_hide_no_other_program(
         f'illuminator-{name}' for name in (
             'bridge', 'conformance', 'gimbal', 'gimbal_manager', 'monitor', 'rededge',
             'simulator')}
+
+
+@pytest.fixture
+def clean(copy: Path, tmp_path: Path) -> Path:
+    """Return the folder of the executables of a venv with the wheel and pymavlink, without ROS."""
+    pytest.importorskip('wheel', reason='wheel is not installed')
+    output(copy, '-m', 'pip', 'wheel', '--no-index', '--no-deps', '--no-build-isolation',
+           '--wheel-dir', str(tmp_path), '.')
+    [wheel] = tmp_path.glob('*.whl')
+    venv = tmp_path / 'venv'
+    output(tmp_path, '-m', 'venv', '--without-pip', str(venv))
+    [site] = venv.glob('lib/python*/site-packages')
+    for name in ('pymavlink', 'fastcrc'):
+        [folder] = importlib.import_module(name).__path__
+        (site / name).symlink_to(folder)
+    output(tmp_path, '-m', 'pip', '--python', str(venv / 'bin' / 'python'), 'install',
+           '--no-index', '--no-deps', str(wheel))
+    return venv / 'bin'
+
+
+def test_tools_of_the_wheel_that_need_no_ros_work_in_a_clean_venv(clean: Path) -> None:
+    port = free_port()
+    simulator = Program(str(clean / 'illuminator-simulator'), f'udpin://127.0.0.1:{port}')
+    try:
+        simulator.wait_for('1/243')
+        checks = Program(
+            str(clean / 'illuminator-conformance'), f'udpout://127.0.0.1:{port}', '--yes',
+            '--only', 'heartbeat-type', '--only', 'on', '--only', 'off')
+        assert checks.wait() == 0, checks.log
+        assert 'PASS' in checks.log
+    finally:
+        simulator.kill()
+
+
+def test_bridge_and_monitor_of_the_wheel_name_the_package_that_is_missing(clean: Path) -> None:
+    for name, missing in (('bridge', 'rclpy'), ('monitor', 'rclpy')):
+        program = Program(str(clean / f'illuminator-{name}'))
+        assert program.wait() == 1
+        assert missing in program.log
+        assert 'Traceback' not in program.log
+
+
+def test_a_release_names_the_version_in_the_changelog_as_bloom_wants_it(copy: Path) -> None:
+    changelog = copy / 'CHANGELOG.rst'
+    update_changelog_sections(
+        {PACKAGE: (str(changelog), get_changelog_from_path(str(copy)), 'Forthcoming')}, '12.3.4')
+
+    [(version, _, entries)] = get_changelog_from_path(str(copy)).foreach_version()
+    assert version == '12.3.4'
+    assert len([*entries[0]]) > 30
+    assert copy.joinpath(parse_package(str(copy)).licenses[0].file).is_file()

@@ -14,8 +14,11 @@
 
 """The package as ``colcon build`` installs it."""
 
+import configparser
 from pathlib import Path
+import shlex
 import shutil
+import signal
 import subprocess
 import sys
 
@@ -103,3 +106,32 @@ def test_installed_programs_find_each_other(
 
         # Retry: these use the clock of the machine; if it pauses, a set may be too late.
         eventually(lambda: Parameters(own_ros).set(brightness=60)[0].successful)
+
+
+def test_command_of_the_systemd_unit_is_the_bridge_itself_and_ends_on_sigterm(
+    own_ros: Ros, workspace: Path, tmp_path: Path,
+) -> None:
+    unit = configparser.ConfigParser(interpolation=None)
+    unit.optionxform = str  # type: ignore[assignment,method-assign]
+    unit.read(workspace / 'install/illuminator_ros/share/illuminator_ros/config'
+              / 'illuminator.service')
+    service = unit['Service']
+    parameters = tmp_path / 'boat.yaml'
+    parameters.write_text('/**: {ros__parameters: {connection_url: "memory://none"}}')
+    command = service['ExecStart'].replace('/home/pilot/ws', str(workspace)).replace(
+        '/home/pilot/boat.yaml', str(parameters))
+    path = f'{Path(sys.executable).parent}:/usr/bin:/bin'
+    bridge = Program(*shlex.split(command), env={
+        'ROS_DOMAIN_ID': str(own_ros.domain), 'PATH': path})
+    with ended(bridge):
+        bridge.wait_for('link open')
+        assert Path(f'/proc/{bridge.pid}/cmdline').read_text().split('\0')[1].endswith('/bridge')
+        assert bridge.end(signal.SIGTERM) == 0
+    assert (service['Restart'], service['RestartPreventExitStatus']) == ('on-failure', '2')
+    assert float(service['TimeoutStopSec']) > 2
+    assert unit['Unit']['StartLimitIntervalSec'] == '0'
+    if verify := shutil.which('systemd-analyze'):
+        verified = subprocess.run(
+            [verify, 'verify', str(ROOT / 'config' / 'illuminator.service')],
+            capture_output=True, text=True)
+        assert (verified.returncode, verified.stderr) == (0, '')
