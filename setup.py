@@ -51,9 +51,10 @@ setup(
         'yaml': ['pyyaml>=5.4'],
         # "colcon test" looks here for pytest.
         # scipy is the oracle for rotations; mavsdk is another player at a gimbal.
-        # mcap reads recordings without ROS.
+        # mcap reads recordings without ROS; cyclonedds is another middleware.
         'test': ['pytest', 'pytest-timeout', 'hypothesis', 'pyserial', 'pyyaml', 'scipy',
-                 'mavsdk>=4.1', 'mcap>=1.2', 'mcap-ros2-support>=0.5', 'textual>=8',
+                 'mavsdk>=4.1', 'mcap>=1.2', 'mcap-ros2-support>=0.5',
+                 'cyclonedds>=11.0', 'textual>=8',
                  'textual-serve>=1.1'],
     },
     zip_safe=True,

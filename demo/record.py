@@ -68,7 +68,7 @@ class Recorder:
     """
     Writes each message of each topic, as the middleware delivers it.
 
-    :ivar topics: those that are recorded.
+    :ivar topics: the names of the recorded topics.
     """
 
     def __init__(self, path: str) -> None:

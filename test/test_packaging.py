@@ -42,7 +42,7 @@ pytestmark = pytest.mark.timeout(300)
 # Modules of the extra "monitor", without a rosdep key.
 OPTIONAL = {'textual', 'textual_serve', 'aiohttp'}
 # Further ones without a key. Tests skip if one is absent.
-PEERS = {'mavsdk', *OPTIONAL}
+PEERS = {'cyclonedds', 'mavsdk', *OPTIONAL}
 # They make tf2_msgs where there is no ROS; a ROS installation has both.
 GENERATORS = {'rosidl_adapter', 'rosidl_generator_c', 'rosidl_generator_py',
               'rosidl_generator_type_description', 'rosidl_typesupport_c',

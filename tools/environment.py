@@ -53,8 +53,8 @@ LINT = ['ros-ament-lint>=0.17', 'ros-ament-flake8>=0.17', 'ros-ament-pep257>=0.1
         'flake8-class-newline>=1.6', 'flake8-comprehensions>=3.14', 'flake8-deprecated>=2.2',
         'flake8-docstrings>=1.6', 'flake8-import-order>=0.18', 'flake8-quotes>=3.4']
 # Independent of ROS and of this package: a MAVLink stack, which is the other player at a gimbal in
-# the tests, and a reader of recordings.
-PEERS = ['mavsdk>=4.1', 'mcap>=1.2', 'mcap-ros2-support>=0.5']
+# the tests; a reader of recordings; another middleware.
+PEERS = ['mavsdk>=4.1', 'mcap>=1.2', 'mcap-ros2-support>=0.5', 'cyclonedds>=11.0']
 # A router for the tests, alone: run without a display it needs none of the gigabyte of graphics
 # packages that it asks for.
 ALONE = ['MAVProxy>=1.8.70']
