@@ -157,7 +157,7 @@ class LinkStatus:
     :ivar since: when it was opened or lost, s.
     :ivar reason: why it is not open, '' where it is.
     :ivar openings: how often it was opened.
-    :ivar events: those that are not reported yet.
+    :ivar events: openings and losses without a report yet.
     """
 
     def __init__(self, label: str, now: float) -> None:
