@@ -74,28 +74,33 @@ class Node:
     """
     A node with all options of its interface.
 
-    :param page: the page that describes it.
+    :param pages: the pages that describe it.
     :param headings: the headings of the tables with its topics and services.
     :param parameters: the parameters that it is started with.
     :param operator: the node that its policy permits to use it.
     """
 
-    page: str
+    pages: tuple[str, ...]
     headings: tuple[str, ...]
     parameters: dict[str, Any]
     operator: str
 
     @property
+    def text(self) -> str:
+        """Return its pages, without backquotes."""
+        return '\n'.join((ROOT / 'doc' / f'{page}.md').read_text().replace('`', '')
+                         for page in self.pages)
+
+    @property
     def rows(self) -> list[list[str]]:
         """Return the rows of its tables, each with its heading first."""
-        page = (ROOT / 'doc' / f'{self.page}.md').read_text().replace('`', '')
-        return [[heading, *row] for heading in self.headings for row in table(page, heading)]
+        return [[heading, *row] for heading in self.headings
+                for row in table(self.text, heading)]
 
     @property
     def of_sources(self) -> set[str]:
         """Return the names that its page describes for sources of commands."""
-        page = (ROOT / 'doc' / f'{self.page}.md').read_text().replace('`', '')
-        names = [name for row in table(page, 'of a source') for name in row[0].split(', ')]
+        names = [name for row in table(self.text, 'of a source') for name in row[0].split(', ')]
         return {'~/source', '~/default/release', *(
             name.replace('NAME', source) for name in names for source in SOURCES)}
 
@@ -103,12 +108,12 @@ class Node:
 ACCEPTED = ('published', 'accepted')
 WITH_SOURCES = {'sources': f'[{", ".join(SOURCES)}]'}
 NODES = {
-    'illuminator': Node('reference', ACCEPTED, {
+    'illuminator': Node(('reference',), ACCEPTED, {
         **WITH_SOURCES, 'beam_range': 5.0, 'target_component': 243}, 'operator'),
-    'gimbal': Node('gimbal', ACCEPTED, WITH_SOURCES, 'gimbal_operator'),
-    'gimbal_manager': Node('gimbal', (*ACCEPTED, 'topic of the manager'), {
+    'gimbal': Node(('gimbal',), ACCEPTED, WITH_SOURCES, 'gimbal_operator'),
+    'gimbal_manager': Node(('gimbal', 'gimbal_manager'), (*ACCEPTED, 'topic of the manager'), {
         **WITH_SOURCES, 'gimbal_device_id': 1}, 'gimbal_manager_operator'),
-    'rededge': Node('rededge', ('subscribed', 'published', 'service'), {}, 'rededge_operator'),
+    'rededge': Node(('rededge',), ('subscribed', 'published', 'service'), {}, 'rededge_operator'),
 }
 each_node = pytest.mark.parametrize('name', NODES)
 
