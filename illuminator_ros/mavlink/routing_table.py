@@ -46,6 +46,8 @@ class RoutingTable:
         # When a component was last heard over more peers than a route has.
         self._overflowed: dict[tuple[int, int], float] = {}
         self._expiry_due = -math.inf
+        # When a component was last heard for which there was no room.
+        self._full_at: float | None = None
 
     def __len__(self) -> int:
         return len(self._routes)
@@ -64,6 +66,7 @@ class RoutingTable:
         route = self._routes.get(source)
         if route is None:
             if len(self._routes) >= MAX_ROUTES and not self._expire(now):
+                self._full_at = now
                 return
             route = self._routes[source] = {}
         if peer not in route and len(route) >= MAX_ROUTE_PEERS:
@@ -74,20 +77,27 @@ class RoutingTable:
                 return
         route[peer] = now
 
+    def is_full(self, now: float, within: float = EXPIRY) -> bool:
+        """Return whether a component was lately heard for which there was no room."""
+        return self._full_at is not None and now - self._full_at <= within
+
     def towards(
         self, target: Address, peers: Sequence[Peer], now: float, within: float = EXPIRY,
     ) -> Sequence[Peer]:
         """
-        Return the peers that lead to a target, none if it has no route.
+        Return the peers that lead to a target: none without a route, all if there was no room.
 
         :param target: all components of the system where the component id is 0.
         :param within: how far back a route counts, s.
         """
+        if target not in self._routes and self.is_full(now, within):
+            return peers
         sources = [target] if target.component else [
             one for one in self._routes if one[0] == target.system]
         known: set[Peer] = set()
         for source in sources:
-            if self._overflowed and now - self._overflowed.get(source, -math.inf) <= within:
+            overflowed = self._overflowed.get(source)
+            if overflowed is not None and now - overflowed <= within:
                 return peers
             known.update(peer for peer, heard in self._routes.get(source, {}).items()
                          if now - heard <= within)
@@ -101,6 +111,7 @@ class RoutingTable:
         """Remove all routes: the link is closed."""
         self._routes.clear()
         self._overflowed.clear()
+        self._full_at = None
 
     def _expire(self, now: float) -> bool:
         """Remove expired routes, and return whether there is room for another."""
@@ -134,9 +145,11 @@ class Router:
         Return where to send one of our own messages: everywhere if no line knows the target.
 
         A message to all components of a system goes everywhere, too: some may not have been heard
-        yet.
+        yet. So does each while a line has heard more components than it remembers.
         """
-        found = self._known(target, peers, now) if target.system and target.component else ()
+        is_one = target.system and target.component
+        is_full = any(table.is_full(now) for table in self._tables)
+        found = self._known(target, peers, now) if is_one and not is_full else ()
         return found if any(found) else peers
 
     def targets(self, frame: Frame, peers: Peers, now: float) -> Peers:

@@ -18,7 +18,7 @@ from __future__ import annotations
 
 from illuminator_ros.mavlink.dialect import mavlink
 from illuminator_ros.mavlink.messages import Address, CommandLong, heartbeat, Message
-from illuminator_ros.mavlink.routing_table import EXPIRY, Router, RoutingTable
+from illuminator_ros.mavlink.routing_table import EXPIRY, MAX_ROUTES, Router, RoutingTable
 import pytest
 from support.frames import frame_of, LIGHT, only, raw_v2
 
@@ -99,6 +99,21 @@ def test_a_frame_goes_where_its_target_was_heard_last_if_that_is_long_ago() -> N
 def test_our_message_goes_where_its_target_was_lately_heard_and_else_everywhere(
         target: Address, now: float, expected: set[int]) -> None:
     assert lines_of(router().towards(target, peers(0, 1, 2), now)) == expected
+
+
+def test_a_full_line_diverts_neither_our_messages_to_an_impostor_nor_frames_from_its_components(
+) -> None:
+    # The light is on line 0, which has no room for its route; an impostor of it is on line 1.
+    tables = [RoutingTable(), RoutingTable()]
+    for number in range(MAX_ROUTES):
+        tables[0].heard(Address(2, number), 'a', 0.0)
+    tables[0].heard(LIGHT, 'a', 0.0)
+    router = Router(tables, {})
+    frame = only(frame_of(to(*LIGHT), source=GROUND))
+    assert lines_of(router.targets(frame, [['a'], ['b']], 0.0)) == {0}
+    tables[1].heard(LIGHT, 'b', 0.0)
+    assert lines_of(router.towards(LIGHT, [['a'], ['b']], 0.0)) == {0, 1}
+    assert lines_of(router.towards(LIGHT, [['a'], ['b']], EXPIRY + 0.1)) == {0, 1}
 
 
 def test_a_frame_goes_to_the_other_clients_of_its_server_by_the_same_rules() -> None:

@@ -16,6 +16,8 @@
 
 from __future__ import annotations
 
+import math
+
 from illuminator_ros.mavlink.messages import Address
 from illuminator_ros.mavlink.routing_table import (
     EXPIRY,
@@ -67,6 +69,7 @@ def test_component_on_more_peers_than_are_remembered_is_sent_to_over_all_meanwhi
     assert router.towards(LIGHT, peers, 1.0) == peers
     router.heard(LIGHT, 'new', EXPIRY + 1)
     assert router.towards(LIGHT, (*peers, 'new'), EXPIRY + 1) == ['new']
+    assert router.towards(Address(9, 9), peers, 1.0, math.inf) == []
 
 
 def test_components_beyond_the_bound_take_no_way_from_those_remembered(
@@ -76,6 +79,7 @@ def test_components_beyond_the_bound_take_no_way_from_those_remembered(
         router.heard(Address(2 + number // 256, number % 256), 'a', 0.0)
     assert len(router) == MAX_ROUTES
     assert router.towards(LIGHT, PEERS, 0.0) == ['b']
+    assert router.towards(Address(9, 9), PEERS, 0.0) == PEERS
 
 
 def test_full_table_makes_room_for_silent_components_once_a_second(router: RoutingTable) -> None:
