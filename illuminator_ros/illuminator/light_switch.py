@@ -228,7 +228,7 @@ class LightSwitch:
             self.state.undoing = None
 
     def note_request(self, now: float) -> None:
-        """Note that the light is not left alone: a silence begins again."""
+        """Begin the time of ``off_after_silence`` again."""
         self.state.requested_at, self._due = now, -math.inf
 
     def decide(

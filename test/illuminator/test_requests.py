@@ -485,6 +485,8 @@ def test_a_refresh_ends_once_and_in_time_with_the_reason(
 ) -> None:
     change(fake, **light)
     answers = [faked.ask_refresh() for _ in range(300)]
+    faked.run(0.3)
+    answers.append(faked.ask_refresh())
     faked.run(REFRESH_LIMIT + 0.1)
     assert {answer.result.success for answer in answers} == {success}
     assert f'ILLUMINATOR_STATUS: {status}' in answers[0].result.message
