@@ -29,7 +29,7 @@ from support.waiting import eventually
 
 pytest.importorskip('cyclonedds', reason='cyclonedds is not installed')
 
-from cyclonedds.core import Policy, Qos  # noqa: E402
+from cyclonedds.core import Policy, Qos  # noqa: E402, I100
 from cyclonedds.domain import Domain, DomainParticipant  # noqa: E402
 from cyclonedds.idl import IdlStruct, types  # noqa: E402
 from cyclonedds.pub import DataWriter  # noqa: E402
