@@ -18,7 +18,9 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Iterator
+import contextlib
 import os
+import select
 import selectors
 import socket
 
@@ -27,7 +29,7 @@ from illuminator_ros.mavlink.forward_queue import MAX_DELAY, MAX_QUEUED
 from illuminator_ros.mavlink.frame import Decoder, Frame, MAX_FRAME
 from illuminator_ros.mavlink.messages import Address, CommandLong, heartbeat, Message
 from illuminator_ros.mavlink.transport.base import FORWARD_AHEAD, FORWARD_SIZE, StreamChannel
-from illuminator_ros.mavlink.transport.tcp import TcpServer
+from illuminator_ros.mavlink.transport.tcp import TcpClient, TcpServer
 from illuminator_ros.mavlink.url import HostPort
 import pytest
 from support.frames import frame_of, LIGHT, only
@@ -182,6 +184,29 @@ def test_a_blocked_line_holds_a_bounded_number_of_bytes_and_sends_nothing_old_la
         assert (held > 0, line.channel._forwarded.size) == (True, 0)
     finally:
         line.close()
+
+
+def test_our_own_message_waits_for_few_forwarded_bytes_in_a_tcp_connection_that_is_slow() -> None:
+    selector = selectors.DefaultSelector()
+    with socket.socket() as server, contextlib.ExitStack() as stack:
+        server.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 4096)
+        server.bind(('127.0.0.1', 0))
+        server.listen()
+        channel = TcpClient(HostPort(*server.getsockname()))
+        stack.callback(channel.close)
+        channel.register(selector, lambda handle, events: None)
+        other = stack.enter_context(server.accept()[0])
+        for number in range(1000):
+            channel.forward([only(frame_of(FILE, number & 0xFF))], (None,), 0.0)
+        own = frame_of(COMMAND, 0, Address(1, 194))
+        channel.send([own], (None,))
+        other.setblocking(False)
+        data = b''
+        while own not in data:
+            eventually(lambda: select.select([other], [], [], 0.1)[0])
+            data += other.recv(1024)
+            channel.send((), (None,))
+        assert data.index(own) < 4 * FORWARD_SIZE
 
 
 def test_a_client_of_a_server_that_reads_nothing_delays_no_other_client() -> None:

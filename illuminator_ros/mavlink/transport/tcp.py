@@ -22,7 +22,16 @@ import math
 import selectors
 import socket
 
-from .base import Channel, ChannelLost, MAX_QUEUED, Peer, resolve, Serve, StreamChannel
+from .base import (
+    Channel,
+    ChannelLost,
+    FORWARD_SIZE,
+    MAX_QUEUED,
+    Peer,
+    resolve,
+    Serve,
+    StreamChannel,
+)
 from ..frame import Frame
 from ..url import HostPort
 
@@ -46,9 +55,11 @@ class _Connection(StreamChannel):
         # The kernel would queue megabytes: minutes of commands that have timed out.
         connection.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, MAX_QUEUED)
         connection.setsockopt(socket.SOL_SOCKET, socket.SO_KEEPALIVE, 1)
-        # Detect a vanished peer in seconds, not in hours.
+        # Detect a vanished peer in seconds, not in hours. Hold forwarded frames here and not in
+        # the kernel, where our own messages would wait behind them.
         for option, value in (('TCP_KEEPIDLE', 2), ('TCP_KEEPINTVL', 1), ('TCP_KEEPCNT', 3),
-                              ('TCP_USER_TIMEOUT', USER_TIMEOUT)):
+                              ('TCP_USER_TIMEOUT', USER_TIMEOUT),
+                              ('TCP_NOTSENT_LOWAT', FORWARD_SIZE)):
             if hasattr(socket, option):
                 connection.setsockopt(socket.IPPROTO_TCP, getattr(socket, option), value)
         super().__init__(name, connection, 'the other side closed the connection')
