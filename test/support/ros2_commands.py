@@ -106,7 +106,7 @@ def topic_pub(node: Node, *arguments: str) -> None:
         rclpy.spin(node)
 
 
-def topic_echo(node: Node, name: str) -> None:
+def topic_echo(node: Node, name: str, type_name: str = '') -> None:
     """Print the messages on a topic, with the durability and reliability of its publisher."""
     found = rclpy.task.Future()
 
@@ -119,7 +119,7 @@ def topic_echo(node: Node, name: str) -> None:
     timer.cancel()
     info = found.result()
     info.qos_profile.history, info.qos_profile.depth = HistoryPolicy.KEEP_LAST, 10
-    node.create_subscription(type_of(info.topic_type), name, show, info.qos_profile)
+    node.create_subscription(type_of(type_name or info.topic_type), name, show, info.qos_profile)
     rclpy.spin(node)
 
 
