@@ -27,7 +27,7 @@ from .duplicate_filter import DuplicateFilter
 from .fault_log import FaultLog
 from .frame import Frame, MAX_ID_V1
 from .frame_writer import FrameWriter
-from .line import Line, LineUser, SILENCE
+from .line import ANNOUNCE_INTERVAL, Line, LineUser, SILENCE
 from .link_state import LinkSnapshot
 from .messages import Address
 from .receiver import ReceivedFrame, Receiver
@@ -73,6 +73,8 @@ class Lines(LineUser):
         self._version = mavlink_version
         self._duplicates = DuplicateFilter() if len(urls) > 1 else None
         self._heard_at = -math.inf
+        # When the endpoint announced itself on all lines because none was heard.
+        self._announced_at = -math.inf
         writer = FrameWriter(signing, mavlink_version)
         sources: dict[Address, SequenceCounter] = {}
         self._lines = [
@@ -173,7 +175,10 @@ class Lines(LineUser):
     def silent(self, line: Line, now: float) -> None:
         """See :meth:`LineUser.silent`."""
         if now >= self._heard_at + SILENCE:
-            self._faults.call(self._endpoint.link_opened, now)
+            # Each silent line calls this, and one call announces the endpoint on all of them.
+            if now >= self._announced_at + ANNOUNCE_INTERVAL:
+                self._announced_at = now
+                self._faults.call(self._endpoint.link_opened, now)
         else:
             # A router on this line forwards nothing to us until it has heard us.
             line.write([*self._sender.heartbeats.values()], line.peers(now), now)

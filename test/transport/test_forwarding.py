@@ -17,6 +17,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+import itertools
 from typing import Any
 
 from hypothesis import given
@@ -336,3 +337,17 @@ def test_a_silent_line_beside_a_live_one_gets_our_last_heartbeat_again() -> None
         pair.network.settle()
         assert [frame_source(frame) for frame in pair.ground.received] == [OWN] * count
     assert pair.light.received == []
+
+
+def test_silent_lines_together_announce_us_as_often_as_one() -> None:
+    pair = Pair()
+    announced: list[float] = []
+    pair.router.endpoint.link_opened = announced.append  # type: ignore[assignment, method-assign]
+    for _ in range(100):
+        pair.network.now += ANNOUNCE_INTERVAL / 10
+        for line in pair.router.lines:
+            line.poll(pair.network.now)
+            pair.network.now += ANNOUNCE_INTERVAL / 10
+    assert len(announced) > 10
+    assert min(after - before for before, after in itertools.pairwise(announced)) >= (
+        ANNOUNCE_INTERVAL)
