@@ -115,9 +115,11 @@ def started(text: str, folder: Path) -> Iterator[subprocess.Popen[str]]:
     if ' monitor' in text and '--once' not in text and '--web' not in text:
         # It needs a terminal.
         text = f'script -qec {shlex.quote(text)} /dev/null'
+    # A shell ignores SIGINT for what it starts in the background, as nohup does.
     program = subprocess.Popen(
-        ['bash', '-c', f'exec {text}'], cwd=folder, stdin=subprocess.DEVNULL, text=True,
-        stdout=subprocess.PIPE, stderr=subprocess.STDOUT, start_new_session=True)
+        ['env', '--default-signal=INT', 'bash', '-c', f'exec {text}'], cwd=folder, text=True,
+        stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.STDOUT,
+        start_new_session=True)
     try:
         yield program
     finally:

@@ -186,7 +186,7 @@ def test_hostile_graph_neither_stops_nor_fills_the_monitor(
     eventually(lambda: len(monitor.names) == 3)
 
     def flood() -> bool:
-        for kind in range(8):
+        for kind in range(ros_graph.MAX_DIAGNOSES + 1):
             diagnostics.publish(DiagnosticArray(status=[DiagnosticStatus(
                 level=bytes([255]), name=f'x: {kind}\x1b', message='\x07' * 9, values=[
                     KeyValue(key='node', value='/l0'), KeyValue(key='k', value='\r\n'),
