@@ -12,16 +12,20 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Devices and players on a UDP port, and a minimal light."""
+"""Devices and players on a UDP port, a minimal light, and the end of a serial line."""
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from collections.abc import Iterator
 import contextlib
+import os
+import select
 import socket
 import sys
 import threading
 import time
+import tty
 from typing import Any, TypeVar
 
 from illuminator_ros.illuminator.messages import IlluminatorStatus
@@ -31,6 +35,7 @@ from support.frames import Codec
 
 LIGHT = mav.Address(1, 243)
 S = TypeVar('S', bound='Side')
+E = TypeVar('E', bound='SerialEnd')
 
 
 class Side:
@@ -165,3 +170,36 @@ if __name__ == '__main__':
     print('ready', flush=True)
     with contextlib.suppress(KeyboardInterrupt), MinimalLight(int(sys.argv[1])) as own:
         own.serve(threading.Event())
+
+
+class SerialEnd(ABC):
+    """
+    The far end of a serial line, which is read in a thread.
+
+    :ivar device: the path of the near end.
+    """
+
+    def __init__(self) -> None:
+        self.far, self._near = os.openpty()
+        tty.setraw(self._near)
+        self.device = os.ttyname(self._near)
+        self._stopping, self._stop = os.pipe()
+        self._thread = threading.Thread(target=self._run)
+
+    def __enter__(self: E) -> E:
+        self._thread.start()
+        return self
+
+    def __exit__(self, *error: object) -> None:
+        os.write(self._stop, b'\0')
+        self._thread.join()
+        for descriptor in (self.far, self._near, self._stopping, self._stop):
+            os.close(descriptor)
+
+    @abstractmethod
+    def take(self, data: bytes) -> None:
+        """Take bytes that have arrived."""
+
+    def _run(self) -> None:
+        while self._stopping not in select.select([self.far, self._stopping], [], [])[0]:
+            self.take(os.read(self.far, 65536))

@@ -21,20 +21,19 @@ import contextlib
 import importlib.util
 import os
 from pathlib import Path
-import select
 import socket
 import statistics
 import sys
 import tempfile
 import threading
 import time
-import tty
 
 from illuminator_ros.mavlink import messages as mav
 from illuminator_ros.mavlink.dialect import decode, mavlink
 from support.frames import Codec
 from support.processes import Program
 
+from ..devices import SerialEnd
 from ..rig import (
     alternate,
     Bench,
@@ -194,7 +193,7 @@ def load(
               shares.pop(OURS), shares, [at_most(lost[OURS], 0, 'frames')])
 
 
-class SlowLine:
+class SlowLine(SerialEnd):
     """
     The far end of a serial line of 57,600 baud, on which a component is heard.
 
@@ -204,36 +203,21 @@ class SlowLine:
     """
 
     def __init__(self) -> None:
-        self._far, self._near = os.openpty()
-        tty.setraw(self._near)
-        self.device = os.ttyname(self._near)
+        super().__init__()
         self.sent: dict[float, float] = {}
         self._codec = Codec()
-        self._stopping, self._stop = os.pipe()
-        self._thread = threading.Thread(target=self._run)
-
-    def __enter__(self) -> SlowLine:
-        self._thread.start()
-        return self
-
-    def __exit__(self, *error: object) -> None:
-        os.write(self._stop, b'\0')
-        self._thread.join()
-        for descriptor in (self._far, self._near, self._stopping, self._stop):
-            os.close(descriptor)
+        self._free_at = 0.0
 
     def beat(self) -> None:
         """Send a heartbeat of the component."""
-        os.write(self._far, self._codec.frame(FAR, mav.heartbeat(mavlink.MAV_TYPE_GENERIC)))
+        os.write(self.far, self._codec.frame(FAR, mav.heartbeat(mavlink.MAV_TYPE_GENERIC)))
 
-    def _run(self) -> None:
-        free_at = 0.0
-        while self._stopping not in select.select([self._far, self._stopping], [], [])[0]:
-            data = os.read(self._far, 65536)
-            free_at = max(free_at, time.monotonic()) + len(data) / LINE_RATE
-            for frame in self._codec.decoder.feed(data):
-                if frame.message_id == mav.CommandLong.id:
-                    self.sent[decode(mav.CommandLong, frame.payload).param1] = free_at
+    def take(self, data: bytes) -> None:
+        """Note when commands were sent."""
+        self._free_at = max(self._free_at, time.monotonic()) + len(data) / LINE_RATE
+        for frame in self._codec.decoder.feed(data):
+            if frame.message_id == mav.CommandLong.id:
+                self.sent[decode(mav.CommandLong, frame.payload).param1] = self._free_at
 
 
 def slow_line(bench: Bench, prepared: list[bytes]) -> Row:

@@ -24,12 +24,8 @@ from __future__ import annotations
 from collections.abc import Iterator
 import contextlib
 import math
-import os
 import random
-import select
-import threading
 import time
-import tty
 
 from geometry_msgs.msg import Quaternion as QuaternionMessage
 from illuminator_ros.payload.rotation import Quaternion
@@ -39,6 +35,7 @@ from std_msgs.msg import Header
 from support.processes import start_interpreter
 from support.strict_mavlink_1 import OVERHEAD, strict_frames
 
+from ..devices import SerialEnd
 from ..rig import Bench, Client, cpu, peer, ready, wait_until
 from ..rows import at_most, quantiles, Row, times
 
@@ -49,41 +46,26 @@ GPS_RAW_INT = 24
 ROTATIONS = 100_000
 
 
-class Line:
+class Line(SerialEnd):
     """The far end of a serial line; it notes when each frame was sent, by its content."""
 
     def __init__(self) -> None:
-        self._far, self._near = os.openpty()
-        tty.setraw(self._near)
-        self.device = os.ttyname(self._near)
+        super().__init__()
         self.frames = 0
         # When the last byte of each fix was sent, s, by its latitude.
         self.sent: dict[int, float] = {}
-        self._stopping, self._stop = os.pipe()
-        self._thread = threading.Thread(target=self._run)
+        self._rest, self._free_at = b'', 0.0
 
-    def __enter__(self) -> Line:
-        self._thread.start()
-        return self
-
-    def __exit__(self, *error: object) -> None:
-        os.write(self._stop, b'\0')
-        self._thread.join()
-        for descriptor in (self._far, self._near, self._stopping, self._stop):
-            os.close(descriptor)
-
-    def _run(self) -> None:
-        rest, free_at = b'', 0.0
-        while self._stopping not in select.select([self._far, self._stopping], [], [])[0]:
-            data = os.read(self._far, 65536)
-            free_at = max(free_at, time.perf_counter()) + len(data) / LINE_RATE
-            found, rest = strict_frames(rest + data)
-            end = free_at - len(rest) / LINE_RATE
-            for frame in reversed(found):
-                if frame.message_id == GPS_RAW_INT:
-                    self.sent[int.from_bytes(frame.payload[8:12], 'little')] = end
-                end -= (len(frame.payload) + OVERHEAD) / LINE_RATE
-            self.frames += len(found)
+    def take(self, data: bytes) -> None:
+        """Note when fixes were sent."""
+        self._free_at = max(self._free_at, time.perf_counter()) + len(data) / LINE_RATE
+        found, self._rest = strict_frames(self._rest + data)
+        end = self._free_at - len(self._rest) / LINE_RATE
+        for frame in reversed(found):
+            if frame.message_id == GPS_RAW_INT:
+                self.sent[int.from_bytes(frame.payload[8:12], 'little')] = end
+            end -= (len(frame.payload) + OVERHEAD) / LINE_RATE
+        self.frames += len(found)
 
 
 def rededge(bench: Bench) -> Iterator[Row]:
