@@ -164,6 +164,13 @@ def test_topics_services_and_parameters_work_for_a_client_on_cyclone_dds(
         assert switched.success, switched.message
         assert light.fake.fields['enable'] == 1
 
+        response = client.call('/illuminator/set_parameters', SetRequest([
+            Parameter('brightness', Value(double_value=30.0)),
+            Parameter('brightness_', Value())]), SetResponse)
+        assert [one.successful for one in response.results] == [True, False]
+        assert light.fake.fields['brightness'] == 30.0
+
+        # Last, since a late repeat of the setpoint would change what another request has set.
         setpoints = client.writer('rt/illuminator/cmd/brightness', Float32)
 
         def dimmed() -> bool:
@@ -173,9 +180,3 @@ def test_topics_services_and_parameters_work_for_a_client_on_cyclone_dds(
 
         eventually(dimmed)
         eventually(lambda: Float32(42.0) in brightness.take(1))
-
-        response = client.call('/illuminator/set_parameters', SetRequest([
-            Parameter('brightness', Value(double_value=30.0)),
-            Parameter('brightness_', Value())]), SetResponse)
-        assert [one.successful for one in response.results] == [True, False]
-        assert light.fake.fields['brightness'] == 30.0
