@@ -32,6 +32,29 @@ STATUS_TOPICS = {
     'enabled': Bool, 'brightness': Float32, 'mode': String, 'strobe_period': Float32,
     'strobe_duty_cycle': Float32, 'error_flags': UInt32, 'uptime': Float64}
 
+#: The statuses before each test, and what their topics show: two, so that the second is new.
+STATUSES = [
+    ({'enable': 1, 'brightness': 99.0, 'mode': 2, 'strobe_period': 9.0,
+      'strobe_duty_cycle': 99.0, 'error_status': 99, 'temp_c': 99.0},
+     {'enabled': True, 'brightness': 99.0, 'mode': 'external_sync', 'strobe_period': 9.0,
+      'strobe_duty_cycle': 99.0, 'error_flags': 99, 'temperature': 99.0}),
+    ({'enable': 0, 'brightness': 100.0, 'mode': 1, 'strobe_period': 0.0,
+      'strobe_duty_cycle': 0.0, 'error_status': 0, 'temp_c': 25.0},
+     {'enabled': False, 'brightness': 100.0, 'mode': 'internal_control', 'strobe_period': 0.0,
+      'strobe_duty_cycle': 0.0, 'error_flags': 0, 'temperature': 25.0}),
+]
+
+
+def value_of(message: Any) -> object:
+    """Return the one value of a message."""
+    return message.temperature if isinstance(message, Temperature) else message.data
+
+
+def wait_and_clear(recorder: Recorder, value: object) -> None:
+    """Wait until a topic shows a value, and forget it with all that came before it."""
+    recorder.wait(lambda message: value_of(message) == pytest.approx(value))
+    recorder.clear()
+
 
 @pytest.fixture(scope='module')
 def recorders(ros: Ros, shared_bridge: object) -> dict[str, Recorder]:
@@ -48,11 +71,11 @@ def topics(
 ) -> dict[str, Recorder]:
     """Return empty recorders of a light that sends a status only when a test says so."""
     light.fake.stream = 0.0
-    light.report(enable=0, brightness=100.0, mode=1, strobe_period=0.0, strobe_duty_cycle=0.0,
-                 error_status=0, temp_c=25.0)
     ros.catch_up()
-    for recorder in recorders.values():
-        recorder.clear()
+    for fields, shown in STATUSES:
+        uptime = light.report(**fields)
+        for topic, value in {**shown, 'uptime': uptime}.items():
+            wait_and_clear(recorders[topic], value)
     return recorders
 
 
@@ -98,7 +121,7 @@ def test_implausible_value_is_not_published_while_the_others_are(
     light.report(**{field: good})
     last = topics[topic].wait()
 
-    assert (last.temperature if topic == 'temperature' else last.data) == good
+    assert value_of(last) == good
     assert len(topics[topic].messages) == 1
 
 
