@@ -12,24 +12,58 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""The camera as a payload of a component."""
+"""The camera as a payload of a component: its liveness, its events, and requests."""
 
 from __future__ import annotations
 
+from collections import deque
 from collections.abc import Collection
 from dataclasses import dataclass
+import math
 import random
 
 from . import messages as rededge
-from .camera import Camera, CameraEvent, CameraSnapshot
-from .feeder import Feeder, FeederSnapshot
-from .input_states import FeederSettings, InputChanged
-from ..mavlink.command_sender import CommandSender
+from .captures import Captures
+from .feeder import Feeder
+from .input_states import FeederSettings
+from .pings import Done, Pings
+from ..mavlink.command_sender import CommandSender, format_seconds
 from ..mavlink.component import Payload
 from ..mavlink.dialect import mavlink
 from ..mavlink.messages import Address, Heartbeat, Message
 from ..payload.listeners import Listeners
 from ..payload.messages import Attitude, GlobalPositionInt, SystemTime
+
+# Successive PINGs without a reply after which the camera counts as not receiving.
+UNANSWERED_PINGS = 3
+# So many heartbeats in CONFLICT_WINDOW s show several components: each sends one a second.
+CONFLICT_HEARTBEATS = 10
+CONFLICT_WINDOW = 7.0
+
+
+@dataclass(frozen=True)
+class CameraConnected:
+    """The camera's heartbeat is heard."""
+
+    address: Address
+
+
+@dataclass(frozen=True)
+class CameraLost:
+    """The camera's heartbeat has stopped, or the link is closed."""
+
+    address: Address
+    reason: str
+
+
+@dataclass(frozen=True)
+class ImageTaken:
+    """The camera reported an image, which any component may have requested."""
+
+    feedback: rededge.CameraFeedback
+
+
+CameraEvent = CameraConnected | CameraLost | ImageTaken
 
 
 @dataclass(frozen=True)
@@ -45,21 +79,45 @@ class Settings:
 
 
 @dataclass(frozen=True)
-class ClientSnapshot:
-    """The camera and its inputs at one moment, for any thread."""
+class CameraSnapshot:
+    """
+    The camera at one moment, for any thread; times are s on the link's clock.
 
-    camera: CameraSnapshot
-    feeder: FeederSnapshot
+    :param address: its latest address, None if it was never heard.
+    :param heard_at: when its last heartbeat came, -inf if none has.
+    :param loss: a text with the reason of its loss, '' if it is connected or was never heard.
+    :param conflict: whether several components have the camera's component id.
+    :param round_trip: of the last answered PING, s; None if no PING was answered.
+    :param unanswered_pings: PINGs without a reply since the last reply.
+    :param images: images that were reported since the start.
+    :param image_index: of the newest reported image; None before it, and after a loss.
+    """
+
+    address: Address | None
+    connected: bool
+    heard_at: float
+    loss: str
+    conflict: bool
+    round_trip: float | None
+    unanswered_pings: int
+    images: int
+    image_index: int | None
+
+    @property
+    def is_unresponsive(self) -> bool:
+        """Return whether the camera is heard, but does not answer PINGs."""
+        return self.connected and self.unanswered_pings >= UNANSWERED_PINGS
 
 
 class RedEdgeClient(Payload):
     """
     Feeds one camera, captures images, and reports its events.
 
+    The camera is identified by its component id, since it adopts the system id of the host.
+
     :param commands: sends messages from the component's address; the camera takes no commands.
     :param sequence: the sequence number before the first PING; by default random, so that a reply
         to an earlier run does not count.
-    :ivar camera: PINGs and captures.
     :ivar feeder: takes the inputs.
     """
 
@@ -74,50 +132,125 @@ class RedEdgeClient(Payload):
         self, commands: CommandSender, settings: Settings, *, sequence: int | None = None,
     ) -> None:
         self.settings = settings
-        self.events: Listeners[CameraEvent | InputChanged] = Listeners()
+        self.events: Listeners[CameraEvent] = Listeners()
+        self.feeder = Feeder(settings.feeder, commands.send, lambda: self.target)
         self._commands = commands
-        self.camera = Camera(
-            commands.address, settings.heartbeat_timeout, commands.send, self.events.emit,
-            sequence=random.getrandbits(32) if sequence is None else sequence)
-        self.feeder = Feeder(
-            settings.feeder, commands.send, lambda: self.camera.target, self.events.emit)
+        self._pings = Pings(commands.address, commands.send,
+                            random.getrandbits(32) if sequence is None else sequence)
+        self._captures = Captures(commands.send)
+        # Why the link is not open, '' while it is.
+        self._link_failure = 'the link is not open'
+        self._address: Address | None = None
+        self._connected = False
+        self._heard_at = -math.inf
+        self._heartbeats: deque[float] = deque(maxlen=CONFLICT_HEARTBEATS)
 
-    def snapshot(self, now: float) -> ClientSnapshot:
-        """Return camera and inputs at this moment; call it in the link's thread."""
-        return ClientSnapshot(self.camera.snapshot(now), self.feeder.snapshot(now))
+    @property
+    def target(self) -> Address:
+        """Return the target of messages to the camera; its system id is 0 until it is heard."""
+        return self._address or Address(0, mavlink.MAV_COMP_ID_CAMERA)
+
+    def snapshot(self, now: float) -> CameraSnapshot:
+        """Return the camera at this moment; call it in the link's thread."""
+        return CameraSnapshot(
+            self._address, self._connected, self._heard_at, self._loss(now),
+            self._is_conflict(now), self._pings.round_trip, self._pings.unanswered,
+            self._captures.images, self._captures.newest)
+
+    def _is_conflict(self, now: float) -> bool:
+        return (len(self._heartbeats) == CONFLICT_HEARTBEATS
+                and now - self._heartbeats[0] <= CONFLICT_WINDOW)
+
+    # Liveness
 
     def link_opened(self, now: float) -> None:
         """See :meth:`Payload.link_opened`."""
-        self.camera.link_opened(now)
-        self.feeder.link_opened(now)
+        self._link_failure = ''
 
     def link_closed(self, now: float, reason: str) -> None:
         """See :meth:`Payload.link_closed`."""
-        self.camera.link_closed(now, reason)
-        self.feeder.link_closed()
+        self._link_failure = f'link lost: {reason}'
+        self._lose(self._link_failure)
+        self._pings.stop(self._link_failure)
+        self._captures.stop(now, self._link_failure)
 
     def components_lost(self, lost: Collection[Address], now: float, reason: str) -> None:
         """See :meth:`Payload.components_lost`."""
-        self.camera.components_lost(lost, reason)
+        if self._address in lost:
+            self._lose(f'link lost: {reason}')
+
+    def _take_heartbeat(self, source: Address, now: float) -> None:
+        """Take a heartbeat of the camera's component id, whatever its content."""
+        self._address = source
+        self._heard_at = now
+        self._heartbeats.append(now)
+        if not self._connected:
+            self._connected = True
+            self.events.emit(CameraConnected(source))
+
+    def _lose(self, reason: str) -> None:
+        if self._connected:
+            self._connected = False
+            self._heartbeats.clear()
+            self._captures.forget_count()
+            self.events.emit(CameraLost(self.target, reason))
+
+    def _loss(self, now: float) -> str:
+        if self._connected or self._address is None:
+            return ''
+        reason = self._link_failure or f'no heartbeat for {format_seconds(now - self._heard_at)}'
+        return f'camera {self._address} is lost: {reason}'
+
+    # Requests, and messages of the camera
+
+    def ping(self, now: float, done: Done) -> None:
+        """Measure the round trip through the camera."""
+        if refusal := self._commands.refusal or self._link_failure:
+            done(False, refusal)
+        else:
+            self._pings.request(now, done)
+
+    def capture(self, shot: rededge.Shot, now: float, done: Done) -> None:
+        """Take an image; succeed only after its CAMERA_FEEDBACK."""
+        if self._commands.refusal or not self._connected:
+            done(False, self._commands.refusal or self._loss(now)
+                 or 'no camera connected: none heard yet')
+        else:
+            self._captures.request(shot, self.target, now, done)
 
     def receive(self, source: Address, message: Message, now: float) -> None:
         """See :meth:`Payload.receive`."""
         if source.component != mavlink.MAV_COMP_ID_CAMERA:
             return
         if isinstance(message, Heartbeat):
-            self.camera.take_heartbeat(source, now)
-        else:
-            self.camera.receive(message, now)
+            self._take_heartbeat(source, now)
+        elif isinstance(message, rededge.Ping):
+            self._pings.take(message, now)
+        elif isinstance(message, rededge.CameraStatus):
+            self._captures.take_status(message, now)
+        elif isinstance(message, rededge.CameraFeedback):
+            note = ("; several components have the camera's id, so another may have taken it"
+                    if self._is_conflict(now) else '')
+            self.events.emit(ImageTaken(message))
+            self._captures.take_feedback(message, now, note)
 
     def close(self, now: float) -> None:
         """See :meth:`Payload.close`."""
-        self.camera.close(self._commands.refusal)
+        self._pings.end(self._commands.refusal)
+        self._captures.end(self._commands.refusal)
 
     def poll(self, now: float) -> None:
         """See :meth:`Payload.poll`."""
-        self.camera.poll(now)
-        self.feeder.poll(now)
+        if self._connected and now >= self._heard_at + self.settings.heartbeat_timeout:
+            self._lose(f'no heartbeat for {format_seconds(self.settings.heartbeat_timeout)}')
+        if not self._link_failure:
+            self._pings.poll(now)
+        self._captures.poll(now)
+        self.feeder.orientation.poll(now)
 
     def next_deadline(self) -> float:
         """See :meth:`Payload.next_deadline`."""
-        return min(self.camera.next_deadline(), self.feeder.next_deadline())
+        return min(
+            self._heard_at + self.settings.heartbeat_timeout if self._connected else math.inf,
+            math.inf if self._link_failure else self._pings.next_deadline(),
+            self._captures.next_deadline(), self.feeder.orientation.next_deadline())

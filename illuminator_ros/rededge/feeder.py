@@ -31,7 +31,6 @@ from .conversions import FIRST_UTC, LAST_UTC, Position
 from .input_states import (
     FeederSettings,
     Input,
-    InputChanged,
     InputSnapshot,
     InputState,
     InputStates,
@@ -57,14 +56,10 @@ class FeederSnapshot:
     All inputs at one moment.
 
     :param needed: groups of inputs; one input of each group must be received.
-    :param positions: sent positions, and ``attitudes``, sent pairs of attitude and mount. Messages
-        that are made while the link is closed are dropped, and are not counted.
     """
 
     inputs: Mapping[Input, InputSnapshot]
     needed: Sequence[Sequence[Input]]
-    positions: int
-    attitudes: int
 
     @property
     def lacking(self) -> list[Sequence[Input]]:
@@ -87,27 +82,22 @@ class Feeder:
 
     :param send: sends a message.
     :param target: returns the address of the camera.
-    :param emit: takes the changes of inputs.
     :ivar orientation: takes attitudes and mounts.
     """
 
     def __init__(
         self, settings: FeederSettings, send: Callable[[Message], None],
-        target: Callable[[], Address], emit: Callable[[InputChanged], None],
+        target: Callable[[], Address],
     ) -> None:
         self._settings = settings
         self._send = send
-        self._inputs = InputStates(settings, emit)
+        self._inputs = InputStates(settings)
         self.orientation = OrientationFeeder(settings, send, target, self._inputs)
-        self._fix_time: int | None = None
         self._velocity: Vector | None = None
-        self._velocity_time: int | None = None
         self._satellites: int | None = None
         self._gps_status_due = -math.inf
         self._reference: _Reference | None = None
         self._needs_reference = False
-        self._link_open = False
-        self._positions = 0
 
     def snapshot(self, now: float) -> FeederSnapshot:
         """Return all inputs at this moment."""
@@ -118,8 +108,7 @@ class Feeder:
             needed.append((Input.MOUNT,))
         if self._needs_reference:
             needed.append((Input.TIME_REFERENCE,))
-        return FeederSnapshot(
-            self._inputs.snapshot(now), needed, self._positions, self.orientation.sent)
+        return FeederSnapshot(self._inputs.snapshot(now), needed)
 
     # Position and time
 
@@ -128,11 +117,10 @@ class Feeder:
         settings, is_fresh = self._settings, self._inputs.is_fresh
         velocity = self._velocity if is_fresh(Input.VELOCITY, now) else None
         satellites = self._satellites if is_fresh(Input.SATELLITES, now) else None
-        with self._inputs.take(Input.FIX, now):
+        with self._inputs.take(Input.FIX, now, stamp):
             conversions.fix_type(position.status)
             utc = self._utc(stamp) // 1000
-            stamp.check_age(settings.position_timeout)
-            stamp.check_newer(self._fix_time)
+            self._inputs.check(Input.FIX, stamp)
             if settings.position_source is PositionSource.RAW:
                 self._send(conversions.gps_raw_int(
                     position, utc, velocity, satellites, settings.geoid_separation))
@@ -144,8 +132,6 @@ class Feeder:
                     position, velocity, settings.geoid_separation, boot_ms)
                 self._send(conversions.system_time(utc, boot_ms))
                 self._send(placed)
-            self._fix_time = stamp.time
-            self._positions += self._link_open
 
     def _utc(self, stamp: Stamp) -> int:
         """Return the UTC of a stamp, ns."""
@@ -172,24 +158,20 @@ class Feeder:
 
         From then on ROS time is no longer used as UTC.
         """
-        # It is used with later fixes, so its age counts from its stamp.
-        with self._inputs.take(Input.TIME_REFERENCE, now, stamp.age):
+        with self._inputs.take(Input.TIME_REFERENCE, now, stamp):
             if not FIRST_UTC <= utc // 1000 <= LAST_UTC:
                 raise ValueError(f'{utc / 1e9:.1f} s after 1970-01-01 cannot be UTC')
-            stamp.check_age(TIME_REFERENCE_LIFETIME)
-            stamp.check_newer(self._reference and self._reference.time)
+            self._inputs.check(Input.TIME_REFERENCE, stamp)
             self._needs_reference = True
             self._reference = _Reference(stamp.time, utc - stamp.time)
 
     def take_velocity(self, velocity: Vector, stamp: Stamp, now: float) -> None:
         """Take the velocity of the vehicle, ENU, m/s."""
-        # The velocity is sent with later fixes, so its age is measured from its stamp.
-        with self._inputs.take(Input.VELOCITY, now, stamp.age):
-            stamp.check_age(self._settings.position_timeout)
-            stamp.check_newer(self._velocity_time)
+        with self._inputs.take(Input.VELOCITY, now, stamp):
+            self._inputs.check(Input.VELOCITY, stamp)
             if not all(map(math.isfinite, velocity)):
                 raise ValueError('a component is not a finite number')
-            self._velocity, self._velocity_time = velocity, stamp.time
+            self._velocity = velocity
 
     def take_satellites(self, count: int, now: float) -> None:
         """Take the number of satellites."""
@@ -214,26 +196,6 @@ class Feeder:
 
     def clock_jumped(self) -> None:
         """Forget everything that depends on ROS time, which has jumped."""
-        self._reference = self._fix_time = self._velocity_time = None
+        self._reference = None
+        self._inputs.clock_jumped()
         self.orientation.clock_jumped()
-
-    # The link, and time
-
-    def link_opened(self, now: float) -> None:
-        """See :meth:`Payload.link_opened`."""
-        self._link_open = True
-        self.orientation.link_opened(now)
-
-    def link_closed(self) -> None:
-        """See :meth:`Payload.link_closed`."""
-        self._link_open = False
-        self.orientation.link_closed()
-
-    def poll(self, now: float) -> None:
-        """See :meth:`Payload.poll`."""
-        self._inputs.poll(now)
-        self.orientation.poll(now)
-
-    def next_deadline(self) -> float:
-        """See :meth:`Payload.next_deadline`."""
-        return min(self._inputs.next_deadline(), self.orientation.next_deadline())

@@ -16,7 +16,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 import contextlib
 from dataclasses import dataclass
 from enum import Enum
@@ -42,6 +42,10 @@ class Input(Enum):
     ATTITUDE = 'attitude'
     MOUNT = 'mount'
     TIME_REFERENCE = 'time_reference'
+
+
+# Inputs that are used with later messages of others, so that their ages count from their stamps.
+USED_LATER = (Input.VELOCITY, Input.TIME_REFERENCE)
 
 
 class InputState(Enum):
@@ -101,18 +105,6 @@ class Stamp(NamedTuple):
     age: float
     simulated: bool = False
 
-    def check_age(self, timeout: float) -> None:
-        """Raise ValueError if the stamp is too old, or too far in the future."""
-        if self.age > timeout:
-            raise ValueError(f'its stamp is {format_seconds(self.age)} old by the ROS clock')
-        if self.age < -timeout:
-            raise ValueError(f'its stamp is {format_seconds(-self.age)} ahead of the ROS clock')
-
-    def check_newer(self, last: int | None) -> None:
-        """Raise ValueError if the message is repeated or overtaken; the last stamp is in ns."""
-        if last is not None and self.time <= last:
-            raise ValueError('its stamp is not newer than the last')
-
 
 @dataclass(frozen=True)
 class InputSnapshot:
@@ -132,35 +124,20 @@ class InputSnapshot:
     refused: int
 
 
-@dataclass(frozen=True)
-class InputChanged:
-    """
-    The state of an input has changed.
-
-    :param text: the reason, for people.
-    """
-
-    input: Input  # noqa: A003 - the field's term
-    state: InputState
-    text: str
-
-
 @dataclass
 class _Tracker:
-    """Tracks whether an input is missing, used, stale or refused."""
+    """
+    Tracks whether an input is missing, used, stale or refused.
 
-    name: Input
+    :param last: the stamp of the last accepted message by ROS time, ns; None after a jump of it.
+    """
+
     timeout: float
-    emit: Callable[[InputChanged], None]
+    last: int | None = None
     accepted_at: float = -math.inf
     refused_at: float = -math.inf
     refusal: str = ''
     refused: int = 0
-    reported: InputState = InputState.MISSING
-
-    def refuse(self, reason: str, now: float) -> None:
-        self.refused += 1
-        self.refused_at, self.refusal = now, reason
 
     def state(self, now: float) -> InputState:
         if now < self.accepted_at + self.timeout:
@@ -171,22 +148,6 @@ class _Tracker:
             return InputState.STALE
         return InputState.MISSING
 
-    def report(self, now: float) -> None:
-        """Emit the state if it has changed since the last call."""
-        state = self.state(now)
-        if state is not self.reported:
-            self.reported = state
-            self.emit(InputChanged(self.name, state, {
-                InputState.OK: 'received', InputState.REFUSED: self.refusal}.get(
-                    state, f'nothing for {format_seconds(self.timeout)}')))
-
-    def next_change(self) -> float:
-        """Return when the reported state ends by itself, s."""
-        if self.reported in (InputState.MISSING, InputState.STALE):
-            return math.inf
-        return self.timeout + (
-            self.accepted_at if self.reported is InputState.OK else self.refused_at)
-
     def snapshot(self, now: float) -> InputSnapshot:
         accepted, refused = (now - at if at > -math.inf else None
                              for at in (self.accepted_at, self.refused_at))
@@ -194,32 +155,41 @@ class _Tracker:
 
 
 class InputStates:
-    """
-    The states of all inputs.
+    """The states of all inputs."""
 
-    :param emit: takes the changes of inputs.
-    """
-
-    def __init__(
-        self, settings: FeederSettings, emit: Callable[[InputChanged], None],
-    ) -> None:
-        self._trackers = {name: _Tracker(name, settings.timeout(name), emit) for name in Input}
+    def __init__(self, settings: FeederSettings) -> None:
+        self._trackers = {name: _Tracker(settings.timeout(name)) for name in Input}
 
     @contextlib.contextmanager
-    def take(self, name: Input, now: float, age: float = 0.0) -> Iterator[None]:
-        """
-        Take a message in the context, which raises ValueError with the reason to refuse it.
-
-        :param age: of a message that is used later, s.
-        """
+    def take(self, name: Input, now: float, stamp: Stamp | None = None) -> Iterator[None]:
+        """Take a message in the context, which raises ValueError with the reason to refuse it."""
         tracker = self._trackers[name]
         try:
             yield
         except ValueError as error:
-            tracker.refuse(str(error), now)
-        else:
-            tracker.accepted_at = now - max(0.0, age)
-        tracker.report(now)
+            tracker.refused += 1
+            tracker.refused_at, tracker.refusal = now, str(error)
+            return
+        tracker.accepted_at = now
+        if stamp is not None:
+            tracker.last = stamp.time
+            if name in USED_LATER:
+                tracker.accepted_at -= max(0.0, stamp.age)
+
+    def check(self, name: Input, stamp: Stamp) -> None:
+        """Raise ValueError if a stamp is old, in the future, or not newer than the last one."""
+        tracker = self._trackers[name]
+        if stamp.age > tracker.timeout:
+            raise ValueError(f'its stamp is {format_seconds(stamp.age)} old by the ROS clock')
+        if stamp.age < -tracker.timeout:
+            raise ValueError(f'its stamp is {format_seconds(-stamp.age)} ahead of the ROS clock')
+        if tracker.last is not None and stamp.time <= tracker.last:
+            raise ValueError('its stamp is not newer than the last')
+
+    def clock_jumped(self) -> None:
+        """Compare no stamp with those from before a jump of ROS time."""
+        for tracker in self._trackers.values():
+            tracker.last = None
 
     def is_fresh(self, name: Input, now: float) -> bool:
         """Return whether an input can be used."""
@@ -228,12 +198,3 @@ class InputStates:
     def snapshot(self, now: float) -> Mapping[Input, InputSnapshot]:
         """Return all inputs at this moment."""
         return {name: one.snapshot(now) for name, one in self._trackers.items()}
-
-    def poll(self, now: float) -> None:
-        """See :meth:`Payload.poll`."""
-        for tracker in self._trackers.values():
-            tracker.report(now)
-
-    def next_deadline(self) -> float:
-        """See :meth:`Payload.next_deadline`."""
-        return min(one.next_change() for one in self._trackers.values())

@@ -47,12 +47,6 @@ class _History:
     timeout: float
     samples: deque[_Sample] = field(default_factory=lambda: deque(maxlen=MAX_SAMPLES))
 
-    def add(self, rotation: Quaternion, rates: Vector, stamp: Stamp) -> None:
-        """Add a rotation of any norm, or raise ValueError."""
-        stamp.check_age(self.timeout)
-        stamp.check_newer(self.samples[-1].time if self.samples else None)
-        self.samples.append(_Sample(stamp.time, rotation.normalized(), rates))
-
     def at(self, time: int) -> _Sample | None:
         """Return the rotation at a time, interpolated; None if it is not known."""
         newer: _Sample | None = None
@@ -77,14 +71,12 @@ class OrientationFeeder:
     :param target: returns the address of the camera.
     :ivar fixed_mount: roll, pitch and yaw of a fixed mount, degrees; None if ~/mount has a
         publisher.
-    :ivar sent: sent pairs; pairs that are made while the link is closed are dropped.
     """
 
     def __init__(
         self, settings: FeederSettings, send: Callable[[Message], None],
         target: Callable[[], Address], inputs: InputStates,
     ) -> None:
-        self.sent = 0
         self._settings = settings
         self._send = send
         self._target = target
@@ -94,8 +86,8 @@ class OrientationFeeder:
         self._mount_parent = MountParent.VEHICLE
         self.fixed_mount: Vector | None = (0.0, 0.0, 0.0)
         self._fixed_since = -math.inf
-        # When mount angles were sent last, s; infinity while the link is closed.
-        self._mount_sent_at = math.inf
+        # When mount angles were sent last, s.
+        self._mount_sent_at = -math.inf
         # The least time between two pairs, s.
         self._interval = 1 / settings.attitude_rate
         self._pair_due = -math.inf
@@ -112,10 +104,10 @@ class OrientationFeeder:
         :param orientation: of any norm; None if the message has none.
         :param rates: of the body, FLU, rad/s; NaN if unknown.
         """
-        with self._inputs.take(name, now):
+        with self._inputs.take(name, now, stamp):
             if orientation is None:
                 raise ValueError('it has no orientation: its covariance begins with -1')
-            self._histories[name].add(orientation, rates, stamp)
+            self._add(name, orientation, rates, stamp)
         self._send_pair(now)
 
     def take_mount(
@@ -126,15 +118,19 @@ class OrientationFeeder:
 
         :param frame_id: the frame of the orientation, see :class:`~.conversions.MountParent`.
         """
-        mounts = self._histories[Input.MOUNT]
         self.expect_mount()
-        with self._inputs.take(Input.MOUNT, now):
+        with self._inputs.take(Input.MOUNT, now, stamp):
             parent = MountParent.of(frame_id)
             if parent is not self._mount_parent:
                 self._mount_parent = parent
-                mounts.samples.clear()
-            mounts.add(orientation, UNKNOWN, stamp)
+                self._histories[Input.MOUNT].samples.clear()
+            self._add(Input.MOUNT, orientation, UNKNOWN, stamp)
         self._send_pair(now)
+
+    def _add(self, name: Input, rotation: Quaternion, rates: Vector, stamp: Stamp) -> None:
+        """Add a rotation of any norm, or raise ValueError."""
+        self._inputs.check(name, stamp)
+        self._histories[name].samples.append(_Sample(stamp.time, rotation.normalized(), rates))
 
     @property
     def mount_is_fixed(self) -> bool:
@@ -153,8 +149,7 @@ class OrientationFeeder:
         """
         if self.fixed_mount is not None:
             self.fixed_mount, self._fixed_since = angles, since
-            if self._link_open:
-                self._mount_sent_at = -math.inf
+            self._mount_sent_at = -math.inf
 
     def _send_pair(self, now: float) -> None:
         """Send the newest known attitude and mount of one instant, back to back."""
@@ -184,7 +179,6 @@ class OrientationFeeder:
         self._pair_due = max(self._pair_due + interval, now + interval / 2)
         self._send(conversions.attitude(sample.rotation, sample.rates, time_boot_ms(now)))
         self._send_mount(angles, now)
-        self.sent += self._link_open
 
     def change_rate(self, attitude_rate: float, now: float) -> None:
         """Replace the highest rate of attitudes, Hz."""
@@ -193,28 +187,13 @@ class OrientationFeeder:
 
     def _send_mount(self, angles: Vector, now: float) -> None:
         self._send(conversions.mount_status(angles, self._target()))
-        if self._link_open:
-            self._mount_sent_at = now
+        self._mount_sent_at = now
 
     def clock_jumped(self) -> None:
         """Forget everything that depends on ROS time."""
         self._pair_time = 0
         for history in self._histories.values():
             history.samples.clear()
-
-    def link_opened(self, now: float) -> None:
-        """Let the next :meth:`poll` send the fixed mount."""
-        # The link repeats the call while it hears no peer.
-        if not self._link_open:
-            self._mount_sent_at = -math.inf
-
-    def link_closed(self) -> None:
-        """Stop repeating the fixed mount until the link is open again."""
-        self._mount_sent_at = math.inf
-
-    @property
-    def _link_open(self) -> bool:
-        return self._mount_sent_at < math.inf
 
     def poll(self, now: float) -> None:
         """See :meth:`Payload.poll`."""

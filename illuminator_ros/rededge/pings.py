@@ -43,7 +43,7 @@ class _Request(NamedTuple):
 
 class Pings:
     """
-    Sends a PING at an interval, and on request, while the link is open.
+    Sends a PING at an interval, and on request; is polled while the link is open.
 
     :param own: the address of this component.
     :param send: sends a message.
@@ -62,16 +62,12 @@ class Pings:
         self._sequence = sequence
         # When each unanswered PING was sent, by sequence number, s.
         self._sent: dict[int, float] = {}
-        self._due = math.inf
+        self._due = -math.inf
         self._requests: list[_Request] = []
 
-    def start(self, now: float) -> None:
-        """Begin to send."""
-        self._due = now
-
     def stop(self, reason: str) -> None:
-        """Send no more, and end all requests."""
-        self._due = math.inf
+        """End all requests, since the link is closed; the next :meth:`poll` sends a PING."""
+        self._due = -math.inf
         self._sent.clear()
         self.end(reason)
 

@@ -293,7 +293,7 @@ def test_diagnostics_name_each_input_that_is_missing_or_refused_re_30(own_ros: R
             eventually(lambda: newest().startswith('geoid_separation is not set'))
             robot.position['latitude'] = math.nan
             eventually(lambda: 'latitude of ~/fix: nan deg is outside -90 to 90 deg' in newest())
-            node.wait_for('~/fix: latitude of ~/fix: nan deg is outside -90 to 90 deg')
+            node.wait_for('ago: latitude of ~/fix: nan deg is outside -90 to 90 deg')
         eventually(lambda: '~/imu: nothing for' in newest())
         camera.answers = False
         eventually(lambda: 'PINGs without a reply: the camera does not receive' in newest())

@@ -28,15 +28,20 @@ from sensor_msgs.msg import NavSatFix, NavSatStatus
 from std_msgs.msg import Bool, Header, UInt32
 from std_srvs.srv import Trigger
 
-from .diagnostics import reports, topics, why_no_camera
+from .diagnostics import reports, topics, why_no_camera, why_unused
 from .inputs import subscriptions
-from ..camera import CameraConnected, CameraEvent, CameraLost, ImageTaken
-from ..client import RedEdgeClient, Settings
+from ..client import (
+    CameraConnected,
+    CameraEvent,
+    CameraLost,
+    ImageTaken,
+    RedEdgeClient,
+    Settings,
+)
 from ..conversions import fixed_mount, image_attitude, image_position, MountFrame, MountParent
 from ..input_states import (
     FeederSettings,
     Input,
-    InputChanged,
     InputState,
     PositionSource,
     Stamp,
@@ -108,6 +113,8 @@ class CameraNode(ServedPayload):
         self._clock: Any = host.node.get_clock()
         self._started = host.link.clock()
         self._absence_due = self._started + ABSENCE_DELAY
+        # The states of the inputs as they were logged.
+        self._states: dict[Input, InputState] = {}
         self._geoid_is_known = GEOID_SEPARATION.name in given_parameters(host.node)
         self._mount_topic = host.node.resolve_topic_name(f'~/{Input.MOUNT.value}')
         self._interface = NodeInterface(
@@ -145,7 +152,7 @@ class CameraNode(ServedPayload):
     # Requests
 
     def _ping(self, request: Trigger.Request, now: float, answer: Answer) -> None:
-        self._client.camera.ping(now, answer)
+        self._client.ping(now, answer)
 
     def _capture(self, shot: Shot) -> Callable[[Trigger.Request, float, Answer], None]:
         def capture(request: Trigger.Request, now: float, answer: Answer) -> None:
@@ -155,7 +162,7 @@ class CameraNode(ServedPayload):
                     message += f', without {", ".join(map(topics, lacking))}'
                 answer(success, message)
 
-            self._client.camera.capture(shot, now, done)
+            self._client.capture(shot, now, done)
 
         return capture
 
@@ -185,9 +192,10 @@ class CameraNode(ServedPayload):
         """See :meth:`ServedPayload.poll`."""
         if now >= self._absence_due:
             self._absence_due = math.inf
-            if self._client.camera.snapshot(now).address is None:
+            if self._client.snapshot(now).address is None:
                 link = self._host.diagnostics.snapshot(now)
                 self._host.log.warning(f'no camera connected: {why_no_camera(link)}')
+        self._log_inputs(now)
         orientation = self._client.feeder.orientation
         if orientation.mount_is_fixed and self._host.node.count_publishers(self._mount_topic):
             orientation.expect_mount()
@@ -198,15 +206,23 @@ class CameraNode(ServedPayload):
                 MountParent.VEHICLE.value, self._host.values['frame_id'],
                 fixed_mount(orientation.fixed_mount, self._client.settings.feeder.mount_frame))
 
+    def _log_inputs(self, now: float) -> None:
+        """Log each input whose state has changed."""
+        for name, one in self._client.feeder.snapshot(now).inputs.items():
+            if one.state is not self._states.get(name, InputState.MISSING):
+                self._states[name] = one.state
+                used = one.state is InputState.OK
+                self._host.log.write(
+                    logging.INFO if used else logging.WARNING,
+                    f'~/{name.value}: received' if used else why_unused(name, one),
+                    f'input {name.value}')
+
     # Events
 
-    def _take(self, event: CameraEvent | InputChanged) -> None:
+    def _take(self, event: CameraEvent) -> None:
         log = self._host.log
         if isinstance(event, ImageTaken):
             self._publish(event.feedback)
-        elif isinstance(event, InputChanged):
-            log.write(logging.INFO if event.state is InputState.OK else logging.WARNING,
-                      f'~/{event.input.value}: {event.text}', f'input {event.input.value}')
         elif isinstance(event, CameraConnected):
             log.info(f'camera {event.address} connected', 'camera')
             self._interface.publish('connected', True)
@@ -238,7 +254,8 @@ class CameraNode(ServedPayload):
 
     def _take_snapshot(self, now: float) -> MakeReports:
         return functools.partial(
-            reports, client=self._client.snapshot(now), started=self._started,
+            reports, camera=self._client.snapshot(now),
+            feeder=self._client.feeder.snapshot(now), started=self._started,
             geoid_is_known=self._geoid_is_known)
 
 

@@ -19,8 +19,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 import math
 
-from ..camera import CameraSnapshot
-from ..client import ClientSnapshot
+from ..client import CameraSnapshot
 from ..feeder import FeederSnapshot
 from ..input_states import Input, InputSnapshot, InputState
 from ...mavlink.command_sender import format_seconds
@@ -41,7 +40,8 @@ HARDWARE_ID = f'mavlink:{mavlink.MAV_COMP_ID_CAMERA}'
 
 
 def reports(
-    link: LinkDiagnostics, *, client: ClientSnapshot, started: float, geoid_is_known: bool,
+    link: LinkDiagnostics, *, camera: CameraSnapshot, feeder: FeederSnapshot, started: float,
+    geoid_is_known: bool,
 ) -> list[Report]:
     """
     Return the reports of the node.
@@ -49,9 +49,14 @@ def reports(
     :param started: when the node was started, s on the link's clock.
     :param geoid_is_known: whether ``geoid_separation`` is set.
     """
-    return [link_report(link, client.camera.address, kind='camera', absence=why_no_camera(link),
+    findings = camera_findings(camera) + input_findings(feeder)
+    if not geoid_is_known:
+        findings.append((WARN, 'geoid_separation is not set, so altitudes are above the '
+                               'ellipsoid'))
+    return [link_report(link, camera.address, kind='camera', absence=why_no_camera(link),
                         started=started),
-            _camera_report(client, link.taken_at, geoid_is_known)]
+            Report('camera', HARDWARE_ID, findings, 'connected',
+                   lambda: _values(camera, feeder, link.taken_at))]
 
 
 def why_no_camera(link: LinkDiagnostics) -> str:
@@ -86,7 +91,7 @@ def input_findings(feeder: FeederSnapshot) -> list[Finding]:
         for state in (InputState.REFUSED, InputState.STALE):
             if state in states:
                 name = states[state]
-                findings.append((WARN, _why(name, feeder.inputs[name])))
+                findings.append((WARN, why_unused(name, feeder.inputs[name])))
                 break
         else:
             if group in feeder.needed:
@@ -99,23 +104,15 @@ def topics(names: Sequence[Input]) -> str:
     return ' or '.join(f'~/{name.value}' for name in names)
 
 
-def _why(name: Input, snapshot: InputSnapshot) -> str:
+def why_unused(name: Input, snapshot: InputSnapshot) -> str:
+    """Return why an input that was received is refused or stale, for people."""
     if snapshot.state is InputState.REFUSED or snapshot.age is None:
         return (f'~/{name.value} refused {format_seconds(snapshot.refused_age or 0.0)} ago: '
                 f'{snapshot.refusal}')
     return f'~/{name.value}: nothing for {format_seconds(snapshot.age)}'
 
 
-def _camera_report(client: ClientSnapshot, now: float, geoid_is_known: bool) -> Report:
-    findings = camera_findings(client.camera) + input_findings(client.feeder)
-    if not geoid_is_known:
-        findings.append((WARN, 'geoid_separation is not set, so altitudes are above the '
-                               'ellipsoid'))
-    return Report('camera', HARDWARE_ID, findings, 'connected', lambda: _values(client, now))
-
-
-def _values(client: ClientSnapshot, now: float) -> dict[str, Value]:
-    camera, feeder = client.camera, client.feeder
+def _values(camera: CameraSnapshot, feeder: FeederSnapshot, now: float) -> dict[str, Value]:
     values: dict[str, Value] = {
         'address': str(camera.address) if camera.address else None,
         'connected': camera.connected,
@@ -124,8 +121,6 @@ def _values(client: ClientSnapshot, now: float) -> dict[str, Value]:
         'pings_unanswered': camera.unanswered_pings,
         'images': camera.images,
         'image_index': camera.image_index,
-        'positions_sent': feeder.positions,
-        'attitudes_sent': feeder.attitudes,
     }
     for name, one in feeder.inputs.items():
         values |= {name.value: one.state.value, f'{name.value}_s_ago': one.age}
