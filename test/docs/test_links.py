@@ -69,7 +69,7 @@ def words(page: Path) -> int:
 
 
 def test_the_pages_are_short_outside_tables_and_code() -> None:
-    counts = {page.name: words(page) for page in PAGES
+    counts = {page.relative_to(ROOT): words(page) for page in PAGES
               if page == README or page.parent == ROOT / 'doc'}
 
     assert {name: count for name, count in counts.items() if count > WORDS} == {}
