@@ -43,6 +43,7 @@ from illuminator_ros.rededge.simulated import COLUMNS
 from illuminator_ros.rededge.simulated import SIMULATED as CAMERA
 
 if TYPE_CHECKING:
+    from illuminator_ros.ros.node import Endpoint
     from illuminator_ros.ros.parameters import ParameterSpec
 
 DOC = Path(__file__).resolve().parent.parent / 'doc'
@@ -135,25 +136,79 @@ def parameters(of: Sequence[ParameterSpec]) -> Rows:
              values_of(spec), spec.unit, meaning_of(spec)] for spec in of]
 
 
+def endpoints(of: Iterable[Endpoint], name: str = '~/{}') -> list[list[str]]:
+    """Return the rows of topics or services: name, type and meaning."""
+    return [[f'`{name.format(one.name)}`',
+             f'`{one.type.__module__.partition(".")[0]}/{one.type.__name__}`', one.meaning]
+            for one in of]
+
+
+def published(of: Iterable[Endpoint], statuses: str) -> Rows:
+    """Return the rows of published topics, with their QoS, and of the diagnostics."""
+    return [*([name, type_, 'stream' if one.qos else 'state', meaning]
+              for one in of for name, type_, meaning in endpoints([one])),
+            ['`/diagnostics`', '`diagnostic_msgs/DiagnosticArray`', 'stream', statuses]]
+
+
+def of_a_source(of: Iterable[Endpoint], release: Endpoint) -> Rows:
+    """Return the rows of the topics and services that each source of commands has."""
+    return endpoints(
+        [*(one._replace(meaning=f'as `~/{one.name}`, for that source') for one in of), release],
+        '~/NAME/{}')
+
+
 def ros_tables() -> Tables:
     """Return the tables of the ROS interface and of the monitor."""
     from illuminator_ros.cli.monitor import app
+    from illuminator_ros.gimbal.ros import gimbal_node, manager_node
     from illuminator_ros.gimbal.ros.gimbals import GIMBAL_PARAMETERS
     from illuminator_ros.gimbal.ros.manager_node import MANAGER_PARAMETERS
+    from illuminator_ros.illuminator.ros import event_publisher, light_node, lights
+    from illuminator_ros.illuminator.ros.beam import beam_topic
     from illuminator_ros.illuminator.ros.diagnostics import FLAG_LEVELS
     from illuminator_ros.illuminator.ros.parameters import DEVICE_PARAMETERS, LIGHT_PARAMETERS
     from illuminator_ros.mavlink.dialect import short_names
     from illuminator_ros.rededge.ros import camera_node as camera
+    from illuminator_ros.rededge.ros.inputs import TOPICS
+    from illuminator_ros.ros.command_sources import RELEASE, SOURCE
     from illuminator_ros.ros.parameters import LINK_PARAMETERS
 
     kinds = {float: 'double', str: 'string'}
     levels = {b'\0': 'OK', b'\1': 'WARN', b'\2': 'ERROR'}
     views = [one.load('view') for one in PAYLOADS.values() if one.view]
+    setpoints = (gimbal_node.CMD_ATTITUDE, gimbal_node.CMD_ANGLES, gimbal_node.CMD_RATE,
+                 gimbal_node.CMD_ROI)
 
     def names(keys: Iterable[str]) -> str:
         return ' '.join(f'`{key}`' for key in keys)
 
     return {
+        ('reference', 'published'): published(
+            (*event_publisher.PUBLICATIONS, SOURCE, beam_topic()),
+            '`illuminator: link` and `illuminator: lamp`; '
+            '[their values](protocol.md#values-of-diagnostics)'),
+        ('reference', 'accepted'): endpoints((
+            light_node.ENABLE, light_node.REFRESH, lights.ENABLE_ALL, light_node.CMD_ENABLE,
+            lights.CMD_ENABLE_ALL, light_node.CMD_BRIGHTNESS)),
+        ('reference', 'of a source'): of_a_source(
+            (light_node.CMD_ENABLE, light_node.CMD_BRIGHTNESS, light_node.ENABLE), RELEASE),
+        ('gimbal', 'published'): published(
+            (*gimbal_node.PUBLICATIONS, SOURCE),
+            '`gimbal: link` and `gimbal: device`: failure flags by name, limits, identity, '
+            'control, silence, a second manager'),
+        ('gimbal', 'accepted'): endpoints(
+            (*setpoints, *gimbal_node.REQUESTS, gimbal_node.SET_YAW_LOCK)),
+        ('gimbal', 'of a source'): of_a_source(setpoints, RELEASE),
+        ('gimbal_manager', 'published by the manager'): published(
+            [manager_node.DEVICE_SETPOINT], '`gimbal_manager: manager`: state, policy, the player '
+            'in control and since when, another manager'),
+        ('gimbal_manager', 'subscribed by the manager'): endpoints((
+            manager_node.DEVICE_ATTITUDE, manager_node.IMU, manager_node.ODOMETRY,
+            manager_node.FIX)),
+        ('rededge', 'subscribed'): endpoints(TOPICS.values()),
+        ('rededge', 'published'): published(
+            camera.PUBLICATIONS, '`rededge: link` and `rededge: camera`'),
+        ('rededge', 'service'): endpoints((camera.PING, *camera.CAPTURES)),
         ('reference', 'parameter of the light'): [
             [f'`{spec.name}`', kinds[type(spec.default)], values_of(spec), spec.unit,
              meaning_of(spec)] for spec in DEVICE_PARAMETERS],

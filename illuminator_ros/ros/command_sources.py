@@ -22,13 +22,18 @@ import math
 import re
 import reprlib
 
+from std_msgs.msg import String
 from std_srvs.srv import Trigger
 
 from .diagnostics import Value
-from .node import Answer, RequestService
+from .node import Answer, Endpoint, RequestService
 from .parameters import ParameterError, ParameterSpec, Values
 from ..payload.command_sources import DEFAULT, SourceSettings
 
+SOURCE = Endpoint(
+    'source', String, "only with `sources`: the source that holds the device, `''` for none")
+RELEASE = Endpoint('release', Trigger, 'the source gives the device back; the answer names the '
+                   'next holder')
 SOURCE_PARAMETERS = (
     ParameterSpec('sources', [],
                   'sources of commands, the highest first; empty = commands have no sources'),
@@ -77,7 +82,7 @@ def release_services(
         release(source, now, answer)
 
     return tuple(
-        RequestService(f'{source}/release', Trigger, functools.partial(start, source))
+        RequestService(RELEASE.of(f'{source}/'), functools.partial(start, source))
         for source in (sources.names if sources else ()))
 
 

@@ -44,34 +44,38 @@ SWITCH_QOS = QoSProfile(depth=10, reliability=ReliabilityPolicy.RELIABLE)
 SERVICE_QOS = QoSProfile(depth=1000, reliability=ReliabilityPolicy.RELIABLE)
 
 
-class Publication(NamedTuple):
+class Endpoint(NamedTuple):
     """
-    A topic ``~/name`` that the node publishes.
+    A topic or service ``~/name``; the tables of the pages are written from it.
 
-    :param type: the message's class.
-    :param qos: :data:`STATE_QOS` where it is None.
+    :param type: the class of its messages, or the service's class.
+    :param meaning: what its values mean, with their unit, or what it does.
+    :param qos: of a topic; where it is None, :data:`STATE_QOS` of one that the node publishes, and
+        :data:`COMMAND_QOS` of others. :data:`SWITCH_QOS` is for single messages.
     """
 
     name: str
     # Untyped: messages of ROS have no types.
     type: type[Any]  # noqa: A003
+    meaning: str
     qos: QoSProfile | None = None
+
+    def of(self, prefix: str) -> Endpoint:
+        """Return the same topic or service of a source, with the prefix of its names."""
+        return self._replace(name=f'{prefix}{self.name}')
 
 
 @dataclass(frozen=True)
 class RequestService:
     """
-    A service ``~/name``.
+    A service, whose response has ``success`` and ``message``.
 
-    :param type: the service's class; its response has ``success`` and ``message``.
     :param start: called in the link's thread with the request, the time (s), and the function
         that it must call once with success and message, then or later.
     :param limit: requests that may wait for their answers; one more is answered at once.
     """
 
-    name: str
-    # Untyped: messages of ROS have no types.
-    type: type[Any]  # noqa: A003
+    endpoint: Endpoint
     start: Callable[[Any, float, Answer], None]
     limit: int = MAX_PENDING
 
@@ -91,21 +95,17 @@ def finite_data(message: Any) -> Any:
 @dataclass(frozen=True)
 class CommandTopic(Generic[T]):
     """
-    A topic ``~/name`` that the node subscribes to.
+    A topic that the node subscribes to.
 
-    :param type: the message's class.
     :param take: called in the link's thread with a value and the time (s); of values that come
         faster than the link takes them only the newest.
     :param read: returns the value of a message, in any thread; a ValueError is logged.
-    :param qos: :data:`SWITCH_QOS` for single messages; :data:`COMMAND_QOS` where it is None.
     """
 
-    name: str
-    type: type[object]  # noqa: A003
+    endpoint: Endpoint
     take: Callable[[T, float], None]
-    # Untyped: of the class that ``type`` names.
+    # Untyped: of the class that the endpoint names.
     read: Callable[[Any], T] = finite_data
-    qos: QoSProfile | None = None
 
 
 # Of any type of value.
@@ -117,7 +117,7 @@ class NodeInterface:
 
     def __init__(
         self, node: Node, link: Link, log: NodeLog, *,
-        publications: Iterable[Publication] = (), services: Iterable[RequestService] = (),
+        publications: Iterable[Endpoint] = (), services: Iterable[RequestService] = (),
         commands: Iterable[AnyCommand] = (),
     ) -> None:
         self._publishers = {
@@ -125,13 +125,14 @@ class NodeInterface:
             for one in publications}
         self._types = {one.name: one.type for one in publications}
         for service in services:
-            calls = LinkCalls(link, log, service.limit)
-            DeferredService(node, service.type, f'~/{service.name}', _taker(service, calls),
+            calls, endpoint = LinkCalls(link, log, service.limit), service.endpoint
+            DeferredService(node, endpoint.type, f'~/{endpoint.name}', _taker(service, calls),
                             calls.refuse_waiting, qos=SERVICE_QOS)
         for command in commands:
+            endpoint = command.endpoint
             node.create_subscription(
-                command.type, f'~/{command.name}', _Newest(link, log, command).offer,
-                command.qos or COMMAND_QOS)
+                endpoint.type, f'~/{endpoint.name}', _Newest(link, log, command).offer,
+                endpoint.qos or COMMAND_QOS)
 
     def publish(self, name: str, value: object) -> None:
         """
@@ -153,7 +154,7 @@ class NodeInterface:
 
 
 def _taker(service: RequestService, calls: LinkCalls) -> Take:
-    response = service.type.Response
+    response = service.endpoint.type.Response
 
     def take(request: Any, respond: Respond) -> None:
         def start(now: float, answer: Respond) -> None:
@@ -179,7 +180,8 @@ class _Newest(Generic[T]):
         try:
             value = self._command.read(message)
         except ValueError as error:
-            self._log.warning(f'~/{self._command.name}: ignored: {error}', self._command.name)
+            name = self._command.endpoint.name
+            self._log.warning(f'~/{name}: ignored: {error}', name)
             return
         with self._lock:
             called = bool(self._waiting)

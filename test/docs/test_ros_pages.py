@@ -80,17 +80,6 @@ def test_parameter_file_and_help_have_each_parameter_with_its_unit(spec: Paramet
     assert re.search(rf'^    (# )?{spec.name}: .+{unit}', YAML, re.MULTILINE)
 
 
-def test_the_readme_names_the_topics_services_and_parameters_of_the_reference() -> None:
-    names = re.findall(r'`([~/\w]+)`', README.partition('## Topics and services')[2].partition(
-        '\n## ')[0].partition('- ')[2])
-
-    assert names[:-len(DEVICE_PARAMETERS)] == [
-        name.strip('`') for name, *_ in table(REFERENCE, 'published')] + sorted((
-            name.strip('`') for name, *_ in table(REFERENCE, 'accepted')),
-            key=lambda name: (name.startswith('~/cmd/'), 'brightness' in name, name))
-    assert set(names[-len(DEVICE_PARAMETERS):]) == {spec.name for spec in DEVICE_PARAMETERS}
-
-
 def test_the_readme_has_the_executables() -> None:
     package = ROOT / 'illuminator_ros'
     modules = {*(path.stem for path in package.glob('[!_]*.py')),

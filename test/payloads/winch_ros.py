@@ -17,10 +17,13 @@
 from __future__ import annotations
 
 from illuminator_ros.payload.attempt import Result
-from illuminator_ros.ros.node import CommandTopic, NodeInterface, Publication
+from illuminator_ros.ros.node import CommandTopic, Endpoint, NodeInterface
 from illuminator_ros.ros.payload import Host, RosPayload, ServedPayload
 from payloads.winch import WinchClient, WinchReport
 from std_msgs.msg import Float32
+
+LINE_LENGTH = Endpoint('line_length', Float32, 'length of the line that is out, m')
+RELEASE = Endpoint('cmd/release', Float32, 'length of line to release, m')
 
 
 class WinchNode(ServedPayload):
@@ -30,8 +33,8 @@ class WinchNode(ServedPayload):
         self._client = client
         self._log = host.log
         self._interface = NodeInterface(
-            host.node, host.link, host.log, publications=[Publication('line_length', Float32)],
-            commands=[CommandTopic('cmd/release', Float32, self._release)])
+            host.node, host.link, host.log, publications=[LINE_LENGTH],
+            commands=[CommandTopic(RELEASE, self._release)])
         client.events.subscribe(self._publish)
 
     def _publish(self, report: WinchReport) -> None:

@@ -59,6 +59,8 @@ OF_EVERY_NODE = re.compile('parameter|logger|type_description|rosout|/clock$')
 # Services that an operator does not need, and topics that each node has.
 INTERNAL = {'get_logger_levels', 'set_logger_levels', 'get_type_description'}
 OF_OPERATOR = {'/clock', '/parameter_events', '/rosout'}
+OF_DRIVER = {f'/gimbal_manager/{topic}' for topic in (
+    'device/attitude', 'device/setpoint', 'fix', 'imu', 'odometry')}
 QOS = {'state': (ReliabilityPolicy.RELIABLE, DurabilityPolicy.TRANSIENT_LOCAL),
        'stream': (ReliabilityPolicy.RELIABLE, DurabilityPolicy.VOLATILE)}
 STATUSES = {
@@ -74,46 +76,39 @@ class Node:
     """
     A node with all options of its interface.
 
-    :param pages: the pages that describe it.
-    :param headings: the headings of the tables with its topics and services.
+    :param tables: the tables with its topics and services: page and heading.
     :param parameters: the parameters that it is started with.
     :param operator: the node that its policy permits to use it.
     """
 
-    pages: tuple[str, ...]
-    headings: tuple[str, ...]
+    tables: tuple[tuple[str, str], ...]
     parameters: dict[str, Any]
     operator: str
 
     @property
-    def text(self) -> str:
-        """Return its pages, without backquotes."""
-        return '\n'.join((ROOT / 'doc' / f'{page}.md').read_text().replace('`', '')
-                         for page in self.pages)
-
-    @property
     def rows(self) -> list[list[str]]:
-        """Return the rows of its tables, each with its heading first."""
-        return [[heading, *row] for heading in self.headings
-                for row in table(self.text, heading)]
-
-    @property
-    def of_sources(self) -> set[str]:
-        """Return the names that its page describes for sources of commands."""
-        names = [name for row in table(self.text, 'of a source') for name in row[0].split(', ')]
-        return {'~/source', '~/default/release', *(
-            name.replace('NAME', source) for name in names for source in SOURCES)}
+        """Return the rows of its tables, without backquotes."""
+        found = [row for page, heading in self.tables for row in table(
+            (ROOT / 'doc' / f'{page}.md').read_text().replace('`', ''), heading)]
+        return [row for row in found if '/NAME/' not in row[0]] + [
+            [row[0].replace('NAME', source), *row[1:]]
+            for row in found for source in (*SOURCES, 'default')
+            if '/NAME/' in row[0] and (source != 'default' or 'release' in row[0])]
 
 
-ACCEPTED = ('published', 'accepted')
+ACCEPTED = ('published', 'accepted', 'of a source')
+OF_GIMBAL = tuple(('gimbal', heading) for heading in ACCEPTED)
+OF_MANAGER = tuple(('gimbal_manager', f'{heading} by the manager')
+                   for heading in ('published', 'subscribed'))
 WITH_SOURCES = {'sources': f'[{", ".join(SOURCES)}]'}
 NODES = {
-    'illuminator': Node(('reference',), ACCEPTED, {
+    'illuminator': Node(tuple(('reference', heading) for heading in ACCEPTED), {
         **WITH_SOURCES, 'beam_range': 5.0, 'target_component': 243}, 'operator'),
-    'gimbal': Node(('gimbal',), ACCEPTED, WITH_SOURCES, 'gimbal_operator'),
-    'gimbal_manager': Node(('gimbal', 'gimbal_manager'), (*ACCEPTED, 'topic of the manager'), {
+    'gimbal': Node(OF_GIMBAL, WITH_SOURCES, 'gimbal_operator'),
+    'gimbal_manager': Node((*OF_GIMBAL, *OF_MANAGER), {
         **WITH_SOURCES, 'gimbal_device_id': 1}, 'gimbal_manager_operator'),
-    'rededge': Node(('rededge',), ('subscribed', 'published', 'service'), {}, 'rededge_operator'),
+    'rededge': Node(tuple(('rededge', heading) for heading in (
+        'subscribed', 'published', 'service')), {}, 'rededge_operator'),
 }
 each_node = pytest.mark.parametrize('name', NODES)
 
@@ -159,7 +154,7 @@ def running(ros: Ros) -> Iterator[Running]:
             return set().union(*STATUSES.values()) <= reported.keys()
         eventually(all_report)
         interfaces = {name: interface(ros, name, [
-            row[1].replace('~', f'/{name}') for row in node.rows]) for name, node in NODES.items()}
+            row[0].replace('~', f'/{name}') for row in node.rows]) for name, node in NODES.items()}
         infos = {topic: ros.node.get_publishers_info_by_topic(topic)[0].qos_profile
                  for one in interfaces.values() for topic in one.publishers}
         yield Running(interfaces, reported, {
@@ -177,14 +172,11 @@ def own_names(name: str, running: Running) -> dict[str, str]:
 
 @each_node
 def test_page_has_the_topics_and_services_of_the_node(name: str, running: Running) -> None:
-    node, found = NODES[name], own_names(name, running)
-    documented = {row[1]: row[2] for row in node.rows}
-    of_sources = node.of_sources if 'sources' in node.parameters else set()
+    rows = NODES[name].rows
 
-    assert {one: found[one] for one in found.keys() - of_sources} == documented
-    assert of_sources <= found.keys()
-    for heading, topic, _, quality, *_ in node.rows:
-        if heading == 'published':
+    assert own_names(name, running) == {topic: type_ for topic, type_, *_ in rows}
+    for topic, _, quality, *_ in rows:
+        if quality in QOS:
             assert running.qos[topic.replace('~', f'/{name}')] == QOS[quality], topic
 
 
@@ -231,8 +223,7 @@ def test_policy_permits_the_operator_all_that_the_node_offers_but_its_internals(
 ) -> None:
     offered, operator = running.interfaces[name], NODES[name].operator
     # The vehicle and the driver of the gimbal use the topics of the manager.
-    others = OF_OPERATOR | {row[1].replace('~', f'/{name}') for row in NODES[name].rows
-                            if row[0] == 'topic of the manager'}
+    others = OF_OPERATOR | (OF_DRIVER if name == 'gimbal_manager' else set())
 
     assert {*permitted(name, operator, 'topic', 'subscribe')} - OF_OPERATOR == (
         set(offered.publishers) - others)

@@ -18,7 +18,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from illuminator_ros.ros.node import NodeInterface, Publication
+from illuminator_ros.ros.node import Endpoint, NodeInterface
 from illuminator_ros.ros.qos import STREAM_QOS
 import pytest
 from std_msgs.msg import Bool
@@ -46,7 +46,7 @@ def test_value_for_subscribers_is_made_and_published_only_where_there_are_any(
         subscriptions: int, published: list[bool]) -> None:
     topic: Any = Topic(subscriptions)
     node = NodeInterface(topic, topic, topic, publications=[
-        Publication('enabled', Bool, STREAM_QOS)])
+        Endpoint('enabled', Bool, '', STREAM_QOS)])
     made: list[bool] = []
 
     def make() -> bool:

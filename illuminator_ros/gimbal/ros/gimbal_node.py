@@ -22,7 +22,6 @@ from typing import Any, TypeVar
 
 from geometry_msgs.msg import QuaternionStamped, Vector3Stamped
 from rclpy.node import Node
-from rclpy.qos import QoSProfile
 from sensor_msgs.msg import NavSatFix
 from std_msgs.msg import Bool, Header, String
 from std_srvs.srv import SetBool, Trigger
@@ -39,9 +38,10 @@ from ...payload.command_sources import DEFAULT, describe
 from ...payload.messages import GeoPoint
 from ...payload.mount_attitude import YawFrame
 from ...ros import node as ros_node
-from ...ros.command_sources import prefixes, release_services
+from ...ros.command_sources import prefixes, release_services, SOURCE
 from ...ros.conversions import quaternion_message
 from ...ros.diagnostics_publisher import DiagnosticsSource, MakeReports
+from ...ros.node import Endpoint
 from ...ros.parameter_services import ParameterServices
 from ...ros.parameters import ChangeableParameters
 from ...ros.payload import Host
@@ -52,22 +52,42 @@ from ...ros.transforms import TransformPublisher
 T = TypeVar('T')
 
 PUBLICATIONS = (
-    ros_node.Publication('connected', Bool),
-    ros_node.Publication('attitude', QuaternionStamped, STREAM_QOS),
-    ros_node.Publication('angular_velocity', Vector3Stamped, STREAM_QOS),
-    ros_node.Publication('angles', Vector3Stamped, STREAM_QOS),
-    ros_node.Publication('yaw_lock', Bool),
-    ros_node.Publication('in_control', Bool),
-    ros_node.Publication('controller', String),
+    Endpoint('connected', Bool, 'manager and device are heard'),
+    Endpoint('attitude', QuaternionStamped,
+             'axes ahead, left and up (FLU); `frame_id` names the yaw frame', STREAM_QOS),
+    Endpoint('angular_velocity', Vector3Stamped, 'rates of roll, pitch and yaw, rad/s; not '
+             'published where the device does not measure them', STREAM_QOS),
+    Endpoint('angles', Vector3Stamped, 'roll, pitch, yaw of the attitude, rad', STREAM_QOS),
+    Endpoint('yaw_lock', Bool, 'yaw is held against the earth'),
+    Endpoint('in_control', Bool, 'this node has primary control'),
+    Endpoint('controller', String,
+             'the components in control, such as `primary 1/195, secondary none`, or `unknown`'),
 )
-# Requests without an argument, by service.
-REQUESTS: dict[str, Callable[[Gimbal, float, Done], None]] = {
-    'take_control': Gimbal.take_control,
-    'release_control': Gimbal.release_control,
-    'neutral': Gimbal.set_neutral,
-    'retract': Gimbal.retract,
-    'clear_roi': Gimbal.clear_roi,
+# Services without an argument.
+REQUESTS: dict[Endpoint, Callable[[Gimbal, float, Done], None]] = {
+    Endpoint('take_control', Trigger, 'take primary control'): Gimbal.take_control,
+    Endpoint('release_control', Trigger, 'stop, and release all control that this node has'):
+        Gimbal.release_control,
+    Endpoint('neutral', Trigger, 'turn to the neutral position'): Gimbal.set_neutral,
+    Endpoint('retract', Trigger, 'turn to the retracted position'): Gimbal.retract,
+    Endpoint('clear_roi', Trigger, 'no longer point at a place'): Gimbal.clear_roi,
 }
+SET_YAW_LOCK = Endpoint(
+    'set_yaw_lock', SetBool, 'hold yaw against the earth, or let it follow the vehicle; refused '
+    'where the gimbal lacks it')
+CMD_ATTITUDE = Endpoint(
+    'cmd/attitude', QuaternionStamped,
+    'an attitude; `frame_id` names the yaw frame, any other is refused', ros_node.SWITCH_QOS)
+CMD_ANGLES = Endpoint(
+    'cmd/angles', Vector3Stamped, 'the same as roll, pitch and yaw, rad; NaN leaves an axis where '
+    'it was sent last, else where it is. Refused beyond pi, and pitch beyond pi/2',
+    ros_node.SWITCH_QOS)
+CMD_RATE = Endpoint(
+    'cmd/rate', Vector3Stamped, 'rates of roll, pitch and yaw, rad/s; `frame_id` is not read. '
+    'Refused beyond 2 pi. Zero is sent once when no message comes for `setpoint_timeout`')
+CMD_ROI = Endpoint(
+    'cmd/roi', NavSatFix, 'a place to point at (MAV_CMD_DO_SET_ROI_LOCATION); its altitude is '
+    'above the ellipsoid', ros_node.SWITCH_QOS)
 
 
 class GimbalNode:
@@ -98,13 +118,12 @@ class GimbalNode:
         self._errors = 0
         self._separation: float = host.values['geoid_separation']
         sources = client.settings.sources
-        source_topic = [ros_node.Publication('source', String)] if sources else []
         self._interface = ros_node.NodeInterface(
-            node, host.link, log, publications=(*PUBLICATIONS, *source_topic),
+            node, host.link, log, publications=(*PUBLICATIONS, *([SOURCE] if sources else [])),
             services=(
-                *(ros_node.RequestService(name, Trigger, functools.partial(self._request, name))
-                  for name in REQUESTS),
-                ros_node.RequestService('set_yaw_lock', SetBool, self._set_yaw_lock),
+                *(ros_node.RequestService(one, functools.partial(self._request, one))
+                  for one in REQUESTS),
+                ros_node.RequestService(SET_YAW_LOCK, self._set_yaw_lock),
                 *release_services(sources, self._release)),
             commands=(topic for way in prefixes(sources).items()
                       for topic in self._command_topics(*way)))
@@ -232,14 +251,14 @@ class GimbalNode:
         return None if refusal else gimbal
 
     def _request(
-        self, name: str, message: Trigger.Request, now: float, answer: ros_node.Answer,
+        self, service: Endpoint, message: Trigger.Request, now: float, answer: ros_node.Answer,
     ) -> None:
-        if gimbal := self._claimed(name, now, answer):
-            REQUESTS[name](gimbal, now, lambda result, now: answer(
+        if gimbal := self._claimed(service.name, now, answer):
+            REQUESTS[service](gimbal, now, lambda result, now: answer(
                 result.success, result.message))
 
     def _set_yaw_lock(self, message: SetBool.Request, now: float, answer: ros_node.Answer) -> None:
-        if gimbal := self._claimed('set_yaw_lock', now, answer):
+        if gimbal := self._claimed(SET_YAW_LOCK.name, now, answer):
             gimbal.set_yaw_lock(message.data, now, lambda result, now: answer(
                 result.success, result.message))
 
@@ -247,15 +266,16 @@ class GimbalNode:
 
     def _command_topics(self, source: str, prefix: str) -> tuple[ros_node.AnyCommand, ...]:
         def topic(
-            name: str, type_: type[object], send: Callable[[Gimbal, T, float], str],
-            read: Callable[[Any], T], qos: QoSProfile = ros_node.SWITCH_QOS,
+            plain: Endpoint, send: Callable[[Gimbal, T, float], str], read: Callable[[Any], T],
         ) -> ros_node.CommandTopic[T]:
+            endpoint = plain.of(prefix)
+
             def take(value: T, now: float) -> None:
                 gimbal = self._gimbal()
-                self._refused(f'{prefix}{name}', self.absence(now) if gimbal is None else
+                self._refused(endpoint.name, self.absence(now) if gimbal is None else
                               gimbal.claim(source, now) or send(gimbal, value, now))
 
-            return ros_node.CommandTopic(f'{prefix}{name}', type_, take, read, qos)
+            return ros_node.CommandTopic(endpoint, take, read)
 
         def point(gimbal: Gimbal, place: GeoPoint, now: float) -> str:
             gimbal.set_roi(*place, now, pointed, is_stream=True)
@@ -263,18 +283,15 @@ class GimbalNode:
 
         def pointed(result: Result, now: float) -> None:
             if not (result.success or result.superseded):
-                self._refused(f'{prefix}cmd/roi', result.message)
+                self._refused(CMD_ROI.of(prefix).name, result.message)
 
         return (
-            topic('cmd/attitude', QuaternionStamped,
-                  lambda gimbal, value, now: gimbal.set_attitude(*value, now),
+            topic(CMD_ATTITUDE, lambda gimbal, value, now: gimbal.set_attitude(*value, now),
                   self._frames.read_attitude),
-            topic('cmd/angles', Vector3Stamped,
-                  lambda gimbal, value, now: gimbal.set_angles(*value, now),
+            topic(CMD_ANGLES, lambda gimbal, value, now: gimbal.set_angles(*value, now),
                   self._frames.read_angles),
-            topic('cmd/rate', Vector3Stamped, Gimbal.set_rates, conversions.read_rates,
-                  ros_node.COMMAND_QOS),
-            topic('cmd/roi', NavSatFix, point,
+            topic(CMD_RATE, Gimbal.set_rates, conversions.read_rates),
+            topic(CMD_ROI, point,
                   lambda message: conversions.read_place(message, self._separation)))
 
     def _refused(self, topic: str, reason: str) -> None:

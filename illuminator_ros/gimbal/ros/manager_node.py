@@ -41,7 +41,7 @@ from ...payload.rotation import enu_ned, ned_frd, Quaternion, Vector
 from ...ros.conversions import quaternion_message, read_orientation, read_quaternion, read_vector
 from ...ros.diagnostics import ERROR, Finding, LinkDiagnostics, Report, Value, WARN
 from ...ros.diagnostics_publisher import DiagnosticsSource, MakeReports
-from ...ros.node import AnyCommand, CommandTopic, NodeInterface, Publication
+from ...ros.node import AnyCommand, CommandTopic, Endpoint, NodeInterface
 from ...ros.parameters import ParameterError, ParameterSpec, Values
 from ...ros.payload import Host, RosPayload, ServedPayload, ShutdownReport
 from ...ros.qos import STREAM_QOS
@@ -52,6 +52,16 @@ ROS = 'ros'
 VEHICLE_RATE_LIMIT, VEHICLE_SPEED_LIMIT = 100.0, 10e3
 _RANGES = ((0.0, 0.0), (-math.pi / 2, math.pi / 2), (-math.pi, math.pi))
 
+DEVICE_SETPOINT = Endpoint(
+    'device/setpoint', QuaternionStamped, 'the attitude for the driver of a gimbal without '
+    'MAVLink', STREAM_QOS)
+DEVICE_ATTITUDE = Endpoint(
+    'device/attitude', QuaternionStamped, 'the attitude that the driver measures')
+IMU = Endpoint('imu', Imu, 'attitude of the vehicle, FLU in ENU')
+ODOMETRY = Endpoint('odometry', Odometry, "attitude and velocity of the vehicle; the twist is in "
+                    "the body's axes")
+FIX = Endpoint('fix', NavSatFix, 'position of the vehicle, for regions of interest; ignored '
+               'without a fix')
 MANAGER_PARAMETERS = (
     ParameterSpec('policy', Policy.HOLD.value, 'when a player takes control from another one',
                   choices=tuple(policy.value for policy in Policy)),
@@ -126,8 +136,7 @@ class ManagerNode(ServedPayload):
         self._gimbals = Gimbals(both.client, host, lambda: manager.tracker.inactive_reason)
         self._interface = NodeInterface(
             host.node, host.link, host.log,
-            publications=() if manager.tracker.has_mavlink else (
-                Publication('device/setpoint', QuaternionStamped, STREAM_QOS),),
+            publications=() if manager.tracker.has_mavlink else (DEVICE_SETPOINT,),
             commands=tuple(self._topics()))
         host.diagnostics.add(DiagnosticsSource(
             host.node.get_fully_qualified_name(), self._take_snapshot))
@@ -136,14 +145,13 @@ class ManagerNode(ServedPayload):
     def _topics(self) -> list[AnyCommand]:
         separation: float = self._host.values['geoid_separation']
         topics: list[AnyCommand] = [
-            CommandTopic('imu', Imu, self._take_imu, _read_imu),
-            CommandTopic('odometry', Odometry, self._take_odometry, _read_odometry),
-            CommandTopic('fix', NavSatFix, self._take_place,
+            CommandTopic(IMU, self._take_imu, _read_imu),
+            CommandTopic(ODOMETRY, self._take_odometry, _read_odometry),
+            CommandTopic(FIX, self._take_place,
                          lambda message: _read_fix(message, separation))]
         if not self._manager.tracker.has_mavlink:
             topics.append(CommandTopic(
-                'device/attitude', QuaternionStamped, self._take_attitude,
-                self._frames.read_attitude))
+                DEVICE_ATTITUDE, self._take_attitude, self._frames.read_attitude))
         return topics
 
     # The vehicle and the device
@@ -198,7 +206,7 @@ class ManagerNode(ServedPayload):
         attitude = from_mavlink(setpoint.attitude or Quaternion(), setpoint.frame)
         header = Header(stamp=self._clock.now().to_msg(),
                         frame_id=self._frames.name(setpoint.frame))
-        self._interface.publish('device/setpoint', quaternion_message(header, attitude))
+        self._interface.publish(DEVICE_SETPOINT.name, quaternion_message(header, attitude))
 
     def _state_changed(self, event: StateChanged) -> None:
         device = f'gimbal {event.device or event.device_id}'

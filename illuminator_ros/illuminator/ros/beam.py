@@ -27,6 +27,7 @@ from .parameters import BeamGeometry
 from ..events import LightEvent, LightLost, StatusReceived
 from ..model import Mode, Status
 from ...payload.rotation import Quaternion
+from ...ros.node import Endpoint
 from ...ros.qos import STATE_QOS
 from ...ros.transforms import TransformPublisher
 
@@ -45,6 +46,14 @@ REFRESH = 1.0
 LIFETIME = 5
 # s between publications of a beam that a gimbal turns.
 MOVE_INTERVAL = 0.1
+
+
+def beam_topic() -> Endpoint:
+    """Return the topic; its type is imported only where the beam is shown."""
+    from visualization_msgs.msg import Marker
+
+    return Endpoint(
+        'beam', Marker, 'only with `beam_range`: [the beam](beam.md), for RViz and Foxglove')
 
 
 def cone(length: float, angle: float) -> list[Point]:
@@ -152,9 +161,9 @@ class BeamPublisher:
     ) -> None:
         # Imported only where the beam is shown.
         from geometry_msgs.msg import Point as PointMessage
-        from visualization_msgs.msg import Marker
 
-        self._publisher = node.create_publisher(Marker, '~/beam', STATE_QOS)
+        topic = beam_topic()
+        self._publisher = node.create_publisher(topic.type, f'~/{topic.name}', STATE_QOS)
         self._beam = Beam()
         self._due = math.inf
         self._mounted_on = self.device_id = geometry.mounted_on
@@ -162,8 +171,8 @@ class BeamPublisher:
         # The rotation that was published last, and the time of that, s.
         self._rotation: Quaternion | None = Quaternion()
         self._published_at = -math.inf
-        self._marker = marker = Marker(
-            ns=node.get_name(), type=Marker.TRIANGLE_LIST, frame_locked=True)
+        self._marker = marker = topic.type(
+            ns=node.get_name(), type=topic.type.TRIANGLE_LIST, frame_locked=True)
         # Without a stamp, and locked to its frame, the beam is drawn where the light is now.
         marker.header.frame_id = geometry.frame_id
         marker.scale.x = marker.scale.y = marker.scale.z = 1.0

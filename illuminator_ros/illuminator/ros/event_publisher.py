@@ -29,25 +29,29 @@ from .parameters import device_parameters
 from .. import events, model
 from ...payload.command_sources import DEFAULT, describe
 from ...ros.diagnostics import ERROR, WARN
-from ...ros.node import NodeInterface, Publication
+from ...ros.node import Endpoint, NodeInterface
 from ...ros.parameters import DeviceParameters
 from ...ros.qos import STREAM_QOS
 from ...ros.throttled_log import NodeLog
 
 # One value of each status, by topic. ``enabled`` is first, since callers wait for it.
-STATUS_TOPICS: dict[str, tuple[type[object], Callable[[model.Status], object]]] = {
-    'enabled': (Bool, operator.attrgetter('enabled')),
-    'brightness': (Float32, operator.attrgetter('brightness')),
-    'mode': (String, operator.attrgetter('mode.label')),
-    'strobe_period': (Float32, operator.attrgetter('strobe_period')),
-    'strobe_duty_cycle': (Float32, operator.attrgetter('strobe_duty_cycle')),
-    'error_flags': (UInt32, operator.attrgetter('error_flags')),
-    'uptime': (Float64, lambda status: status.uptime_ms / 1000.0),
+STATUS_TOPICS: dict[Endpoint, Callable[[model.Status], object]] = {
+    Endpoint('enabled', Bool, 'the light is on'): operator.attrgetter('enabled'),
+    Endpoint('brightness', Float32, '%'): operator.attrgetter('brightness'),
+    Endpoint('mode', String, '`unknown`, `internal_control`, `external_sync`'):
+        operator.attrgetter('mode.label'),
+    Endpoint('strobe_period', Float32, 's, 0 = no strobe'): operator.attrgetter('strobe_period'),
+    Endpoint('strobe_duty_cycle', Float32, '%'): operator.attrgetter('strobe_duty_cycle'),
+    Endpoint('error_flags', UInt32, 'ILLUMINATOR_ERROR_FLAGS as sent: 1 thermal throttling, '
+             '2 over-temperature shutdown, 4 thermistor failure'):
+        operator.attrgetter('error_flags'),
+    Endpoint('uptime', Float64, 's'): lambda status: status.uptime_ms / 1000.0,
 }
 PUBLICATIONS = (
-    *(Publication(name, type_) for name, (type_, _) in STATUS_TOPICS.items()),
-    Publication('temperature', Temperature, STREAM_QOS),
-    Publication('connected', Bool),
+    Endpoint('connected', Bool, 'the bridge hears the light; on change'),
+    *STATUS_TOPICS,
+    Endpoint('temperature', Temperature, 'degC; not published if the light does not measure it or '
+             'its sensor failed', STREAM_QOS),
 )
 # Events that may change a level.
 _DIAGNOSED = (events.LightConnected, events.LightLost, events.LightIdentified, events.LightHeld,
@@ -161,10 +165,10 @@ class EventPublisher:
 
     def _status_received(self, event: events.StatusReceived) -> None:
         status = event.status
-        for name, (_, read) in STATUS_TOPICS.items():
+        for topic, read in STATUS_TOPICS.items():
             # An implausible value is None.
             if (value := read(status)) is not None:
-                self._interface.publish(name, value)
+                self._interface.publish(topic.name, value)
         if event.temperature is not None:
             message = Temperature(temperature=event.temperature)
             message.header.stamp = self._clock.now().to_msg()

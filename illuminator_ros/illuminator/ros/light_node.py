@@ -21,7 +21,7 @@ import functools
 import itertools
 
 from rclpy.node import Node
-from std_msgs.msg import Bool, Float32, String
+from std_msgs.msg import Bool, Float32
 from std_srvs.srv import SetBool, Trigger
 
 from .beam import BeamFrame, BeamPublisher
@@ -36,7 +36,7 @@ from ...mavlink.messages import Address
 from ...payload.attempt import Result
 from ...payload.rotation import Quaternion
 from ...ros import node as ros_node
-from ...ros.command_sources import prefixes, release_services
+from ...ros.command_sources import prefixes, release_services, SOURCE
 from ...ros.diagnostics import DISCOVERY_GRACE
 from ...ros.diagnostics_publisher import DiagnosticsSource, MakeReports
 from ...ros.parameter_services import ParameterServices
@@ -45,6 +45,14 @@ from ...ros.payload import Host
 from ...ros.throttled_log import NodeLog
 from ...ros.transforms import TransformPublisher
 
+ENABLE = ros_node.Endpoint('enable', SetBool, 'switch the light on or off')
+REFRESH = ros_node.Endpoint('refresh', Trigger, 'request identity and status again')
+CMD_ENABLE = ros_node.Endpoint(
+    'cmd/enable', Bool, 'the same as the service, for joysticks and behaviour trees',
+    ros_node.SWITCH_QOS)
+CMD_BRIGHTNESS = ros_node.Endpoint(
+    'cmd/brightness', Float32,
+    'a stream of setpoints, %: the newest wins, with one command in flight, whatever the rate')
 # Refreshes that may wait for their answers: each is two messages of the light.
 MAX_REFRESHES = 16
 # How many of the heard lights a node without a light names.
@@ -84,13 +92,12 @@ class LightNode:
         parameters = DeviceParameters(node, device_parameters(limits))
         self._overrides = _checked(parameters.overrides(), limits)
         sources = client.settings.sources
-        source_topic = [ros_node.Publication('source', String)] if sources else []
         interface = ros_node.NodeInterface(
-            node, host.link, log, publications=(*PUBLICATIONS, *source_topic),
+            node, host.link, log, publications=(*PUBLICATIONS, *([SOURCE] if sources else [])),
             services=(
                 *(self._enable_service(*way) for way in prefixes(sources).items()),
                 *release_services(sources, self._release),
-                ros_node.RequestService('refresh', Trigger, self._refresh, limit=MAX_REFRESHES),
+                ros_node.RequestService(REFRESH, self._refresh, limit=MAX_REFRESHES),
                 *services),
             commands=(
                 *(topic for way in prefixes(sources).items()
@@ -189,7 +196,7 @@ class LightNode:
                     lambda result, now: answer(result.success, result.message),
                     detail=f'{prefix}service', source=source)
 
-        return ros_node.RequestService(f'{prefix}enable', SetBool, enable)
+        return ros_node.RequestService(ENABLE.of(prefix), enable)
 
     def _release(self, source: str, now: float, answer: ros_node.Answer) -> None:
         if light := self._light_or_refusal(now, answer):
@@ -200,11 +207,9 @@ class LightNode:
     ) -> tuple[ros_node.AnyCommand, ros_node.AnyCommand]:
         return (
             ros_node.CommandTopic(
-                f'{prefix}cmd/enable', Bool, functools.partial(self._switch, source, prefix),
-                qos=ros_node.SWITCH_QOS),
+                CMD_ENABLE.of(prefix), functools.partial(self._switch, source, prefix)),
             ros_node.CommandTopic(
-                f'{prefix}cmd/brightness', Float32,
-                functools.partial(self._set_brightness, source, prefix),
+                CMD_BRIGHTNESS.of(prefix), functools.partial(self._set_brightness, source, prefix),
                 lambda message: checked('brightness', message.data)))
 
     # Requests

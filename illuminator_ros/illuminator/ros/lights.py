@@ -32,11 +32,16 @@ from ...mavlink.command_sender import CommandSender
 from ...mavlink.messages import Address
 from ...payload.attempt import Done, Result
 from ...ros.device_nodes import DeviceNodes
-from ...ros.node import Answer, CommandTopic, RequestService, SWITCH_QOS
+from ...ros.node import Answer, CommandTopic, Endpoint, RequestService, SWITCH_QOS
 from ...ros.parameters import ChangeableParameters, Values
 from ...ros.payload import Host, RosPayload, ServedPayload, ShutdownReport
 from ...ros.transforms import TransformPublisher
 
+ENABLE_ALL = Endpoint(
+    'enable_all', SetBool, 'first node only: switch all connected lights; the answer names each '
+    'outcome, and is `true` if all succeeded')
+CMD_ENABLE_ALL = Endpoint(
+    'cmd/enable_all', Bool, 'the same as the service `~/enable_all`', SWITCH_QOS)
 # s from the first light to the warnings on unused names: lights that start together are heard by
 # then.
 NAMES_DELAY = 10.0
@@ -60,9 +65,8 @@ class Lights(ServedPayload):
         self._nodes = DeviceNodes[Address, LightNode](
             host, 'light', LightNode(
                 host.node, host, host.log, client, geometry, limits,
-                services=(RequestService('enable_all', SetBool, self._enable_all),),
-                commands=(CommandTopic(
-                    'cmd/enable_all', Bool, self._switch_all, qos=SWITCH_QOS),),
+                services=(RequestService(ENABLE_ALL, self._enable_all),),
+                commands=(CommandTopic(CMD_ENABLE_ALL, self._switch_all),),
                 changeable=ChangeableParameters(
                     host.node, parameters.LIGHT_PARAMETERS, host.values,
                     check=self._check_parameters, change=self._change_parameters),

@@ -53,7 +53,7 @@ from ...payload.rotation import Vector
 from ...ros.conversions import GEOID_SEPARATION, quaternion_message
 from ...ros.device_nodes import ABSENCE_DELAY
 from ...ros.diagnostics_publisher import DiagnosticsSource, MakeReports
-from ...ros.node import Answer, NodeInterface, Publication, RequestService
+from ...ros.node import Answer, Endpoint, NodeInterface, RequestService
 from ...ros.parameter_services import ParameterServices
 from ...ros.parameters import (
     ChangeableParameters,
@@ -73,6 +73,20 @@ EARTH_FRAME = 'map'
 # what it got before a restart of the node.
 DISCOVERY_TIME = 2.0
 
+PUBLICATIONS = (
+    Endpoint('connected', Bool, "the camera's heartbeat is heard"),
+    Endpoint('image/fix', NavSatFix, 'position of an image; its altitude is above the ellipsoid',
+             STREAM_QOS),
+    Endpoint('image/attitude', QuaternionStamped,
+             'orientation of the camera in that image, in `map` (ENU)', STREAM_QOS),
+    Endpoint('image/index', UInt32, 'its number, as the camera counts captures by MAVLink',
+             STREAM_QOS),
+)
+PING = Endpoint('ping', Trigger, 'round trip through the camera; the message has the time in ms')
+CAPTURES = {
+    Endpoint('capture', Trigger, 'take an image'): Shot.SURVEY,
+    Endpoint('capture_panel', Trigger, 'take an image of the calibration panel'): Shot.PANEL,
+}
 PARAMETERS = (
     ParameterSpec('position_source', 'raw', 'messages that carry the position: GPS_RAW_INT, or '
                   'GLOBAL_POSITION_INT with SYSTEM_TIME',
@@ -118,15 +132,10 @@ class CameraNode(ServedPayload):
         self._geoid_is_known = GEOID_SEPARATION.name in given_parameters(host.node)
         self._mount_topic = host.node.resolve_topic_name(f'~/{Input.MOUNT.value}')
         self._interface = NodeInterface(
-            host.node, host.link, host.log, publications=(
-                Publication('connected', Bool),
-                Publication('image/fix', NavSatFix, STREAM_QOS),
-                Publication('image/attitude', QuaternionStamped, STREAM_QOS),
-                Publication('image/index', UInt32, STREAM_QOS)),
+            host.node, host.link, host.log, publications=PUBLICATIONS,
             services=(
-                RequestService('ping', Trigger, self._ping),
-                RequestService('capture', Trigger, self._capture(Shot.SURVEY)),
-                RequestService('capture_panel', Trigger, self._capture(Shot.PANEL))),
+                RequestService(PING, self._ping),
+                *(RequestService(one, self._capture(shot)) for one, shot in CAPTURES.items())),
             commands=subscriptions(host.node, host.link, client.feeder))
         self._interface.publish('connected', False)
         # The first NavSatFix imports numpy, which takes too long for the link's thread.

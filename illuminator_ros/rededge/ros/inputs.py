@@ -35,12 +35,28 @@ from ..input_states import Input, Stamp, UNKNOWN
 from ...mavlink.link import Link
 from ...payload.rotation import Quaternion, Vector
 from ...ros.conversions import NO_VALUE, read_orientation, read_quaternion, read_vector
-from ...ros.node import AnyCommand, CommandTopic
+from ...ros.node import AnyCommand, CommandTopic, Endpoint
 
 # s; a greater change relative to a steady clock is a jump. Simulated time may run fast and in
 # steps, so its limit is higher.
 JUMP = 0.5
 SIMULATED_JUMP = 5.0
+
+
+TOPICS = {
+    name: Endpoint(name.value, type_, meaning) for name, type_, meaning in (
+        (Input.FIX, NavSatFix,
+         'required: position; its altitude is above the WGS84 ellipsoid'),
+        (Input.VELOCITY, TwistStamped,
+         'velocity of the vehicle, ENU; required with `position_source: fused` only'),
+        (Input.SATELLITES, UInt32, 'number of satellites'),
+        (Input.IMU, Imu, 'required, or `~/attitude`: orientation of `base_link` (FLU) in ENU, and '
+         'its rates'),
+        (Input.ATTITUDE, QuaternionStamped,
+         'the same orientation, used while no `~/imu` comes'),
+        (Input.MOUNT, QuaternionStamped, 'for a camera on a gimbal: its orientation in the frame '
+         'of `frame_id`'),
+        (Input.TIME_REFERENCE, TimeReference, 'UTC, where ROS time is not UTC'))}
 
 
 class StampReader:
@@ -99,28 +115,25 @@ def subscriptions(node: Node, link: Link, feeder: Feeder) -> Iterable[AnyCommand
     reader = StampReader(node, lambda: link.call(lambda now: feeder.clock_jumped()))
 
     def topic(
-        name: Input, type_: type[object], values: Callable[[Any], tuple[object, ...]],
-        take: Callable[..., None],
+        name: Input, values: Callable[[Any], tuple[object, ...]], take: Callable[..., None],
     ) -> AnyCommand:
         def read(message: Any) -> tuple[object, ...]:
             return *values(message), reader.read(message.header)
 
-        return CommandTopic(name.value, type_, lambda taken, now: take(*taken, now), read)
+        return CommandTopic(TOPICS[name], lambda taken, now: take(*taken, now), read)
 
     return (
-        topic(Input.FIX, NavSatFix, lambda one: (position(one),), feeder.take_fix),
-        topic(Input.VELOCITY, TwistStamped, lambda one: (read_vector(one.twist.linear),),
-              feeder.take_velocity),
-        CommandTopic(Input.SATELLITES.value, UInt32, feeder.take_satellites),
-        topic(Input.IMU, Imu, orientation_and_rates,
+        topic(Input.FIX, lambda one: (position(one),), feeder.take_fix),
+        topic(Input.VELOCITY, lambda one: (read_vector(one.twist.linear),), feeder.take_velocity),
+        CommandTopic(TOPICS[Input.SATELLITES], feeder.take_satellites),
+        topic(Input.IMU, orientation_and_rates,
               functools.partial(feeder.orientation.take_attitude, Input.IMU)),
-        topic(Input.ATTITUDE, QuaternionStamped,
-              lambda one: (read_quaternion(one.quaternion), UNKNOWN),
+        topic(Input.ATTITUDE, lambda one: (read_quaternion(one.quaternion), UNKNOWN),
               functools.partial(feeder.orientation.take_attitude, Input.ATTITUDE)),
-        topic(Input.MOUNT, QuaternionStamped,
+        topic(Input.MOUNT,
               lambda one: (read_quaternion(one.quaternion), one.header.frame_id),
               feeder.orientation.take_mount),
-        topic(Input.TIME_REFERENCE, TimeReference,
+        topic(Input.TIME_REFERENCE,
               lambda one: (one.time_ref.sec * 1_000_000_000 + one.time_ref.nanosec,),
               feeder.take_time_reference),
     )
