@@ -306,6 +306,18 @@ def test_reason_why_no_camera_is_heard_is_in_the_log(own_ros: Ros) -> None:
         pass_time_until(lambda: node.count('no camera connected: none heard yet on'), step=2.0)
 
 
+def test_requests_say_why_the_link_is_not_open(own_ros: Ros, port: int) -> None:
+    with ended(python(MODULE, f'tcp://127.0.0.1:{port}',
+                      env={'ROS_DOMAIN_ID': str(own_ros.domain)})) as node:
+        node.wait_for('not open')
+        closed = (f'tcp://127.0.0.1:{port} is not open: cannot connect to 127.0.0.1:{port}: '
+                  'Connection refused')
+        for service, reason in (('ping', closed), ('capture', f'no camera connected: {closed}'),
+                                ('capture_panel', f'no camera connected: {closed}')):
+            answer = own_ros.call(Trigger, f'/rededge/{service}', Trigger.Request())
+            assert (answer.success, answer.message) == (False, reason)
+
+
 def test_help_names_the_device_and_its_own_defaults() -> None:
     shown = ' '.join(run(MODULE, '--help').stdout.split())
     assert 'usage: rededge ' in shown

@@ -160,8 +160,17 @@ class CameraNode(ServedPayload):
 
     # Requests
 
+    def _absence(self, now: float) -> str:
+        """Return why no camera was ever heard, for people; '' if one was."""
+        if self._client.snapshot(now).address is not None:
+            return ''
+        return f'no camera connected: {why_no_camera(self._host.diagnostics.snapshot(now))}'
+
     def _ping(self, request: Trigger.Request, now: float, answer: Answer) -> None:
-        self._client.ping(now, answer)
+        if failure := self._host.diagnostics.snapshot(now).failure:
+            answer(False, failure)
+        else:
+            self._client.ping(now, answer)
 
     def _capture(self, shot: Shot) -> Callable[[Trigger.Request, float, Answer], None]:
         def capture(request: Trigger.Request, now: float, answer: Answer) -> None:
@@ -171,7 +180,10 @@ class CameraNode(ServedPayload):
                     message += f', without {", ".join(map(topics, lacking))}'
                 answer(success, message)
 
-            self._client.capture(shot, now, done)
+            if absence := self._absence(now):
+                answer(False, absence)
+            else:
+                self._client.capture(shot, now, done)
 
         return capture
 
@@ -201,9 +213,8 @@ class CameraNode(ServedPayload):
         """See :meth:`ServedPayload.poll`."""
         if now >= self._absence_due:
             self._absence_due = math.inf
-            if self._client.snapshot(now).address is None:
-                link = self._host.diagnostics.snapshot(now)
-                self._host.log.warning(f'no camera connected: {why_no_camera(link)}')
+            if absence := self._absence(now):
+                self._host.log.warning(absence)
         self._log_inputs(now)
         orientation = self._client.feeder.orientation
         if orientation.mount_is_fixed and self._host.node.count_publishers(self._mount_topic):
