@@ -61,8 +61,7 @@ def requirements(of: Sequence[Requirement[Any]], consent: str) -> Rows:
 
 def faults(of: FaultTable) -> list[list[str]]:
     """Return the rows of faults, with what they do without a value."""
-    return [[f'`{name}={fault.metavar}`' if fault.metavar else f'`{name}`',
-             fault.description, fault.default_text] for name, fault in of.items()]
+    return [[f'`{fault.usage}`', fault.description, fault.default_text] for fault in of.values()]
 
 
 def settings(of: SimulatedType[Any]) -> list[list[str]]:

@@ -37,8 +37,7 @@ from .. import __version__
 from ..mavlink.dialect import flag_names, mavlink, short_names
 from ..mavlink.messages import Address, Message, time_boot_ms
 from ..payload import simulated
-from ..payload.faults import Behaviour, Fault, FaultTable
-from ..payload.faults import FAULTS as COMPONENT_FAULTS
+from ..payload.faults import Behaviour, Fault, FaultTable, FaultValue, faulty, FLAGS
 from ..payload.messages import GimbalDeviceAttitudeStatus
 from ..payload.mount_attitude import AXES, yaw_frame, YawFrame
 from ..payload.rotation import Quaternion
@@ -77,53 +76,39 @@ class GimbalBehaviour(Behaviour):
     """
 
     heartbeat_type: int = mavlink.MAV_TYPE_GIMBAL
-    enforces_control: bool = True
-    reports: bool = True
-    frozen_flags: bool = False
-    frozen_axis: str = ''
-    jump: float = 0.0
-    names_frame: bool = True
-    false_flags: int = 0
-    identifies: bool = True
-    static_information: bool = True
-    limits_range: bool = True
-    limits_in_degrees: bool = False
-    stops: bool = True
-    accepts_earth_always: bool = False
-    takes_manager_set: bool = False
     reports_earth: bool = True
     reports_failures: bool = True
+    enforces_control: bool = faulty(True, Fault(
+        'obeys-others', 'obeys components that do not control it', False))
+    reports: bool = faulty(True, Fault('no-status', 'sends no status', False))
+    frozen_flags: bool = faulty(False, Fault('stale-flags', 'reports the flags of its start'))
+    frozen_axis: str = faulty('', Fault(
+        'frozen-axis', 'an axis does not move', 'pitch', FaultValue('AXIS', one_of(AXES), str)))
+    jump: float = faulty(0.0, Fault(
+        'jumps', 'every tenth reported attitude is wrong by DEG', 20.0,
+        FaultValue('DEG', number(1, 180))))
+    names_frame: bool = faulty(True, Fault(
+        'no-frame', 'does not name the yaw frame of its attitude', False))
+    false_flags: int = faulty(0, Fault(
+        'flags', 'reports failure flags without a reason',
+        mavlink.GIMBAL_DEVICE_ERROR_FLAGS_MOTOR_ERROR, FLAGS))
+    identifies: bool = faulty(True, Fault('no-identity', 'sends no INFORMATION message', False))
+    static_information: bool = faulty(True, Fault(
+        'changing-identity', 'changes the limits that it reports', False))
+    limits_range: bool = faulty(True, Fault(
+        'no-limits', 'turns beyond the range that it reports', False))
+    limits_in_degrees: bool = faulty(False, Fault('degrees', 'reports its ranges in degrees'))
+    stops: bool = faulty(True, Fault(
+        'runaway', 'goes on turning when the rate is set to 0', False))
+    accepts_earth_always: bool = faulty(False, Fault(
+        'false-north',
+        'claims to accept yaw relative to north without a heading from the vehicle'))
+    takes_manager_set: bool = faulty(False, Fault(
+        'manager-set', 'obeys the messages to gimbal managers'))
 
 
-# The faults of devices and of managers.
-GIMBAL_FAULTS = FaultTable({
-    **COMPONENT_FAULTS,
-    'obeys-others': Fault('enforces_control', 'obeys components that do not control it',
-                          default=False),
-    'no-status': Fault('reports', 'sends no status', default=False),
-    'stale-flags': Fault('frozen_flags', 'reports the flags of its start'),
-    'frozen-axis': Fault('frozen_axis', 'an axis does not move', 'AXIS', one_of(AXES), 'pitch'),
-    'jumps': Fault('jump', 'every tenth reported attitude is wrong by DEG', 'DEG',
-                   number(1, 180), 20.0),
-    'no-frame': Fault('names_frame', 'does not name the yaw frame of its attitude',
-                      default=False),
-    'flags': Fault('false_flags', 'reports failure flags without a reason', 'FLAGS',
-                   integer(1, 0xFFFFFFFF), mavlink.GIMBAL_DEVICE_ERROR_FLAGS_MOTOR_ERROR),
-    'no-identity': Fault('identifies', 'sends no INFORMATION message', default=False),
-    'changing-identity': Fault('static_information', 'changes the limits that it reports',
-                               default=False),
-    'no-limits': Fault('limits_range', 'turns beyond the range that it reports', default=False),
-    'degrees': Fault('limits_in_degrees', 'reports its ranges in degrees'),
-    'runaway': Fault('stops', 'goes on turning when the rate is set to 0', default=False),
-})
 # No command changes a device, so the faults in the results of such commands are left out.
-FAULTS = FaultTable({
-    **{name: fault for name, fault in GIMBAL_FAULTS.items()
-       if name not in ('refuse', 'progress', 'busy', 'disobey')},
-    'false-north': Fault('accepts_earth_always', 'claims to accept yaw relative to north without '
-                         'a heading from the vehicle'),
-    'manager-set': Fault('takes_manager_set', 'obeys the messages to gimbal managers'),
-})
+FAULTS = FaultTable.of(GimbalBehaviour, 'refuse', 'progress', 'busy', 'disobey')
 
 
 @dataclass(frozen=True)

@@ -35,7 +35,6 @@ from .manager_setpoint import AnySetpoint, Demand, direction, read_demand, read_
 from .messages import DEVICE_ID_PARAM, NO_COMPONENT
 from .simulated_device import (
     COMMANDS,
-    GIMBAL_FAULTS,
     GimbalBehaviour,
     GimbalProperties,
     MECHANICS,
@@ -45,7 +44,7 @@ from .simulated_device import (
 from ..mavlink.dialect import mavlink, replaced
 from ..mavlink.messages import Address, AnyCommand, Message, params_of
 from ..payload import simulated
-from ..payload.faults import Behaviour, Fault, FaultTable
+from ..payload.faults import Behaviour, Fault, FaultTable, faulty
 from ..payload.messages import (
     Attitude,
     GeoPoint,
@@ -88,7 +87,8 @@ class ManagerBehaviour(GimbalBehaviour):
     """
 
     enforces_roi: bool = True
-    frozen_control: bool = False
+    frozen_control: bool = faulty(False, Fault(
+        'stale-control', 'reports the control of its start'))
     has_secondary: bool = True
     own_is_manager: bool = False
     releases_pairs: bool = True
@@ -103,11 +103,9 @@ class ManagerBehaviour(GimbalBehaviour):
     shows_flags: bool = True
 
 
-# Any type of component may be a manager, so the faults of the heartbeat's content are left out.
-FAULTS = FaultTable({
-    **{name: fault for name, fault in GIMBAL_FAULTS.items() if name not in ('type', 'autopilot')},
-    'stale-control': Fault('frozen_control', 'reports the control of its start'),
-})
+# Any type of component may be a manager, so the faults of the heartbeat's content are left out,
+# and those of a device that has a manager.
+FAULTS = FaultTable.of(ManagerBehaviour, 'type', 'autopilot', 'false-north', 'manager-set')
 
 
 class Profile(NamedTuple):

@@ -25,10 +25,8 @@ from .thermal import ThermalProperties
 from .. import __version__
 from ..mavlink import messages
 from ..mavlink.dialect import mavlink
-from ..payload.faults import Behaviour, Fault, FaultTable
-from ..payload.faults import FAULTS as COMPONENT_FAULTS
+from ..payload.faults import Behaviour, Fault, FaultTable, faulty, FLAGS
 from ..payload.identity import Identity
-from ..payload.simulated_settings import integer
 
 
 class Extension(NamedTuple):
@@ -61,38 +59,31 @@ class IlluminatorBehaviour(Behaviour):
     """
 
     heartbeat_type: int = mavlink.MAV_TYPE_ILLUMINATOR
-    has_clock: bool = True
     measures: bool = True
     extension: Extension | None = None
-    identifies: bool = True
     terminates: bool = True
-    padding: str = ''
     brightness_is_switch: bool = False
-    accepts_nan: bool = False
-    accepts_out_of_range: bool = False
-    toggles: bool = False
-    false_flags: int = 0
-    inverted_flags: bool = False
-    thermistor_failed: bool = False
+    thermistor_failed: bool = faulty(False, Fault(
+        'thermistor', 'its temperature sensor fails: THERMISTOR_FAILURE, and temp_c stays at 0'))
+    has_clock: bool = faulty(True, Fault('no-clock', 'reports an uptime of 0', False))
+    identifies: bool = faulty(True, Fault(
+        'no-identity', 'sends no COMPONENT_INFORMATION_BASIC', False))
+    padding: str = faulty('', Fault(
+        'no-terminator', 'fills its strings with blanks, to the last byte', ' '))
+    accepts_nan: bool = faulty(False, Fault('nan', 'accepts NaN'))
+    accepts_out_of_range: bool = faulty(False, Fault(
+        'anything', 'accepts values out of range'))
+    toggles: bool = faulty(False, Fault(
+        'toggle', 'is switched off by switching it on again'))
+    false_flags: int = faulty(0, Fault(
+        'flags', 'reports error flags without a reason',
+        mavlink.ILLUMINATOR_ERROR_FLAGS_OVER_TEMPERATURE_SHUTDOWN, FLAGS))
+    inverted_flags: bool = faulty(False, Fault(
+        'cold-throttling',
+        'reports THERMAL_THROTTLING while it is on and cool, not while it is hot'))
 
 
-FAULTS = FaultTable({
-    **COMPONENT_FAULTS,
-    'thermistor': Fault('thermistor_failed', 'its temperature sensor fails: THERMISTOR_FAILURE, '
-                        'and temp_c stays at 0'),
-    'no-clock': Fault('has_clock', 'reports an uptime of 0', default=False),
-    'no-identity': Fault('identifies', 'sends no COMPONENT_INFORMATION_BASIC', default=False),
-    'no-terminator': Fault('padding', 'fills its strings with blanks, to the last byte',
-                           default=' '),
-    'nan': Fault('accepts_nan', 'accepts NaN'),
-    'anything': Fault('accepts_out_of_range', 'accepts values out of range'),
-    'toggle': Fault('toggles', 'is switched off by switching it on again'),
-    'flags': Fault('false_flags', 'reports error flags without a reason',
-                   'FLAGS', integer(1, 0xFFFFFFFF),
-                   mavlink.ILLUMINATOR_ERROR_FLAGS_OVER_TEMPERATURE_SHUTDOWN),
-    'cold-throttling': Fault('inverted_flags', 'reports THERMAL_THROTTLING while it is on and '
-                             'cool, not while it is hot'),
-})
+FAULTS = FaultTable.of(IlluminatorBehaviour)
 
 
 @dataclass(frozen=True)

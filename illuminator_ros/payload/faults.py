@@ -15,104 +15,24 @@
 """
 The faults of a simulated component, and the behaviour that each changes.
 
-Each payload has one table: ``--fault``, the YAML file and the console take its names, ``--help``
-and doc/simulator.md show its descriptions.
+A field of the behaviour declares its faults. ``--fault``, the YAML file and the console take their
+names, ``--help`` and doc/simulator.md show their descriptions.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
 import copy
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, fields, replace
 import math
 import random
-from typing import TypeVar
+from typing import Any, NamedTuple, TypeVar
 
 from .simulated_settings import integer, number, Values
 from ..mavlink import messages
 from ..mavlink.dialect import mavlink, short_names
 
-
-@dataclass(frozen=True)
-class Behaviour:
-    """
-    The behaviour of a simulated component; the defaults follow the protocol.
-
-    :param heartbeat_type: MAV_TYPE.
-    :param heartbeat_autopilot: MAV_AUTOPILOT.
-    :param heartbeat_base_mode: base_mode.
-    :param heartbeat_custom_mode: custom_mode.
-    :param heartbeat_state: MAV_STATE.
-    :param heartbeat_interval: s, 0 for no heartbeat.
-    :param fixed_rate: whether MAV_CMD_SET_MESSAGE_INTERVAL only starts and stops a stream.
-    :param endless_stream: whether a stream cannot be stopped.
-    :param resumes: whether a stream can be started again.
-    :param on_request: whether a streamed message can be requested.
-    :param status_on_change: whether each change is followed by the streamed messages.
-    :param filters_target: whether messages to other addresses are ignored.
-    :param adopts_system_id: whether it takes over the system id of every message that it
-        receives, and ignores target_system.
-    :param answers_commands: whether it answers COMMAND_LONG and COMMAND_INT.
-    :param answers_command_int: whether it answers COMMAND_INT.
-    :param answers_broadcast: whether it answers messages to all components.
-    :param acks_target: whether COMMAND_ACK has a target.
-    :param acks_wrong_target: whether the target of COMMAND_ACK is another component.
-    :param apply_after: s from the acknowledgement to the change.
-    :param applies_rejected: whether rejected commands are applied.
-    :param accepts_unknown: whether unknown commands, and requests for unknown messages, are
-        accepted.
-    :param ignores_changes: whether accepted changes are not applied.
-    :param silence: s for which it neither receives nor sends.
-    :param reboot_interval: s, 0 for never.
-    :param refuse: result of each change, None to execute it.
-    :param rejections: how many changes get MAV_RESULT_TEMPORARILY_REJECTED.
-    :param progress: s of MAV_RESULT_IN_PROGRESS before a change is applied.
-    :param slow: s from a command to its acknowledgement.
-    :param drop: share (0..1) of messages that are not sent.
-    :param duplicate: share (0..1) of messages that are sent twice.
-    :param delay: maximum delay of a message, s.
-    :param corrupt: share (0..1) of messages with a wrong checksum.
-    """
-
-    heartbeat_type: int = 0
-    heartbeat_autopilot: int = mavlink.MAV_AUTOPILOT_INVALID
-    heartbeat_base_mode: int = 0
-    heartbeat_custom_mode: int = 0
-    heartbeat_state: int = mavlink.MAV_STATE_ACTIVE
-    heartbeat_interval: float = 1.0
-    fixed_rate: bool = False
-    endless_stream: bool = False
-    resumes: bool = True
-    on_request: bool = True
-    status_on_change: bool = True
-    filters_target: bool = True
-    adopts_system_id: bool = False
-    answers_commands: bool = True
-    answers_command_int: bool = True
-    answers_broadcast: bool = True
-    acks_target: bool = True
-    acks_wrong_target: bool = False
-    apply_after: float = 0.0
-    applies_rejected: bool = False
-    accepts_unknown: bool = False
-    ignores_changes: bool = False
-    silence: float = 0.0
-    reboot_interval: float = 0.0
-    refuse: int | None = None
-    rejections: int = 0
-    progress: float = 0.0
-    slow: float = 0.0
-    drop: float = 0.0
-    duplicate: float = 0.0
-    delay: float = 0.0
-    corrupt: float = 0.0
-
-
-B = TypeVar('B', bound=Behaviour)
-
-
-class FaultError(ValueError):
-    """A fault that does not exist, or a value that it cannot have; the message says which."""
+T = TypeVar('T')
 
 
 def _result(text: str) -> int:
@@ -123,42 +43,189 @@ def _result(text: str) -> int:
     return by_name[name]
 
 
+class FaultValue(NamedTuple):
+    """
+    The values that a fault can have.
+
+    :param metavar: their unit or type.
+    :param read: makes a value from text; raises ValueError, whose message gives the reason.
+    :param text: makes the text from a value.
+    """
+
+    metavar: str
+    read: Callable[[str], object]
+    text: Callable[[Any], str] = '{:.10g}'.format
+
+
+SECONDS = FaultValue('S', number(0.001, 3600))
+SHARE = FaultValue('SHARE', number(0.001, 1))
+UINT8 = FaultValue('N', integer(0, 255))
+FLAGS = FaultValue('FLAGS', integer(1, 0xFFFFFFFF))
+COUNT = FaultValue('N', integer(1, 1_000_000))
+RESULT = FaultValue('RESULT', _result, lambda result: short_names('MAV_RESULT')[result].lower())
+
+
 @dataclass(frozen=True)
 class Fault:
     """
     One fault.
 
-    :param field: the field of the behaviour that it sets.
+    :param name: as it is typed.
     :param description: its effect, for people.
-    :param metavar: its unit or type, '' if it has no value.
-    :param read: makes a value from text; None if it has no value.
     :param default: the value if none is given; for a fault without values, the value it sets.
+    :param value: the values that it can have, None for none.
+    :param field: the field of the behaviour that it sets.
     """
 
-    field: str
+    name: str
     description: str
-    metavar: str = ''
-    read: Callable[[str], object] | None = None
     default: object = True
+    value: FaultValue | None = None
+    field: str = ''
+
+    @property
+    def usage(self) -> str:
+        """Return how it is typed."""
+        return f'{self.name}={self.value.metavar}' if self.value else self.name
 
     @property
     def default_text(self) -> str:
         """Return the default value for people, '' if the fault has no value."""
-        return (self.text(self.default) or 'for ever') if self.read else ''
+        return (self.text(self.default) or 'for ever') if self.value else ''
 
     def text(self, value: object) -> str:
         """Return a value as it is typed, '' if there is none to type."""
-        if self.read is None or value == math.inf:
-            return ''
-        if isinstance(value, str):
-            return value
-        if self.read is _result and isinstance(value, int):
-            return short_names('MAV_RESULT')[value].lower()
-        return f'{value:.10g}'
+        return '' if self.value is None or value == math.inf else self.value.text(value)
+
+
+def faulty(normal: T, *faults: Fault) -> T:
+    """
+    Return a field of a behaviour, and the faults that set it.
+
+    :param normal: its value without a fault.
+    """
+    return field(default=normal, metadata={'faults': faults})
+
+
+@dataclass(frozen=True)
+class Behaviour:
+    """
+    The behaviour of a simulated component; the defaults follow the protocol.
+
+    :param heartbeat_base_mode: base_mode.
+    :param heartbeat_custom_mode: custom_mode.
+    :param heartbeat_state: MAV_STATE.
+    :param status_on_change: whether each change is followed by the streamed messages.
+    :param adopts_system_id: whether it takes over the system id of every message that it
+        receives, and ignores target_system.
+    :param answers_commands: whether it answers COMMAND_LONG and COMMAND_INT.
+    :param acks_target: whether COMMAND_ACK has a target.
+    :param apply_after: s from the acknowledgement to the change.
+    :param silence: s for which it neither receives nor sends.
+    :param reboot_interval: s, 0 for never.
+    :param refuse: result of each change, None to execute it.
+    :param progress: s of MAV_RESULT_IN_PROGRESS before a change is applied.
+    :param rejections: how many changes get MAV_RESULT_TEMPORARILY_REJECTED.
+    :param slow: s from a command to its acknowledgement.
+    :param drop: share (0..1) of messages that are not sent.
+    :param duplicate: share (0..1) of messages that are sent twice.
+    :param delay: maximum delay of a message, s.
+    :param corrupt: share (0..1) of messages with a wrong checksum.
+    :param ignores_changes: whether accepted changes are not applied.
+    :param heartbeat_interval: s, 0 for no heartbeat.
+    :param heartbeat_type: MAV_TYPE.
+    :param heartbeat_autopilot: MAV_AUTOPILOT.
+    :param answers_command_int: whether it answers COMMAND_INT.
+    :param answers_broadcast: whether it answers messages to all components.
+    :param filters_target: whether messages to other addresses are ignored.
+    :param endless_stream: whether a stream cannot be stopped.
+    :param fixed_rate: whether MAV_CMD_SET_MESSAGE_INTERVAL only starts and stops a stream.
+    :param applies_rejected: whether rejected commands are applied.
+    :param accepts_unknown: whether unknown commands, and requests for unknown messages, are
+        accepted.
+    :param on_request: whether a streamed message can be requested.
+    :param resumes: whether a stream can be started again.
+    :param acks_wrong_target: whether the target of COMMAND_ACK is another component.
+    """
+
+    heartbeat_base_mode: int = 0
+    heartbeat_custom_mode: int = 0
+    heartbeat_state: int = mavlink.MAV_STATE_ACTIVE
+    status_on_change: bool = True
+    adopts_system_id: bool = False
+    answers_commands: bool = True
+    acks_target: bool = True
+    apply_after: float = 0.0
+    silence: float = faulty(0.0, Fault(
+        'silence', 'neither receives nor sends for S seconds', math.inf, SECONDS))
+    reboot_interval: float = faulty(0.0, Fault(
+        'reboot', 'restarts every S seconds; on the console, without S, once', 10.0, SECONDS))
+    refuse: int | None = faulty(None, Fault(
+        'refuse', 'answers changes with RESULT, such as failed', mavlink.MAV_RESULT_DENIED,
+        RESULT))
+    progress: float = faulty(0.0, Fault(
+        'progress', 'reports IN_PROGRESS for S seconds before each change', 2.5, SECONDS))
+    rejections: int = faulty(0, Fault('busy', 'rejects N changes temporarily', 3, COUNT))
+    slow: float = faulty(0.0, Fault('slow', 'answers S seconds late', 1.5, SECONDS))
+    drop: float = faulty(0.0, Fault('drop', 'loses a share of its messages', 0.3, SHARE))
+    duplicate: float = faulty(0.0, Fault(
+        'duplicate', 'sends a share of its messages twice', 0.3, SHARE))
+    delay: float = faulty(0.0, Fault(
+        'delay', 'delays and reorders its messages by up to S seconds', 2.0, SECONDS))
+    corrupt: float = faulty(0.0, Fault(
+        'corrupt', 'sends a share of its messages with a wrong checksum', 0.3, SHARE))
+    ignores_changes: bool = faulty(False, Fault(
+        'lie', 'accepts changes and does not apply them'))
+    heartbeat_interval: float = faulty(1.0, Fault(
+        'heartbeat', 'sends a heartbeat every S seconds', 4.0, SECONDS))
+    heartbeat_type: int = faulty(0, Fault(
+        'type', 'sends a heartbeat of MAV_TYPE N', mavlink.MAV_TYPE_ONBOARD_CONTROLLER, UINT8))
+    heartbeat_autopilot: int = faulty(mavlink.MAV_AUTOPILOT_INVALID, Fault(
+        'autopilot', 'sends a heartbeat with MAV_AUTOPILOT N', 3, UINT8))
+    answers_command_int: bool = faulty(True, Fault(
+        'no-int', 'does not answer COMMAND_INT', False))
+    answers_broadcast: bool = faulty(True, Fault(
+        'no-broadcast', 'does not answer messages to all components', False))
+    filters_target: bool = faulty(True, Fault(
+        'any-target', 'obeys commands to other addresses', False))
+    endless_stream: bool = faulty(False, Fault('no-stop', 'does not stop its status stream'))
+    fixed_rate: bool = faulty(False, Fault(
+        'fixed-rate', 'ignores the interval that it is given'))
+    applies_rejected: bool = faulty(False, Fault(
+        'disobey', 'applies the commands that it rejects'))
+    accepts_unknown: bool = faulty(False, Fault(
+        'unknown', 'accepts unknown commands, and requests for unknown messages'))
+    on_request: bool = faulty(True, Fault(
+        'no-request', 'does not send its status on request', False))
+    resumes: bool = faulty(True, Fault(
+        'no-resume', 'does not start its status stream again', False))
+    acks_wrong_target: bool = faulty(False, Fault(
+        'misaddress', 'sends acknowledgements to another component'))
+
+
+B = TypeVar('B', bound=Behaviour)
+
+
+class FaultError(ValueError):
+    """A fault that does not exist, or a value that it cannot have; the message says which."""
 
 
 class FaultTable(dict[str, Fault]):
     """The faults of one payload, by name."""
+
+    @classmethod
+    def of(cls, behaviour: type[Behaviour], *lacks: str) -> FaultTable:
+        """
+        Return the faults that the fields of a behaviour declare.
+
+        A field that a class declares again, with another default, keeps its faults.
+
+        :param lacks: the names of faults that the payload does not have.
+        """
+        classes = [one for one in reversed(behaviour.__mro__) if issubclass(one, Behaviour)]
+        return cls({fault.name: replace(fault, field=one.name) for base in classes
+                    for one in fields(base) for fault in one.metadata.get('faults', ())
+                    if fault.name not in lacks})
 
     def find(self, name: str) -> Fault:
         """Return a fault; FaultError if there is none of this name."""
@@ -175,15 +242,14 @@ class FaultTable(dict[str, Fault]):
         """
         name, equals, typed = text.strip().partition('=')
         fault = self.find(name)
-        value = fault.default
-        if equals:
-            if fault.read is None:
-                raise FaultError(f'fault {text!r}: {name} takes no value')
-            try:
-                value = fault.read(typed.strip())
-            except ValueError as error:
-                raise FaultError(f'fault {text!r}: {error}') from error
-        return {fault.field: value}
+        if not equals:
+            return {fault.field: fault.default}
+        if fault.value is None:
+            raise FaultError(f'fault {text!r}: {name} takes no value')
+        try:
+            return {fault.field: fault.value.read(typed.strip())}
+        except ValueError as error:
+            raise FaultError(f'fault {text!r}: {error}') from error
 
     def add(self, behaviour: B, text: str) -> B:
         """Return a behaviour with one more fault, see :meth:`parse`."""
@@ -203,7 +269,7 @@ class FaultTable(dict[str, Fault]):
         # Two faults without values may set one field.
         return [name for name, fault in self.items()
                 if (value := getattr(behaviour, fault.field)) != getattr(normal, fault.field)
-                and (fault.read or value == fault.default)]
+                and (fault.value or value == fault.default)]
 
     def as_typed(self, behaviour: B, normal: B) -> list[str]:
         """Return the faults of a behaviour as :meth:`add` takes them, with values."""
@@ -215,52 +281,13 @@ class FaultTable(dict[str, Fault]):
         """Return the table for people, a line for each fault."""
         lines = []
         for name, fault in self.items():
-            shown = f'{name}[={fault.metavar}]' if fault.metavar else name
-            default = f' (default: {fault.default_text})' if fault.metavar else ''
+            shown = f'{name}[={fault.value.metavar}]' if fault.value else name
+            default = f' (default: {fault.default_text})' if fault.value else ''
             lines.append(f'  {shown:20} {fault.description}{default}')
         return '\n'.join(lines)
 
 
-_seconds, _share, _uint8 = number(0.001, 3600), number(0.001, 1), integer(0, 255)
-
-FAULTS = FaultTable({
-    'silence': Fault('silence', 'neither receives nor sends for S seconds', 'S', _seconds,
-                     math.inf),
-    'reboot': Fault('reboot_interval', 'restarts every S seconds; on the console, '
-                    'without S, once', 'S', _seconds, 10.0),
-    'refuse': Fault('refuse', 'answers changes with RESULT, such as failed',
-                    'RESULT', _result, mavlink.MAV_RESULT_DENIED),
-    'progress': Fault('progress', 'reports IN_PROGRESS for S seconds before each change',
-                      'S', _seconds, 2.5),
-    'busy': Fault('rejections', 'rejects N changes temporarily', 'N', integer(1, 1_000_000), 3),
-    'slow': Fault('slow', 'answers S seconds late', 'S', _seconds, 1.5),
-    'drop': Fault('drop', 'loses a share of its messages', 'SHARE', _share, 0.3),
-    'duplicate': Fault('duplicate', 'sends a share of its messages twice',
-                       'SHARE', _share, 0.3),
-    'delay': Fault('delay', 'delays and reorders its messages by up to S seconds',
-                   'S', _seconds, 2.0),
-    'corrupt': Fault('corrupt', 'sends a share of its messages with a wrong checksum',
-                     'SHARE', _share, 0.3),
-    'lie': Fault('ignores_changes', 'accepts changes and does not apply them'),
-    'heartbeat': Fault('heartbeat_interval', 'sends a heartbeat every S seconds',
-                       'S', _seconds, 4.0),
-    'type': Fault('heartbeat_type', 'sends a heartbeat of MAV_TYPE N',
-                  'N', _uint8, mavlink.MAV_TYPE_ONBOARD_CONTROLLER),
-    'autopilot': Fault('heartbeat_autopilot', 'sends a heartbeat with MAV_AUTOPILOT N',
-                       'N', _uint8, 3),
-    'no-int': Fault('answers_command_int', 'does not answer COMMAND_INT', default=False),
-    'no-broadcast': Fault('answers_broadcast', 'does not answer messages to all components',
-                          default=False),
-    'any-target': Fault('filters_target', 'obeys commands to other addresses', default=False),
-    'no-stop': Fault('endless_stream', 'does not stop its status stream'),
-    'fixed-rate': Fault('fixed_rate', 'ignores the interval that it is given'),
-    'disobey': Fault('applies_rejected', 'applies the commands that it rejects'),
-    'unknown': Fault('accepts_unknown', 'accepts unknown commands, and requests for unknown '
-                     'messages'),
-    'no-request': Fault('on_request', 'does not send its status on request', default=False),
-    'no-resume': Fault('resumes', 'does not start its status stream again', default=False),
-    'misaddress': Fault('acks_wrong_target', 'sends acknowledgements to another component'),
-})
+FAULTS = FaultTable.of(Behaviour)
 
 
 class FaultInjector:

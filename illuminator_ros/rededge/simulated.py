@@ -32,8 +32,7 @@ from . import messages as rededge
 from ..mavlink.dialect import mavlink, raw, replaced
 from ..mavlink.messages import Address, Heartbeat, Message, target_of
 from ..payload import simulated
-from ..payload.faults import Behaviour, Fault, FaultTable
-from ..payload.faults import FAULTS as COMPONENT_FAULTS
+from ..payload.faults import Behaviour, Fault, FaultTable, faulty, SECONDS
 from ..payload.messages import Attitude, GeoPoint, GlobalPositionInt, is_finite, SystemTime
 from ..payload.rotation import Quaternion
 from ..payload.simulated_settings import geo_point, number, Setting, Values
@@ -88,47 +87,38 @@ class RedEdgeBehaviour(Behaviour):
     heartbeat_autopilot: int = 1
     heartbeat_base_mode: int = 2
     heartbeat_custom_mode: int = 3
-    adopts_system_id: bool = True
     answers_commands: bool = False
     firmware: rededge.Firmware = rededge.PARAMETERS
-    validity: float = 5.0
-    injectable: bool = True
-    feedback: bool = True
-    feedback_delay: float = FEEDBACK_DELAY
-    triggers: bool = True
-    counts: bool = True
-    shots: tuple[int, ...] = tuple(rededge.Shot)
-    ping_component: int = 0
-    ping_sequence: int = 0
-    ping_target: bool = True
-    extension: bool = False
+    adopts_system_id: bool = faulty(True, Fault(
+        'fixed-system', 'keeps its system ID, and takes messages for that only', False))
+    ping_component: int = faulty(0, Fault(
+        'other-ping', 'lets another component answer PING', 1))
+    ping_sequence: int = faulty(0, Fault(
+        'ping-sequence', 'answers PING with another sequence number', 1))
+    ping_target: bool = faulty(True, Fault(
+        'ping-target', 'answers PING without a target', False))
+    triggers: bool = faulty(True, Fault('no-status', 'sends no CAMERA_STATUS', False))
+    feedback: bool = faulty(True, Fault('no-feedback', 'sends no CAMERA_FEEDBACK', False))
+    feedback_delay: float = faulty(FEEDBACK_DELAY, Fault(
+        'late', 'sends CAMERA_FEEDBACK S seconds after the image', 15.0, SECONDS))
+    counts: bool = faulty(True, Fault('same-index', 'does not count its images', False))
+    shots: tuple[int, ...] = faulty(
+        tuple(rededge.Shot),
+        Fault('no-captures', 'takes no image on DIGICAM_CONTROL', ()),
+        Fault('no-panel', 'takes no image of the panel', (rededge.Shot.SURVEY,)),
+        Fault('any-shot', 'takes an image for each value of shot', tuple(range(256))))
+    injectable: bool = faulty(True, Fault(
+        'no-injection', 'ignores injected position, time and attitude', False))
+    validity: float = faulty(5.0, Fault('stale', 'uses injected state for ever', math.inf))
+    extension: bool = faulty(False, Fault(
+        'extension',
+        'sends CAMERA_FEEDBACK with its extension field, which MAVLink 1 does not have'))
 
 
-_FAULTS_OF_EVERY_COMPONENT = ('silence', 'reboot', 'slow', 'drop', 'duplicate', 'delay', 'corrupt',
-                              'heartbeat', 'type', 'autopilot', 'any-target')
-FAULTS = FaultTable({
-    **{name: COMPONENT_FAULTS[name] for name in _FAULTS_OF_EVERY_COMPONENT},
-    'fixed-system': Fault('adopts_system_id', 'keeps its system ID, and takes messages for that '
-                          'only', default=False),
-    'other-ping': Fault('ping_component', 'lets another component answer PING', default=1),
-    'ping-sequence': Fault('ping_sequence', 'answers PING with another sequence number',
-                           default=1),
-    'ping-target': Fault('ping_target', 'answers PING without a target', default=False),
-    'no-status': Fault('triggers', 'sends no CAMERA_STATUS', default=False),
-    'no-feedback': Fault('feedback', 'sends no CAMERA_FEEDBACK', default=False),
-    'late': Fault('feedback_delay', 'sends CAMERA_FEEDBACK S seconds after the image', 'S',
-                  number(0.001, 3600), 15.0),
-    'same-index': Fault('counts', 'does not count its images', default=False),
-    'no-captures': Fault('shots', 'takes no image on DIGICAM_CONTROL', default=()),
-    'no-panel': Fault('shots', 'takes no image of the panel', default=(rededge.Shot.SURVEY,)),
-    'any-shot': Fault('shots', 'takes an image for each value of shot',
-                      default=tuple(range(256))),
-    'no-injection': Fault('injectable', 'ignores injected position, time and attitude',
-                          default=False),
-    'stale': Fault('validity', 'uses injected state for ever', default=math.inf),
-    'extension': Fault('extension', 'sends CAMERA_FEEDBACK with its extension field, which '
-                       'MAVLink 1 does not have'),
-})
+# It has no commands, and no streams.
+FAULTS = FaultTable.of(
+    RedEdgeBehaviour, 'refuse', 'progress', 'busy', 'lie', 'no-int', 'no-broadcast', 'no-stop',
+    'fixed-rate', 'disobey', 'unknown', 'no-request', 'no-resume', 'misaddress')
 
 
 class ExtendedCameraFeedback(rededge.CameraFeedback):
