@@ -68,6 +68,7 @@ from illuminator_ros.payload.simulated import Description, SimulatedComponents  
 from illuminator_ros.rededge.simulated import (  # noqa: E402
     COLUMNS,
     DEFAULT_SYSTEM_ID,
+    RedEdgeProperties,
     SimulatedRedEdge,
 )
 
@@ -150,8 +151,8 @@ class SimulatedCamera:
     def __init__(self, path: Path, images: Path, speed: float) -> None:
         address = Address(DEFAULT_SYSTEM_ID, mavlink.MAV_COMP_ID_CAMERA)
         self._url = f'pty://{path}'
-        self._device = SimulatedRedEdge(
-            address, validity=VALIDITY / speed, own_gps=GeoPoint(LATITUDE, LONGITUDE, 0.0))
+        self._device = SimulatedRedEdge(RedEdgeProperties(
+            address, validity=VALIDITY / speed, own_gps=GeoPoint(LATITUDE, LONGITUDE, 0.0)))
         self._device.records.subscribe(CsvFile(str(images), tuple(COLUMNS)).append)
         self._device.set_clock(time.time(), time.monotonic())
         self._endpoint = SimulatedComponents(

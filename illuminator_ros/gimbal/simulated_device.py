@@ -24,24 +24,24 @@ the device for :data:`MANAGER_TIMEOUT`.
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import partial
 import math
 from typing import Any
 
 from . import messages as gimbal
-from .axes import Range, range_fields
+from .axes import range_fields
 from .manager_setpoint import Demand
 from .simulated_motion import GimbalMechanics, GimbalMotion
 from .. import __version__
-from ..mavlink.dialect import flag_names, mavlink, short_names
+from ..mavlink.dialect import flag_names, mavlink
 from ..mavlink.messages import Address, Message, time_boot_ms
 from ..payload import simulated
 from ..payload.faults import Behaviour, Fault, FaultTable, FaultValue, faulty, FLAGS
 from ..payload.messages import GimbalDeviceAttitudeStatus
 from ..payload.mount_attitude import AXES, yaw_frame, YawFrame
 from ..payload.rotation import Quaternion
-from ..payload.simulated_settings import integer, number, one_of, Setting, text, Values
+from ..payload.simulated_settings import integer, number, one_of, setting, text
 
 # s without an announcement after which a component is no longer the manager.
 MANAGER_TIMEOUT = 5.0
@@ -112,22 +112,44 @@ FAULTS = FaultTable.of(GimbalBehaviour, 'refuse', 'progress', 'busy', 'disobey')
 
 
 @dataclass(frozen=True)
-class GimbalProperties:
+class MountProperties(GimbalMechanics, simulated.Properties):
     """
-    The properties of a simulated gimbal.
+    The properties of a simulated gimbal, with or without a manager of its own.
 
-    :param manager: the only component that a device obeys, None for the first that announces it.
     :param status_interval: s between messages with its attitude.
     """
 
+    vendor: str = setting('illuminator_ros', 'TEXT', 'vendor_name', text)
+    model: str = setting('simulator', 'TEXT', 'model_name', text)
+    custom_name: str = setting('', 'TEXT', 'custom_name', text)
+    status_interval: float = setting(
+        0.1, 'S', 'time between attitudes; 0 sends them only on request (default: 0.1)',
+        number(0, 3600))
+
+
+@dataclass(frozen=True)
+class GimbalProperties(MountProperties):
+    """
+    The properties of a simulated gimbal device.
+
+    :param manager_id: component id of the only component that it obeys, None for the first that
+        announces it.
+    """
+
     address: Address = Address(1, mavlink.MAV_COMP_ID_GIMBAL)
-    mechanics: GimbalMechanics = GimbalMechanics()
-    vendor: str = 'illuminator_ros'
-    model: str = 'simulator'
-    custom_name: str = ''
-    manager: Address | None = None
-    status_interval: float = 0.1
     behaviour: GimbalBehaviour = GimbalBehaviour()
+    drift: float = setting(
+        GimbalMechanics.drift, 'DEG_S',
+        'drift of a locked yaw without a heading from the vehicle (default: 0.5)',
+        number(-10, 10))
+    manager_id: int | None = setting(
+        None, 'ID', 'component id of its manager; without it, the first component that announces '
+        'itself', integer(1, 255))
+
+    @property
+    def manager(self) -> Address | None:
+        """Return the only component that it obeys, None for the first that announces it."""
+        return Address(self.address.system, self.manager_id) if self.manager_id else None
 
 
 class SimulatedMount:
@@ -137,8 +159,8 @@ class SimulatedMount:
     :param device_id: gimbal_device_id of its messages, 0 for a component of its own.
     """
 
-    def __init__(self, properties: GimbalProperties, device_id: int, now: float) -> None:
-        self.motion = GimbalMotion(properties.mechanics, now)
+    def __init__(self, properties: MountProperties, device_id: int, now: float) -> None:
+        self.motion = GimbalMotion(properties, now)
         self._properties = properties
         self._device_id = device_id
         self._booted_at = now
@@ -186,7 +208,7 @@ class SimulatedMount:
             # In older devices YAW_LOCK also selects the frame.
             frame = yaw_frame(flags)
         if behaviour.accepts_earth_always or known and (
-                motion.mechanics.capabilities
+                self._properties.capabilities
                 & mavlink.GIMBAL_DEVICE_CAP_FLAGS_SUPPORTS_YAW_IN_EARTH_FRAME):
             flags |= mavlink.GIMBAL_DEVICE_FLAGS_ACCEPTS_YAW_IN_EARTH_FRAME
         q = motion.attitude(frame)
@@ -205,7 +227,7 @@ class SimulatedMount:
 
     def limits(self, behaviour: GimbalBehaviour) -> Mapping[str, float]:
         """Return the fields roll_min to yaw_max of an INFORMATION message."""
-        fields = range_fields(self._properties.mechanics.ranges)
+        fields = range_fields(self._properties.ranges)
         if behaviour.limits_in_degrees:
             fields = {name: math.degrees(value) for name, value in fields.items()}
         self._informed += 1
@@ -218,7 +240,7 @@ class SimulatedMount:
         """Return the INFORMATION of a device, None if it sends none."""
         if not behaviour.identifies:
             return None
-        properties, capabilities = self._properties, self.motion.mechanics.capabilities
+        properties, capabilities = self._properties, self._properties.capabilities
         vendor, model, custom = (
             name.encode()[:31] for name in (
                 properties.vendor, properties.model, properties.custom_name))
@@ -269,11 +291,11 @@ class SimulatedGimbal(simulated.SimulatedDevice):
     sends = (GimbalDeviceAttitudeStatus, gimbal.GimbalDeviceInformation)
     faults = FAULTS
     commands = COMMANDS
+    properties: GimbalProperties
     behaviour: GimbalBehaviour
 
     def __init__(self, properties: GimbalProperties) -> None:
-        super().__init__(properties.behaviour)
-        self.properties = properties
+        super().__init__(properties)
         self.restart(0.0)
 
     def restart(self, now: float) -> None:
@@ -354,81 +376,8 @@ class SimulatedGimbal(simulated.SimulatedDevice):
             '' if self.mount.motion.heading_known(now) else 'heading unknown')
 
 
-_SPANS = ('roll_range', 'pitch_range', 'yaw_range')
-
-
-def _span(text_: str) -> Range:
-    parts = text_.split(',')
-    if len(parts) != 2:
-        raise ValueError(f'{text_!r} is not MIN,MAX')
-    low, high = (math.radians(_degrees(part)) for part in parts)
-    if low > high:
-        raise ValueError(f'{text_}: the minimum is above the maximum')
-    return Range(low, high)
-
-
-def _capabilities(names: str) -> int:
-    known = {name.lower(): flag
-             for flag, name in short_names('GIMBAL_DEVICE_CAP_FLAGS').items()}
-    result = 0
-    for name in names.split(','):
-        result |= known[one_of(known)(name.strip().lower())]
-    return result
-
-
-# The settings of devices and of managers.
-MECHANICS: dict[str, Setting] = {
-    'vendor': Setting('TEXT', 'vendor_name', text),
-    'model': Setting('TEXT', 'model_name', text),
-    'custom_name': Setting('TEXT', 'custom_name', text),
-    'status_interval': Setting('S', 'time between attitudes; 0 sends them only on request '
-                               '(default: 0.1)', number(0, 3600)),
-    'roll_range': Setting('MIN,MAX', 'degrees from the horizon (default: -45,45)', _span),
-    'pitch_range': Setting('MIN,MAX', 'likewise, up is positive (default: -120,45)', _span),
-    'yaw_range': Setting('MIN,MAX', 'degrees from the front of the vehicle, right is positive; '
-                         '-180,180 has no stop (default: -170,170)', _span),
-    'axis_rate': Setting('DEG_S', 'highest rate of each axis (default: 60)', number(0.1, 1000)),
-    'drift': Setting('DEG_S', 'drift of a locked yaw without a heading from the vehicle '
-                     '(default: 0.5)', number(-10, 10)),
-    'lacks': Setting('NAME,...', 'GIMBAL_DEVICE_CAP_FLAGS that it does not have, such as '
-                     'has_yaw_lock', _capabilities),
-}
-SETTINGS: dict[str, Setting] = {
-    **MECHANICS,
-    'manager_id': Setting('ID', 'component id of its manager; without it, the first '
-                          'component that announces itself', integer(1, 255)),
-}
-
-
-def mechanics(settings: Values) -> GimbalMechanics:
-    """Return the mechanics that settings describe."""
-    default = GimbalMechanics()
-    given: dict[str, Any] = {
-        name.removesuffix('_range'): settings[name] for name in _SPANS if name in settings}
-    for name, field in (('axis_rate', 'rate'), ('drift', 'drift')):
-        if name in settings:
-            given[field] = math.radians(settings[name])
-    endless = given.get('yaw', default.yaw).is_endless
-    return replace(default, **given, capabilities=(
-        default.capabilities
-        | (mavlink.GIMBAL_DEVICE_CAP_FLAGS_SUPPORTS_INFINITE_YAW if endless else 0))
-        & ~settings.get('lacks', 0))
-
-
-def properties(settings: Values, address: Address) -> GimbalProperties:
-    """Return the gimbal that settings describe."""
-    names = ('vendor', 'model', 'custom_name', 'status_interval')
-    manager = settings.get('manager_id')
-    return GimbalProperties(
-        address, mechanics(settings), **{name: settings[name] for name in names
-                                         if name in settings},
-        manager=Address(address.system, manager) if manager else None)
-
-
 SIMULATED = simulated.SimulatedType(
-    'gimbal', 'gimbals', SimulatedGimbal,
-    make=lambda settings, address: SimulatedGimbal(properties(settings, address)),
-    address=lambda settings: GimbalProperties.address, settings=SETTINGS,
+    'gimbal', 'gimbals', SimulatedGimbal, GimbalProperties(),
     examples=(
         '--payload gimbal',
         '--payload illuminator,gimbal      # a light and a gimbal on one vehicle',

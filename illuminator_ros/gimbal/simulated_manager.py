@@ -24,10 +24,9 @@ up to :data:`NUDGE_LIMIT`.
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import partial
 import math
-from typing import NamedTuple
 
 from . import messages as gimbal
 from .axes import LEVEL, Range
@@ -36,9 +35,7 @@ from .messages import DEVICE_ID_PARAM, NO_COMPONENT
 from .simulated_device import (
     COMMANDS,
     GimbalBehaviour,
-    GimbalProperties,
-    MECHANICS,
-    properties,
+    MountProperties,
     SimulatedMount,
 )
 from ..mavlink.dialect import mavlink, replaced
@@ -54,14 +51,13 @@ from ..payload.messages import (
     place_of,
 )
 from ..payload.mount_attitude import UNSET_VECTOR, YawFrame
-from ..payload.simulated_settings import geo_point, integer, number, one_of, Setting, Values
+from ..payload.simulated_settings import geo_point, integer, number, setting
 
 # s between messages with the state of the manager ("Gimbal Manager Status").
 STATUS_INTERVAL = 0.2
 # rad that secondary control may add to an angle.
 NUDGE_LIMIT = math.radians(20.0)
-mavlink.MAV_TYPE_QUADROTOR = 2
-mavlink.MAV_AUTOPILOT_PX4 = 12
+AUTOPILOT = Address(1, mavlink.MAV_COMP_ID_AUTOPILOT1)
 
 
 @dataclass(frozen=True)
@@ -84,6 +80,7 @@ class ManagerBehaviour(GimbalBehaviour):
     :param angles_with_rates: whether messages may have angles and rates.
     :param frame_is_lock: whether YAW_LOCK alone selects the frame of a yaw.
     :param shows_flags: whether its status has the flags of the setpoint.
+    :param lacks: GIMBAL_DEVICE_CAP_FLAGS that it does not have.
     """
 
     enforces_roi: bool = True
@@ -101,6 +98,7 @@ class ManagerBehaviour(GimbalBehaviour):
     angles_with_rates: bool = True
     frame_is_lock: bool = False
     shows_flags: bool = True
+    lacks: int = 0
 
 
 # Any type of component may be a manager, so the faults of the heartbeat's content are left out,
@@ -108,61 +106,62 @@ class ManagerBehaviour(GimbalBehaviour):
 FAULTS = FaultTable.of(ManagerBehaviour, 'type', 'autopilot', 'false-north', 'manager-set')
 
 
-class Profile(NamedTuple):
-    """The behaviour of a kind of gimbal manager."""
+@dataclass(frozen=True)
+class ManagerProperties(MountProperties):
+    """
+    The properties of a simulated gimbal with a manager.
 
-    description: str
-    behaviour: ManagerBehaviour = ManagerBehaviour()
+    :param device_id: gimbal_device_id, 1..6 for a gimbal that is not a component of its own.
+    :param position: of the vehicle, until it sends GLOBAL_POSITION_INT.
+    :param heading: of the vehicle, until it sends ATTITUDE, degrees.
+    """
+
     address: Address = Address(1, mavlink.MAV_COMP_ID_GIMBAL)
-    lacks: int = 0
+    behaviour: ManagerBehaviour = ManagerBehaviour()
+    device_id: int = setting(1, 'ID', 'gimbal_device_id, 1 to 6 (default: 1)', integer(1, 6))
+    position: GeoPoint = setting(
+        GeoPoint(47.397742, 8.545594, 488.0), 'LAT,LON,ALT', 'of the vehicle until it sends '
+        'GLOBAL_POSITION_INT, degrees and m above mean sea level (default: '
+        '47.397742,8.545594,488)', geo_point)
+    heading: float = setting(
+        0.0, 'DEG', 'of the vehicle until it sends ATTITUDE (default: 0)', number(-180, 360))
+
+    @property
+    def capabilities(self) -> int:
+        """Return its GIMBAL_DEVICE_CAP_FLAGS."""
+        points = mavlink.GIMBAL_DEVICE_CAP_FLAGS_CAN_POINT_LOCATION_GLOBAL & ~self.lacks
+        return (super().capabilities | points) & ~self.behaviour.lacks
 
 
 PROFILES = {
-    'reference': Profile('follows the protocol, and enforces control'),
+    'reference': simulated.Profile(
+        'follows the protocol, and enforces control', ManagerProperties()),
     # input_mavlink.cpp and output_rc.cpp of src/modules/gimbal.
-    'px4': Profile(
+    'px4': simulated.Profile(
         'PX4 with a gimbal on its outputs: enforces primary control, has no secondary control '
         'and no device ids, -2 is PX4 itself, -3 compares system and component id separately, '
         'PITCHYAW takes rates in rad/s, no SET_PITCHYAW, regions of interest from any component',
-        ManagerBehaviour(
+        ManagerProperties(AUTOPILOT, ManagerBehaviour(
             heartbeat_type=mavlink.MAV_TYPE_QUADROTOR,
             heartbeat_autopilot=mavlink.MAV_AUTOPILOT_PX4,
             enforces_roi=False, has_secondary=False, own_is_manager=True, releases_pairs=False,
             invalid_configure=mavlink.MAV_RESULT_ACCEPTED, rates_in_degrees=False,
-            checks_device=False,
-            takes_pitchyaw=False, partial_angles=mavlink.MAV_RESULT_ACCEPTED, frame_is_lock=True),
-        Address(1, mavlink.MAV_COMP_ID_AUTOPILOT1), mavlink.GIMBAL_DEVICE_CAP_FLAGS_HAS_RETRACT),
+            checks_device=False, takes_pitchyaw=False,
+            partial_angles=mavlink.MAV_RESULT_ACCEPTED, frame_is_lock=True,
+            lacks=mavlink.GIMBAL_DEVICE_CAP_FLAGS_HAS_RETRACT))),
     # AP_Mount.cpp and AP_Mount_Backend.cpp.
-    'ardupilot': Profile(
+    'ardupilot': simulated.Profile(
         'ArduPilot with a gimbal on its outputs: records control and obeys any component, no '
         'secondary control, no SET_MANUAL_CONTROL, ignores angles with rates and the angle of one '
         'axis, reports constant flags and no failures',
-        ManagerBehaviour(
+        ManagerProperties(AUTOPILOT, ManagerBehaviour(
             heartbeat_type=mavlink.MAV_TYPE_QUADROTOR,
             heartbeat_autopilot=mavlink.MAV_AUTOPILOT_ARDUPILOTMEGA,
             enforces_control=False, enforces_roi=False, has_secondary=False,
             invalid_configure=mavlink.MAV_RESULT_FAILED, takes_manual=False,
             partial_angles=mavlink.MAV_RESULT_FAILED, angles_with_rates=False, frame_is_lock=True,
-            shows_flags=False, reports_earth=False, reports_failures=False),
-        Address(1, mavlink.MAV_COMP_ID_AUTOPILOT1)),
+            shows_flags=False, reports_earth=False, reports_failures=False))),
 }
-
-
-@dataclass(frozen=True)
-class ManagerProperties:
-    """
-    The properties of a simulated gimbal with a manager.
-
-    :param gimbal: the gimbal.
-    :param device_id: gimbal_device_id, 1..6 for a gimbal that is not a component of its own.
-    :param position: of the vehicle, until it sends GLOBAL_POSITION_INT.
-    :param heading: of the vehicle, until it sends ATTITUDE, rad.
-    """
-
-    gimbal: GimbalProperties = GimbalProperties(behaviour=ManagerBehaviour())
-    device_id: int = 1
-    position: GeoPoint = GeoPoint(47.397742, 8.545594, 488.0)
-    heading: float = 0.0
 
 
 class SimulatedManager(simulated.SimulatedDevice):
@@ -181,11 +180,11 @@ class SimulatedManager(simulated.SimulatedDevice):
     changes = frozenset(DEVICE_ID_PARAM)
     faults = FAULTS
     commands = COMMANDS
+    properties: ManagerProperties
     behaviour: ManagerBehaviour
 
     def __init__(self, properties: ManagerProperties) -> None:
-        super().__init__(properties.gimbal.behaviour)
-        self.properties = properties
+        super().__init__(properties)
         self._position = properties.position
         self.restart(0.0)
 
@@ -194,10 +193,10 @@ class SimulatedManager(simulated.SimulatedDevice):
         self.primary = self.secondary = NO_COMPONENT
         self._roi: GeoPoint | None = None
         self._base = UNSET_VECTOR
-        self.mount = SimulatedMount(self.properties.gimbal, self.properties.device_id, now)
+        self.mount = SimulatedMount(self.properties, self.properties.device_id, now)
         self.mount.behave(self.behaviour, now)
         self.mount.motion.take_heading(
-            0.0, 0.0, self.properties.heading, 0.0, now, math.inf)
+            0.0, 0.0, math.radians(self.properties.heading), 0.0, now, math.inf)
 
     def behave(self, behaviour: Behaviour, now: float) -> None:
         """See :meth:`SimulatedDevice.behave`."""
@@ -207,7 +206,7 @@ class SimulatedManager(simulated.SimulatedDevice):
     def streams(self) -> Mapping[int, float]:
         """See :meth:`SimulatedDevice.streams`."""
         return {gimbal.GimbalManagerStatus.id: STATUS_INTERVAL,
-                GimbalDeviceAttitudeStatus.id: self.properties.gimbal.status_interval}
+                GimbalDeviceAttitudeStatus.id: self.properties.status_interval}
 
     def message(self, message_id: int, now: float) -> Message | None:
         """See :meth:`SimulatedDevice.message`."""
@@ -220,7 +219,7 @@ class SimulatedManager(simulated.SimulatedDevice):
                 mount.uptime_ms(now), int(flags), device_id, *control[0], *control[1])
         if message_id == gimbal.GimbalManagerInformation.id and behaviour.identifies:
             return gimbal.GimbalManagerInformation(
-                mount.uptime_ms(now), int(mount.motion.mechanics.capabilities), device_id,
+                mount.uptime_ms(now), int(self.properties.capabilities), device_id,
                 **mount.limits(behaviour))
         if message_id == GimbalDeviceAttitudeStatus.id:
             return mount.status(behaviour, now)
@@ -233,7 +232,7 @@ class SimulatedManager(simulated.SimulatedDevice):
     def receive(self, source: Address, message: Message, now: float) -> Iterable[Message]:
         """See :meth:`SimulatedDevice.receive`."""
         if isinstance(message, Attitude | GlobalPositionInt):
-            if source.system == self.properties.gimbal.address.system:
+            if source.system == self.properties.address.system:
                 self._take_vehicle(message, now)
         elif isinstance(message, AnySetpoint) and self._is_for_device(message.gimbal_device_id):
             demand = self._read(message)
@@ -271,7 +270,7 @@ class SimulatedManager(simulated.SimulatedDevice):
             return None
         try:
             demand = read_demand(replaced(message, flags=self._flags(message.flags)),
-                                 self.mount.motion.mechanics.ranges)
+                                 self.properties.ranges)
         except ValueError:
             return None
         has_both = all(map(math.isfinite, (*demand.target, *demand.rates[1:])))
@@ -360,7 +359,7 @@ class SimulatedManager(simulated.SimulatedDevice):
         self, current: Address, values: Sequence[float], source: Address,
     ) -> Address:
         """Return the component to which the values of CONFIGURE give control."""
-        own = self.properties.gimbal.address if self.behaviour.own_is_manager else source
+        own = self.properties.address if self.behaviour.own_is_manager else source
         result = []
         for now_, value, itself, sender in zip(current, values, own, source, strict=True):
             releases = current == source if self.behaviour.releases_pairs else now_ == sender
@@ -399,43 +398,9 @@ class SimulatedManager(simulated.SimulatedDevice):
             now, control or 'no control', 'region of interest' if self._roi else '')
 
 
-SETTINGS: dict[str, Setting] = {
-    'profile': Setting('NAME', 'a kind of manager, see below (default: reference)',
-                       one_of(PROFILES)),
-    **{name: setting for name, setting in MECHANICS.items() if name != 'drift'},
-    'device_id': Setting('ID', 'gimbal_device_id, 1 to 6 (default: 1)', integer(1, 6)),
-    'position': Setting('LAT,LON,ALT', 'of the vehicle until it sends GLOBAL_POSITION_INT, '
-                        'degrees and m above mean sea level (default: '
-                        '47.397742,8.545594,488)', geo_point),
-    'heading': Setting('DEG', 'of the vehicle until it sends ATTITUDE (default: 0)',
-                       number(-180, 360)),
-}
-
-
-def _profile(settings: Values) -> Profile:
-    return PROFILES[settings.get('profile', 'reference')]
-
-
-def manager_properties(settings: Values, address: Address) -> ManagerProperties:
-    """Return the manager that settings describe."""
-    profile, default = _profile(settings), ManagerProperties()
-    described = properties(settings, address)
-    mechanics = replace(described.mechanics, capabilities=(
-        described.mechanics.capabilities
-        | mavlink.GIMBAL_DEVICE_CAP_FLAGS_CAN_POINT_LOCATION_GLOBAL)
-        & ~profile.lacks & ~settings.get('lacks', 0))
-    return replace(
-        default, gimbal=replace(described, mechanics=mechanics, behaviour=profile.behaviour),
-        device_id=settings.get('device_id', default.device_id),
-        position=settings.get('position', default.position),
-        heading=math.radians(settings.get('heading', 0.0)))
-
-
 SIMULATED = simulated.SimulatedType(
-    'manager', 'managers', SimulatedManager,
-    make=lambda settings, address: SimulatedManager(manager_properties(settings, address)),
-    address=lambda settings: _profile(settings).address, settings=SETTINGS, mavlink_version=2,
-    profiles={name: profile.description for name, profile in PROFILES.items()},
+    'manager', 'managers', SimulatedManager, ManagerProperties(), PROFILES,
     examples=(
         '--payload gimbal_manager --heading 40',
-        '--payload gimbal_manager --profile ardupilot --fault frozen-axis=yaw'))
+        '--payload gimbal_manager --profile ardupilot --fault frozen-axis=yaw'),
+    mavlink_version=2)

@@ -22,9 +22,10 @@ from typing import NamedTuple
 
 from .axes import AT_LIMIT, HAS_AXIS, HAS_FOLLOW, HAS_LOCK, LEVEL, LOCKS, Range, Ranges, RESOLUTION
 from .manager_setpoint import Demand
-from ..mavlink.dialect import mavlink
+from ..mavlink.dialect import mavlink, short_names
 from ..payload.mount_attitude import AXES, UNSET_VECTOR, YawFrame
 from ..payload.rotation import Quaternion, Vector
+from ..payload.simulated_settings import number, one_of, setting
 
 # s without a heading from the vehicle after which its heading is unknown.
 HEADING_TIMEOUT = 2.0
@@ -45,38 +46,81 @@ def wrapped(angle: float) -> float:
 NO_STOPS = Range(-math.pi, math.pi)
 
 
+_degrees = number(-180.0, 180.0)
+
+
+def _span(text: str) -> Range:
+    parts = text.split(',')
+    if len(parts) != 2:
+        raise ValueError(f'{text!r} is not MIN,MAX')
+    low, high = (math.radians(_degrees(part)) for part in parts)
+    if low > high:
+        raise ValueError(f'{text}: the minimum is above the maximum')
+    return Range(low, high)
+
+
+def _capabilities(names: str) -> int:
+    known = {name.lower(): flag
+             for flag, name in short_names('GIMBAL_DEVICE_CAP_FLAGS').items()}
+    result = 0
+    for name in names.split(','):
+        result |= known[one_of(known)(name.strip().lower())]
+    return result
+
+
 @dataclass(frozen=True)
 class GimbalMechanics:
     """
     The axes of a gimbal, and its capabilities.
 
-    :param roll, pitch: relative to the horizon.
-    :param yaw: relative to the vehicle's heading; a full turn has no stop.
-    :param rate: highest rate of each axis, rad/s.
-    :param drift: of the gimbal's own heading while the vehicle sends none, rad/s.
+    :param roll_range, pitch_range: relative to the horizon, rad.
+    :param yaw_range: relative to the vehicle's heading, rad; a full turn has no stop.
+    :param axis_rate: highest rate of each axis, deg/s.
+    :param drift: of the gimbal's own heading while the vehicle sends none, deg/s.
     """
 
-    roll: Range = Range(*map(math.radians, (-45.0, 45.0)))
-    pitch: Range = Range(*map(math.radians, (-120.0, 45.0)))
-    yaw: Range = Range(*map(math.radians, (-170.0, 170.0)))
-    rate: float = math.radians(60.0)
-    drift: float = math.radians(0.5)
-    capabilities: int = CAPABILITIES
+    roll_range: Range = setting(
+        _span('-45,45'), 'MIN,MAX', 'degrees from the horizon (default: -45,45)', _span)
+    pitch_range: Range = setting(
+        _span('-120,45'), 'MIN,MAX', 'likewise, up is positive (default: -120,45)', _span)
+    yaw_range: Range = setting(
+        _span('-170,170'), 'MIN,MAX', 'degrees from the front of the vehicle, right is positive; '
+        '-180,180 has no stop (default: -170,170)', _span)
+    axis_rate: float = setting(
+        60.0, 'DEG_S', 'highest rate of each axis (default: 60)', number(0.1, 1000))
+    drift: float = 0.5
+    lacks: int = setting(
+        0, 'NAME,...', 'GIMBAL_DEVICE_CAP_FLAGS that it does not have, such as has_yaw_lock',
+        _capabilities)
+
+    @property
+    def capabilities(self) -> int:
+        """Return its GIMBAL_DEVICE_CAP_FLAGS."""
+        endless = (mavlink.GIMBAL_DEVICE_CAP_FLAGS_SUPPORTS_INFINITE_YAW
+                   if self.yaw_range.is_endless else 0)
+        return (CAPABILITIES | endless) & ~self.lacks
+
+    @property
+    def rate(self) -> float:
+        """Return the highest rate of each axis, rad/s."""
+        return math.radians(self.axis_rate)
 
     @property
     def ranges(self) -> Ranges:
         """Return the ranges in the order of the axes."""
-        return self.roll, self.pitch, self.yaw
+        return self.roll_range, self.pitch_range, self.yaw_range
 
     @property
     def neutral(self) -> Vector:
         """Return the angles of the neutral position, rad: level and ahead."""
-        return self.roll.clip(0.0), self.pitch.clip(0.0), self.yaw.clip(0.0)
+        roll, pitch, yaw = (span.clip(0.0) for span in self.ranges)
+        return roll, pitch, yaw
 
     @property
     def retracted(self) -> Vector:
         """Return the angles of the retracted position, rad: the highest pitch, and ahead."""
-        return self.roll.clip(0.0), self.pitch.high, self.yaw.clip(0.0)
+        roll, _, yaw = self.neutral
+        return roll, self.pitch_range.high, yaw
 
 
 class VehicleAttitude(NamedTuple):
@@ -160,7 +204,7 @@ class GimbalMotion:
     def _heading(self, now: float) -> float:
         """Return the heading of the gimbal's gyros; it drifts while the vehicle sends none."""
         lost = max(0.0, now - max(self.vehicle.until, 0.0))
-        return wrapped(self.vehicle.yaw + self.mechanics.drift * lost)
+        return wrapped(self.vehicle.yaw + math.radians(self.mechanics.drift) * lost)
 
     def take_heading(self, roll: float, pitch: float, yaw: float, rate: float, now: float,
                      valid: float = HEADING_TIMEOUT) -> None:
@@ -258,7 +302,8 @@ class GimbalMotion:
     @property
     def moving(self) -> bool:
         """Return whether an axis moves, slow drift aside."""
-        return any(abs(rate) > self.mechanics.drift * 1.5 + RESOLUTION for rate in self.rates)
+        drift = math.radians(self.mechanics.drift)
+        return any(abs(rate) > drift * 1.5 + RESOLUTION for rate in self.rates)
 
     def limits(self) -> int:
         """Return the flags of the axes that are stopped at the end of their range."""

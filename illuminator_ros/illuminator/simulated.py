@@ -20,7 +20,7 @@ https://mavlink.io/en/services/illuminator.html
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from dataclasses import fields, replace
 from functools import partial
 import math
@@ -28,7 +28,6 @@ import math
 from . import model
 from .messages import IlluminatorStatus, STATUS_ID
 from .simulated_properties import (
-    Extension,
     FAULTS,
     IlluminatorBehaviour,
     IlluminatorProperties,
@@ -39,7 +38,6 @@ from ..mavlink import messages as mav
 from ..mavlink.dialect import mavlink
 from ..mavlink.messages import AnyCommand, params_of
 from ..payload.faults import Behaviour
-from ..payload.identity import Identity
 from ..payload.simulated import (
     CommandReply,
     ConsoleCommand,
@@ -49,7 +47,7 @@ from ..payload.simulated import (
     SimulatedType,
     Snapshot,
 )
-from ..payload.simulated_settings import integer, number, one_of, Setting, text, Values
+from ..payload.simulated_settings import number
 
 # K by which the temperature must change for a line of its own.
 TEMPERATURE_STEP = 5.0
@@ -98,12 +96,12 @@ class SimulatedIlluminator(SimulatedDevice):
     sends = (IlluminatorStatus, mav.ComponentInformationBasic)
     faults = FAULTS
     commands = COMMANDS
+    properties: IlluminatorProperties
     behaviour: IlluminatorBehaviour
 
     def __init__(self, properties: IlluminatorProperties) -> None:
-        super().__init__(properties.behaviour)
-        self.properties = properties
-        self.thermal = ThermalModel(properties.thermal)
+        super().__init__(properties)
+        self.thermal = ThermalModel(properties.thermal, properties.ambient)
         self.thermal.set_sensor_failed(self.behaviour.thermistor_failed)
         self.restart(0.0)
 
@@ -154,10 +152,10 @@ class SimulatedIlluminator(SimulatedDevice):
             configuration.strobe_period, configuration.strobe_duty_cycle,
             thermal.reading if behaviour.measures else 0.0,
             strobe_range.min_strobe_period, strobe_range.max_strobe_period)
-        return IlluminatorStatus(*fields, *(behaviour.extension or ()))
+        return IlluminatorStatus(*fields, *self.properties.extension)
 
     def _information(self, now: float) -> mav.ComponentInformationBasic:
-        behaviour, identity = self.behaviour, self.properties.identity
+        behaviour, properties = self.behaviour, self.properties
 
         def string(text: str, size: int) -> bytes:
             if behaviour.padding:
@@ -166,9 +164,10 @@ class SimulatedIlluminator(SimulatedDevice):
 
         return mav.ComponentInformationBasic(
             self.uptime_ms(now) if behaviour.has_clock else 0, 0, 0,
-            string(identity.vendor, 32), string(identity.model, 32),
-            string(identity.software_version, 24), string(identity.hardware_version, 24),
-            string(identity.serial_number, 32))
+            string(properties.vendor, 32), string(properties.model, 32),
+            string(properties.software_version, 24), string(properties.hardware_version, 24),
+            string(properties.serial_number or f'SIM-{"-".join(map(str, properties.address))}',
+                   32))
 
     def execute(self, source: mav.Address, command: AnyCommand, now: float) -> Reply:
         """See :meth:`SimulatedDevice.execute`."""
@@ -276,101 +275,13 @@ class SimulatedIlluminator(SimulatedDevice):
                         (*state, *notes), temperature / TEMPERATURE_STEP)
 
 
-# Its settings, and its registration with the simulator
-
-THERMAL = {field.name: field.default for field in fields(ThermalProperties)}
-
-
-def _modes(names: str) -> tuple[model.Mode, ...]:
-    modes = tuple(model.MODES[one_of(model.MODES)(name.strip())]
-                  for name in names.split(',') if name.strip())
-    if not modes:
-        raise ValueError('at least one mode is needed')
-    return modes
-
-
-def _thermal(values: str) -> dict[str, float]:
-    result = {}
-    for part in values.split(','):
-        name, equals, value = part.strip().partition('=')
-        if name not in THERMAL or not equals:
-            raise ValueError(f'{part!r} is not one of '
-                             + ', '.join(f'{known}=VALUE' for known in THERMAL))
-        result[name] = number(-1000, 100_000)(value)
-    return result
-
-
-_byte = integer(0, 255)
-
-SETTINGS: dict[str, Setting] = {
-    'profile': Setting('NAME', 'a kind of light, see below (default: default)', one_of(PROFILES)),
-    'vendor': Setting('TEXT', 'vendor_name', text),
-    'model': Setting('TEXT', 'model_name', text),
-    'software_version': Setting('TEXT', 'software_version', text),
-    'hardware_version': Setting('TEXT', 'hardware_version', text),
-    'serial_number': Setting('TEXT', 'serial_number; several lights append their component id',
-                             text, distinct=True),
-    'status_interval': Setting('S', 'time between statuses; 0 sends them only on request '
-                               '(default: 1)', number(0, 3600)),
-    'min_strobe_period': Setting('S', 'shortest strobe period (default: 0.05)',
-                                 number(0, 3600)),
-    'max_strobe_period': Setting('S', 'longest strobe period (default: 10)', number(0, 3600)),
-    'modes': Setting('MODE,...', 'modes that it can be configured to (default: '
-                     f'{",".join(model.MODES)})', _modes),
-    'mode_bitmask': Setting('N', 'mode_bitmask, if it does not follow from the modes', _byte),
-    'ambient': Setting('DEG_C', 'ambient temperature (default: 25)', number(-60, 150)),
-    'thermal': Setting('NAME=VALUE,...', 'thermal model, see below', _thermal, True),
-    'time_scale': Setting('X', 'factor by which it heats faster than real time (default: 1)',
-                          number(0.001, 10000)),
-    'zoom_level': Setting('N', 'zoom_level, which makes the status one of 38 bytes', _byte),
-    'color_mode': Setting('N', 'color_mode, likewise', _byte),
-    'gimbal_device_id': Setting('N', 'gimbal_device_id, likewise', _byte),
-}
-
-
-def _profile(settings: Values) -> IlluminatorProperties:
-    return PROFILES[settings.get('profile', 'default')].properties
-
-
-def properties(settings: Values, address: mav.Address) -> IlluminatorProperties:
-    """
-    Return the properties of the light that settings describe.
-
-    :raises ValueError: if they contradict each other.
-    """
-    def given(names: Iterable[str]) -> Values:
-        return {name: settings[name] for name in names if name in settings}
-
-    profile = _profile(settings)
-    strobe_range = replace(
-        profile.strobe_range, **given(field.name for field in fields(model.StrobeRange)))
-    if strobe_range.min_strobe_period > strobe_range.max_strobe_period:
-        raise ValueError('min_strobe_period is above max_strobe_period')
-    behaviour = profile.behaviour
-    if extension := given(Extension._fields):
-        behaviour = replace(
-            behaviour, extension=(behaviour.extension or Extension())._replace(**extension))
-    identity = profile.identity
-    if profile.identity == IlluminatorProperties.identity:
-        identity = replace(identity, serial_number=f'SIM-{address.system}-{address.component}')
-    identity = replace(identity, **given(field.name for field in fields(Identity)))
-    return replace(
-        profile, address=address, identity=identity, strobe_range=strobe_range,
-        behaviour=behaviour,
-        thermal=ThermalProperties(**{**given(['ambient']), **settings.get('thermal', {})}),
-        **given(['modes', 'mode_bitmask', 'status_interval', 'time_scale']))
-
-
 SIMULATED = SimulatedType(
-    'light', 'lights', SimulatedIlluminator,
-    make=lambda settings, address: SimulatedIlluminator(properties(settings, address)),
-    address=lambda settings: _profile(settings).address,
-    settings=SETTINGS, mavlink_version=2,
+    'light', 'lights', SimulatedIlluminator, IlluminatorProperties(), PROFILES,
     examples=(
         '', 'udpin://127.0.0.1:14550 --count 3',
         '--light 1/243=bow --light 1/250=stern --fault stern:drop=0.2',
         '--ambient 60 --time-scale 60      # gets hot in seconds',
         '--file lights.yaml                # the same settings, for each light'),
-    profiles={name: profile.description for name, profile in PROFILES.items()},
     notes='thermal, with defaults (degC, K and s; throttle_to is a share of the brightness):\n  '
-    + ', '.join(f'{name}={value:g}' for name, value in THERMAL.items()))
+    + ', '.join(f'{one.name}={one.default:g}' for one in fields(ThermalProperties)),
+    mavlink_version=2)

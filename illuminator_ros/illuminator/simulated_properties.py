@@ -16,25 +16,18 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, fields
 import functools
-from typing import NamedTuple
 
-from .model import Mode, StrobeRange
+from .model import Mode, MODES, StrobeRange
 from .thermal import ThermalProperties
 from .. import __version__
 from ..mavlink import messages
 from ..mavlink.dialect import mavlink
 from ..payload.faults import Behaviour, Fault, FaultTable, faulty, FLAGS
-from ..payload.identity import Identity
-
-
-class Extension(NamedTuple):
-    """The three fields that follow the common 35 bytes in a vendor's ILLUMINATOR_STATUS."""
-
-    zoom_level: int = 0
-    color_mode: int = 0
-    gimbal_device_id: int = 0
+from ..payload.simulated import Profile, Properties
+from ..payload.simulated_settings import integer, number, one_of, setting, text
 
 
 @dataclass(frozen=True)
@@ -45,7 +38,6 @@ class IlluminatorBehaviour(Behaviour):
     :param has_clock: whether uptime_ms and time_boot_ms run; else they are 0.
     :param measures: whether it has a temperature and strobe limits to report; else they are 0,
         and it does not strobe.
-    :param extension: makes the status one of 38 bytes.
     :param identifies: whether it sends COMPONENT_INFORMATION_BASIC.
     :param terminates: whether a string that is too long ends with a NUL.
     :param padding: fills its strings to the last byte, '' for nothing.
@@ -60,7 +52,6 @@ class IlluminatorBehaviour(Behaviour):
 
     heartbeat_type: int = mavlink.MAV_TYPE_ILLUMINATOR
     measures: bool = True
-    extension: Extension | None = None
     terminates: bool = True
     brightness_is_switch: bool = False
     thermistor_failed: bool = faulty(False, Fault(
@@ -86,31 +77,81 @@ class IlluminatorBehaviour(Behaviour):
 FAULTS = FaultTable.of(IlluminatorBehaviour)
 
 
+def _modes(names: str) -> tuple[Mode, ...]:
+    modes = tuple(MODES[one_of(MODES)(name.strip())] for name in names.split(',') if name.strip())
+    if not modes:
+        raise ValueError('at least one mode is needed')
+    return modes
+
+
+def _thermal(values: str) -> dict[str, float]:
+    known = [field.name for field in fields(ThermalProperties)]
+    result = {}
+    for part in values.split(','):
+        name, equals, value = part.strip().partition('=')
+        if name not in known or not equals:
+            raise ValueError(f'{part!r} is not one of '
+                             + ', '.join(f'{name}=VALUE' for name in known))
+        result[name] = number(-1000, 100_000)(value)
+    return result
+
+
+_period, _byte = number(0, 3600), integer(0, 255)
+
+
 @dataclass(frozen=True)
-class IlluminatorProperties:
+class IlluminatorProperties(Properties):
     """
     The properties of a simulated light.
 
-    :param modes: the modes that it can be configured to.
+    :param shifted_bitmask: whether the mode_bitmask is computed from 1 << mode for each mode, else
+        from the mode.
+    :param serial_number: '' for one with the address.
     :param mode_bitmask: as reported; None to compute it from the modes.
-    :param shifted_bitmask: whether it is computed from 1 << mode for each mode, else from the
-        mode.
-    :param status_interval: s between statuses by default; 0 sends none.
-    :param time_scale: factor by which it heats and cools faster than real time.
-    :param behaviour: how it behaves at first, and without faults.
     """
 
     address: messages.Address = messages.Address(1, mavlink.MAV_COMP_ID_ILLUMINATOR)
-    identity: Identity = Identity(
-        'illuminator_ros', 'simulator', __version__, '1.0.0', 'SIM-1-243')
-    strobe_range: StrobeRange = StrobeRange(0.05, 10.0)
-    modes: tuple[Mode, ...] = (Mode.INTERNAL_CONTROL, Mode.EXTERNAL_SYNC)
-    mode_bitmask: int | None = None
-    shifted_bitmask: bool = False
-    status_interval: float = 1.0
-    thermal: ThermalProperties = ThermalProperties()
-    time_scale: float = 1.0
     behaviour: IlluminatorBehaviour = IlluminatorBehaviour()
+    shifted_bitmask: bool = False
+    vendor: str = setting('illuminator_ros', 'TEXT', 'vendor_name', text)
+    model: str = setting('simulator', 'TEXT', 'model_name', text)
+    software_version: str = setting(__version__, 'TEXT', 'software_version', text)
+    hardware_version: str = setting('1.0.0', 'TEXT', 'hardware_version', text)
+    serial_number: str = setting(
+        '', 'TEXT', 'serial_number; several lights append their component id', text,
+        distinct=True)
+    status_interval: float = setting(
+        1.0, 'S', 'time between statuses; 0 sends them only on request (default: 1)', _period)
+    min_strobe_period: float = setting(
+        0.05, 'S', 'shortest strobe period (default: 0.05)', _period)
+    max_strobe_period: float = setting(10.0, 'S', 'longest strobe period (default: 10)', _period)
+    modes: tuple[Mode, ...] = setting(
+        tuple(MODES.values()), 'MODE,...',
+        f'modes that it can be configured to (default: {",".join(MODES)})', _modes)
+    mode_bitmask: int | None = setting(
+        None, 'N', 'mode_bitmask, if it does not follow from the modes', _byte)
+    ambient: float = setting(
+        25.0, 'DEG_C', 'ambient temperature (default: 25)', number(-60, 150))
+    thermal: ThermalProperties = setting(
+        ThermalProperties(), 'NAME=VALUE,...', 'thermal model, see below', _thermal, adds=True)
+    time_scale: float = setting(
+        1.0, 'X', 'factor by which it heats faster than real time (default: 1)',
+        number(0.001, 10000))
+    zoom_level: int | None = setting(
+        None, 'N', 'zoom_level, which makes the status one of 38 bytes', _byte)
+    color_mode: int | None = setting(None, 'N', 'color_mode, likewise', _byte)
+    gimbal_device_id: int | None = setting(None, 'N', 'gimbal_device_id, likewise', _byte)
+
+    @property
+    def strobe_range(self) -> StrobeRange:
+        """Return the strobe periods that are possible."""
+        return StrobeRange(self.min_strobe_period, self.max_strobe_period)
+
+    @property
+    def extension(self) -> Sequence[int]:
+        """Return the three fields that follow the common 35 bytes of some vendor's status."""
+        values = self.zoom_level, self.color_mode, self.gimbal_device_id
+        return () if values == (None,) * 3 else [value or 0 for value in values]
 
     @functools.cached_property
     def reported_bitmask(self) -> int:
@@ -120,13 +161,6 @@ class IlluminatorProperties:
         return sum({1 << mode if self.shifted_bitmask else mode for mode in self.modes})
 
 
-class Profile(NamedTuple):
-    """A light seen in the field."""
-
-    description: str
-    properties: IlluminatorProperties
-
-
 PROFILES = {
     'default': Profile('follows the protocol in everything', IlluminatorProperties()),
     # The emulator of the developer guide, with its deviations from the protocol.
@@ -134,30 +168,30 @@ PROFILES = {
         'the emulator of the MAVLink developer guide: 255/0, acknowledges before it applies, '
         'status at 1 Hz or not at all',
         IlluminatorProperties(
-            address=messages.Address(255, 0), strobe_range=StrobeRange(0.0, 10.0),
-            identity=Identity(
-                'Illuminator Vendor', 'Illuminator Model', 'Illuminator Software Version',
-                'Illuminator Hardware Version', 'Illuminator Serial Number'),
-            behaviour=IlluminatorBehaviour(
+            messages.Address(255, 0),
+            IlluminatorBehaviour(
                 heartbeat_state=mavlink.MAV_STATE_UNINIT, has_clock=False, fixed_rate=True,
                 status_on_change=False, terminates=False, filters_target=False,
                 answers_command_int=False, acks_target=False, apply_after=0.005,
-                accepts_nan=True))),
+                accepts_nan=True),
+            vendor='Illuminator Vendor', model='Illuminator Model',
+            software_version='Illuminator Software Version',
+            hardware_version='Illuminator Hardware Version',
+            serial_number='Illuminator Serial Number', min_strobe_period=0.0)),
     'ardusub': Profile(
         "a light of ArduSub: the autopilot's component and heartbeat, mode_bitmask 1 << mode, 0 "
         'for what it does not measure, brightness 0 is off',
         IlluminatorProperties(
-            address=messages.Address(1, mavlink.MAV_COMP_ID_AUTOPILOT1),
-            strobe_range=StrobeRange(0.0, 0.0),
-            modes=(Mode.INTERNAL_CONTROL,), shifted_bitmask=True,
-            behaviour=IlluminatorBehaviour(
+            messages.Address(1, mavlink.MAV_COMP_ID_AUTOPILOT1),
+            IlluminatorBehaviour(
                 heartbeat_type=mavlink.MAV_TYPE_SUBMARINE,
                 heartbeat_autopilot=mavlink.MAV_AUTOPILOT_ARDUPILOTMEGA, measures=False,
                 identifies=False, brightness_is_switch=True, status_on_change=False,
-                accepts_nan=True))),
+                accepts_nan=True),
+            shifted_bitmask=True, min_strobe_period=0.0, max_strobe_period=0.0,
+            modes=(Mode.INTERNAL_CONTROL,))),
     'extended': Profile(
         'a vendor extension: 38 bytes of status, with zoom_level, color_mode and '
         'gimbal_device_id',
-        IlluminatorProperties(behaviour=IlluminatorBehaviour(
-            extension=Extension(zoom_level=25, color_mode=1)))),
+        IlluminatorProperties(zoom_level=25, color_mode=1)),
 }

@@ -34,7 +34,6 @@ class ThermalProperties:
     """
     A first-order thermal model with two thresholds, each with hysteresis.
 
-    :param ambient: degC.
     :param rise: K above ambient at full power, in the steady state.
     :param time_constant: s.
     :param throttle_at: degC at which brightness is cut to ``throttle_to`` (a share, 0..1) ...
@@ -43,7 +42,6 @@ class ThermalProperties:
     :param shutdown_until: ... until it is cooler than this, degC.
     """
 
-    ambient: float = 25.0
     rise: float = 60.0
     time_constant: float = 120.0
     throttle_at: float = 80.0
@@ -65,17 +63,17 @@ class ThermalModel:
     """
     The temperature of a light over time.
 
+    :param ambient: degC.
     :ivar temperature: degC.
-    :ivar ambient: degC.
     :ivar sensor_failed: whether the light cannot measure its temperature.
     :ivar flags: the error flags of its report; THERMISTOR_FAILURE alone while the sensor has
         failed.
     :ivar output: the share (0..1) of the commanded brightness that the light gives.
     """
 
-    def __init__(self, properties: ThermalProperties) -> None:
+    def __init__(self, properties: ThermalProperties, ambient: float) -> None:
         self.properties = properties
-        self.ambient = self.temperature = properties.ambient
+        self.ambient = self.temperature = ambient
         self.sensor_failed = False
         self.flags = 0
         self.output = 1.0

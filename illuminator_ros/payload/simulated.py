@@ -27,7 +27,7 @@ from typing import Any, ClassVar, Generic, NamedTuple, TypeVar
 
 from .faults import Behaviour, FaultInjector, FAULTS, FaultTable
 from .listeners import Listeners
-from .simulated_settings import integer, Setting, Values
+from .simulated_settings import integer, one_of, Setting, settings_of, Values
 from ..mavlink import messages
 from ..mavlink.component import Endpoint
 from ..mavlink.deadline_queue import DeadlineQueue
@@ -96,13 +96,24 @@ class ConsoleCommand(Generic[T_contra, R_co]):
         return self.usage.partition(' ')[0]
 
 
+@dataclass(frozen=True)
+class Properties:
+    """
+    The properties of a simulated component, by default those of a kind of it.
+
+    :param behaviour: how it behaves at first, and without faults.
+    """
+
+    address: Address
+    behaviour: Behaviour = Behaviour()
+
+
 class SimulatedDevice(ABC):
     """
     The part of a simulated component that belongs to a payload: state, commands, messages.
 
     No I/O; ``now`` is s on the link's clock.
 
-    :param behaviour: how it behaves at first, and without faults.
     :ivar records: rows of the payload's :class:`RecordType`.
     :cvar messages: the classes of the messages that it takes, besides commands.
     :cvar sends: the classes of its messages.
@@ -117,8 +128,9 @@ class SimulatedDevice(ABC):
     faults: ClassVar[FaultTable] = FAULTS
     commands: ClassVar[Sequence[ConsoleCommand[Any, Effect]]] = ()
 
-    def __init__(self, behaviour: Behaviour) -> None:
-        self.behaviour = self.normal = behaviour
+    def __init__(self, properties: Properties) -> None:
+        self.properties = properties
+        self.behaviour = self.normal = properties.behaviour
         self.records: Listeners[Sequence[str]] = Listeners()
 
     def behave(self, behaviour: Behaviour, now: float) -> None:
@@ -181,6 +193,17 @@ class RecordType:
     columns: Sequence[str]
 
 
+P_co = TypeVar('P_co', bound=Properties, covariant=True)
+
+
+@dataclass(frozen=True)
+class Profile(Generic[P_co]):
+    """A kind of component seen in the field."""
+
+    description: str
+    properties: P_co
+
+
 @dataclass(frozen=True)
 class SimulatedType(Generic[D]):
     """
@@ -188,11 +211,10 @@ class SimulatedType(Generic[D]):
 
     :param noun: names one device, as in the option ``--light`` and in messages.
     :param plural: the key of the YAML file.
-    :param device: the class, for its faults and its console.
-    :param make: makes a device from settings and its address; ValueError if the settings
-        contradict each other.
-    :param address: the address by default, from settings.
-    :param profiles: descriptions of the values of the setting ``profile``.
+    :param device: the class; it is constructed from properties.
+    :param properties: by default. They declare the settings, see
+        :func:`~.simulated_settings.setting`.
+    :param profiles: the values of the setting ``profile``; the first one is the default.
     :param examples: arguments of the simulator, for ``--help``.
     :param notes: further paragraphs of it.
     :param records: records that it makes, None for none.
@@ -203,10 +225,8 @@ class SimulatedType(Generic[D]):
     noun: str
     plural: str
     device: type[D]
-    make: Callable[[Values, Address], D]
-    address: Callable[[Values], Address]
-    settings: Mapping[str, Setting] = field(default_factory=dict)
-    profiles: Mapping[str, str] = field(default_factory=dict)
+    properties: Properties
+    profiles: Mapping[str, Profile[Properties]] = field(default_factory=dict)
     examples: Sequence[str] = ()
     notes: str = ''
     records: RecordType | None = None
@@ -216,8 +236,11 @@ class SimulatedType(Generic[D]):
     @cached_property
     def all_settings(self) -> Mapping[str, Setting]:
         """Return the settings of the payload, and those of every payload."""
+        profile = {'profile': Setting(
+            'NAME', f'a kind of {self.noun}, see below (default: {next(iter(self.profiles))})',
+            one_of(self.profiles))} if self.profiles else {}
         return {
-            **self.settings,
+            **profile, **settings_of(type(self.properties)),
             'fault': Setting(f'[{self.noun.upper()}:]NAME[=VALUE]', 'a fault, see below',
                              self._read_faults, True),
             'seed': Setting('N', 'seed of the random faults (default: 0)', integer(0, 1 << 32)),
@@ -228,6 +251,26 @@ class SimulatedType(Generic[D]):
         for name in names:
             self.device.faults.parse(name)
         return names
+
+    def _normal(self, settings: Values) -> Properties:
+        return (self.profiles[settings['profile']].properties if 'profile' in settings
+                else self.properties)
+
+    def address(self, settings: Values) -> Address:
+        """Return the address by default."""
+        return self._normal(settings).address
+
+    def make(self, settings: Values, address: Address) -> D:
+        """
+        Return the device that settings describe.
+
+        :raises ValueError: if the settings contradict each other.
+        """
+        normal = self._normal(settings)
+        own = {name: settings[name] for name in settings_of(type(normal)) if name in settings}
+        return self.device(replace(normal, address=address, **{
+            name: replace(getattr(normal, name), **value) if isinstance(value, Mapping) else value
+            for name, value in own.items()}))
 
 
 @dataclass(frozen=True)

@@ -17,13 +17,14 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping
-from dataclasses import dataclass
-from typing import Any
+from dataclasses import dataclass, field, fields
+from typing import Any, TypeVar
 
 from .messages import GeoPoint
 
 # The values of settings by name, untyped: each is what its Setting.read returns.
 Values = Mapping[str, Any]
+T = TypeVar('T')
 
 
 @dataclass(frozen=True)
@@ -31,7 +32,8 @@ class Setting:
     """
     One setting: ``status_interval`` of the file is the option ``--status-interval``.
 
-    :param read: makes a value from text; raises ValueError, whose message gives the reason.
+    :param read: makes a value from text; raises ValueError, whose message gives the reason. A
+        mapping has the fields to replace in a value that is a dataclass.
     :param adds: whether a second value is added to the first, which it otherwise replaces.
     :param distinct: whether several components append their component ids to a common text.
     """
@@ -41,6 +43,21 @@ class Setting:
     read: Callable[[str], object]
     adds: bool = False
     distinct: bool = False
+
+
+def setting(
+    default: T, metavar: str, help: str, read: Callable[[str], object], *,  # noqa: A002
+    adds: bool = False, distinct: bool = False,
+) -> T:
+    """Return a field of properties that is a setting; see :class:`Setting`."""
+    return field(default=default, metadata={
+        'setting': Setting(metavar, help, read, adds, distinct)})
+
+
+def settings_of(properties: type) -> dict[str, Setting]:
+    """Return the settings that the fields of properties declare."""
+    return {one.name: one.metadata['setting'] for one in fields(properties)
+            if 'setting' in one.metadata}
 
 
 def number(low: float, high: float) -> Callable[[str], float]:

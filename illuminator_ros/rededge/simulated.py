@@ -35,7 +35,7 @@ from ..payload import simulated
 from ..payload.faults import Behaviour, Fault, FaultTable, faulty, SECONDS
 from ..payload.messages import Attitude, GeoPoint, GlobalPositionInt, is_finite, SystemTime
 from ..payload.rotation import Quaternion
-from ..payload.simulated_settings import geo_point, number, Setting, Values
+from ..payload.simulated_settings import geo_point, number, setting, Values
 
 # Until the camera hears a host.
 DEFAULT_SYSTEM_ID = 255
@@ -49,6 +49,8 @@ MAX_IMAGES = 1000
 FOCAL_LENGTH = 5.4
 # fix_type of GPS_RAW_INT from which the camera takes a position.
 FIX_3D = 3
+# Over a field near Zurich.
+DEFAULT_PLACE = '47.397742,8.545594,488'
 UNKNOWN = 0xFFFF
 UNKNOWN_SATELLITES = 0xFF
 # The camera's axes in the vehicle's FRD axes at a mount of 0/0/0: x down, y right, z back.
@@ -70,8 +72,7 @@ class RedEdgeBehaviour(Behaviour):
     """
     The behaviour of a simulated camera; the defaults follow the serial API.
 
-    :param firmware: its software version.
-    :param validity: s for which it uses injected state.
+    :param expires: whether it uses injected state for some time only.
     :param injectable: whether it uses injected state at all.
     :param feedback: whether it sends CAMERA_FEEDBACK.
     :param feedback_delay: s from an image to its CAMERA_FEEDBACK.
@@ -88,7 +89,6 @@ class RedEdgeBehaviour(Behaviour):
     heartbeat_base_mode: int = 2
     heartbeat_custom_mode: int = 3
     answers_commands: bool = False
-    firmware: rededge.Firmware = rededge.PARAMETERS
     adopts_system_id: bool = faulty(True, Fault(
         'fixed-system', 'keeps its system ID, and takes messages for that only', False))
     ping_component: int = faulty(0, Fault(
@@ -109,7 +109,7 @@ class RedEdgeBehaviour(Behaviour):
         Fault('any-shot', 'takes an image for each value of shot', tuple(range(256))))
     injectable: bool = faulty(True, Fault(
         'no-injection', 'ignores injected position, time and attitude', False))
-    validity: float = faulty(5.0, Fault('stale', 'uses injected state for ever', math.inf))
+    expires: bool = faulty(True, Fault('stale', 'uses injected state for ever', False))
     extension: bool = faulty(False, Fault(
         'extension',
         'sends CAMERA_FEEDBACK with its extension field, which MAVLink 1 does not have'))
@@ -241,11 +241,48 @@ def _angles(rotation: Quaternion) -> tuple[float, float, float]:
     return roll, pitch, yaw % 360
 
 
+def read_place(text: str) -> GeoPoint | None:
+    """
+    Read ``LAT,LON,ALT`` or ``none``.
+
+    :raises ValueError: if it is neither.
+    """
+    return None if text == 'none' else geo_point(text)
+
+
 def _interval(text: str) -> float:
     value = number(0, 3600)(text)
     if 0 < value < SHORTEST_INTERVAL:
         raise ValueError(f'{text} is shorter than {SHORTEST_INTERVAL:g}')
     return value
+
+
+@dataclass(frozen=True)
+class RedEdgeProperties(simulated.Properties):
+    """
+    The properties of a simulated camera.
+
+    :param address: until it hears a host.
+    :param interval: s between images, 0 for none.
+    :param validity: s for which injected state is used.
+    :param firmware: it has no captures, and no parameters, before the firmware that brought them.
+    :param own_gps: the position of its own GPS receiver, None without a fix.
+    """
+
+    address: Address = Address(DEFAULT_SYSTEM_ID, mavlink.MAV_COMP_ID_CAMERA)
+    behaviour: RedEdgeBehaviour = RedEdgeBehaviour()
+    interval: float = setting(
+        0.0, 'S', 'take an image every S seconds (default: 0, none)', _interval)
+    validity: float = setting(
+        5.0, 'S', 'time for which injected state is used (default: 5; firmware before 1.3.0 had '
+        '30)', number(0.001, 3600))
+    firmware: rededge.Firmware = setting(
+        rededge.PARAMETERS, 'X.Y.Z', 'its software version (default: 7.1.0); it takes images on '
+        'DIGICAM_CONTROL from 1.5.5 on, and reports the version from 7.1.0 on',
+        rededge.Firmware.parse)
+    own_gps: GeoPoint | None = setting(
+        read_place(DEFAULT_PLACE), 'LAT,LON,ALT', "position of the camera's own GPS, above mean "
+        f'sea level, or none (default: {DEFAULT_PLACE})', read_place)
 
 
 def _capture(camera: SimulatedRedEdge, words: list[str], now: float) -> simulated.Effect:
@@ -277,12 +314,8 @@ class SimulatedRedEdge(simulated.SimulatedDevice):
     time, attitude and mount angles of the host for some time after it has received them, and then
     the position and time of its own GPS.
 
-    :param address: the address until it hears a host.
-    :param validity: s for which injected state is used.
-    :param interval: s between images, 0 for none.
-    :param own_gps: the position of its own GPS receiver, None without a fix.
-    :param firmware: it has no captures, and no parameters, before the firmware that brought them.
     :ivar images: the latest images.
+    :ivar own_gps: the position of its own GPS receiver, None without a fix.
     """
 
     messages = (Heartbeat, rededge.Ping, rededge.GpsRawInt, rededge.GpsStatus, SystemTime,
@@ -292,17 +325,13 @@ class SimulatedRedEdge(simulated.SimulatedDevice):
              rededge.CameraFeedback)
     faults = FAULTS
     commands = COMMANDS
+    properties: RedEdgeProperties
     behaviour: RedEdgeBehaviour
 
-    def __init__(
-        self, address: Address, *, validity: float = 5.0, interval: float = 0.0,
-        own_gps: GeoPoint | None = None, firmware: rededge.Firmware = rededge.PARAMETERS,
-    ) -> None:
-        super().__init__(RedEdgeBehaviour(validity=validity, firmware=firmware))
-        self.own_gps = own_gps
+    def __init__(self, properties: RedEdgeProperties) -> None:
+        super().__init__(properties)
+        self.own_gps = properties.own_gps
         self.images: deque[Image] = deque(maxlen=MAX_IMAGES)
-        self._component = address.component
-        self._first_interval = interval
         # Unix time at 0 on the link's clock.
         self._epoch = 0.0
         self.restart(0.0)
@@ -317,7 +346,7 @@ class SimulatedRedEdge(simulated.SimulatedDevice):
         self._ground: float | None = None
         # The feedback of images, with its time.
         self._pending: deque[tuple[float, rededge.CameraFeedback]] = deque(maxlen=MAX_IMAGES)
-        self.set_interval(self._first_interval, now)
+        self.set_interval(self.properties.interval, now)
 
     def set_clock(self, unix_time: float, now: float) -> None:
         """See :meth:`SimulatedDevice.set_clock`: the time of its own GPS."""
@@ -349,7 +378,7 @@ class SimulatedRedEdge(simulated.SimulatedDevice):
         if isinstance(message, rededge.DigicamControl):
             return self._control(source, message, now)
         if isinstance(message, rededge.ParamRequestRead):
-            firmware = self.behaviour.firmware
+            firmware = self.properties.firmware
             is_known = (firmware >= rededge.PARAMETERS
                         and raw(message, 'param_id').rstrip(b'\0') == rededge.VERSION_PARAMETER)
             return (firmware.value(),) if is_known else ()
@@ -380,7 +409,7 @@ class SimulatedRedEdge(simulated.SimulatedDevice):
         self, source: Address, control: rededge.DigicamControl, now: float,
     ) -> Iterable[Message]:
         behaviour = self.behaviour
-        if control.shot not in behaviour.shots or behaviour.firmware < rededge.CAPTURES:
+        if control.shot not in behaviour.shots or self.properties.firmware < rededge.CAPTURES:
             return
         self._index = (self._index + behaviour.counts) & 0xFFFF
         is_panel = control.shot == rededge.Shot.PANEL
@@ -412,8 +441,9 @@ class SimulatedRedEdge(simulated.SimulatedDevice):
             **(_position(position.message) if position else _own_position(self.own_gps)),
             **_orientation(attitude.message if attitude else None,
                            mount.message if mount else None),
-            'camera': self._component, 'image': self._count, 'shot': shot.name.lower(),
-            'trigger': trigger, 'img_idx': self._index if trigger == 'mavlink' else None,
+            'camera': self.properties.address.component, 'image': self._count,
+            'shot': shot.name.lower(), 'trigger': trigger,
+            'img_idx': self._index if trigger == 'mavlink' else None,
             'time_utc_s': time_utc, 'time_source': time_source,
             'position_source': Source.INJECTED if position else self._own_source,
             'position_age_s': position and now - position.at,
@@ -432,7 +462,9 @@ class SimulatedRedEdge(simulated.SimulatedDevice):
         return Source.OWN if self.own_gps else Source.NONE
 
     def _fresh(self, injected: Injected[M] | None, now: float) -> Injected[M] | None:
-        return injected if injected and now - injected.at <= self.behaviour.validity else None
+        expired = injected and self.behaviour.expires and (
+            now - injected.at > self.properties.validity)
+        return None if expired else injected
 
     def _clock(self, now: float) -> tuple[float, Source]:
         """Return the time by the camera's clock, s since 1970, and its source."""
@@ -486,39 +518,8 @@ def _microseconds(seconds: float) -> int:
     return min(max(round(seconds * 1e6), 0), 2 ** 64 - 1)
 
 
-def read_place(text: str) -> GeoPoint | None:
-    """
-    Read ``LAT,LON,ALT`` or ``none``.
-
-    :raises ValueError: if it is neither.
-    """
-    return None if text == 'none' else geo_point(text)
-
-
-# Over a field near Zurich.
-DEFAULT_PLACE = '47.397742,8.545594,488'
-SETTINGS: Mapping[str, Setting] = {
-    'interval': Setting('S', 'take an image every S seconds (default: 0, none)', _interval),
-    'validity': Setting('S', 'time for which injected state is used (default: 5; firmware before '
-                        '1.3.0 had 30)', number(0.001, 3600)),
-    'firmware': Setting('X.Y.Z', 'its software version (default: 7.1.0); it takes images on '
-                        'DIGICAM_CONTROL from 1.5.5 on, and reports the version from 7.1.0 on',
-                        rededge.Firmware.parse),
-    'own_gps': Setting('LAT,LON,ALT', "position of the camera's own GPS, above mean sea level, or "
-                       f'none (default: {DEFAULT_PLACE})', read_place),
-}
-
-
-def _make(settings: Values, address: Address) -> SimulatedRedEdge:
-    return SimulatedRedEdge(address, **{
-        'own_gps': read_place(DEFAULT_PLACE),
-        **{name: settings[name] for name in SETTINGS if name in settings}})
-
-
 SIMULATED = simulated.SimulatedType(
-    'camera', 'cameras', SimulatedRedEdge, make=_make,
-    address=lambda settings: Address(DEFAULT_SYSTEM_ID, mavlink.MAV_COMP_ID_CAMERA),
-    settings=SETTINGS,
+    'camera', 'cameras', SimulatedRedEdge, RedEdgeProperties(),
     examples=(
         '--payload rededge --interval 1 --images flight.csv',
         '--payload rededge pty:///tmp/ttyREDEDGE',

@@ -18,7 +18,6 @@ from dataclasses import replace
 
 from illuminator_ros.illuminator.checks.requirements import REQUIREMENTS
 from illuminator_ros.illuminator.model import Configuration, Mode
-from illuminator_ros.illuminator.simulated import properties
 from illuminator_ros.illuminator.simulated_properties import (
     FAULTS,
     IlluminatorProperties,
@@ -33,8 +32,7 @@ from support.conformance_run import Run
 LIGHTS = {
     'switch': IlluminatorProperties(),
     'brightness is the switch': replace(
-        properties({'profile': 'ardusub'}, PROFILES['ardusub'].properties.address),
-        modes=(Mode.INTERNAL_CONTROL, Mode.EXTERNAL_SYNC)),
+        PROFILES['ardusub'].properties, modes=(Mode.INTERNAL_CONTROL, Mode.EXTERNAL_SYNC)),
 }
 BRIGHT = Configuration(Mode.INTERNAL_CONTROL, 100.0, 0.0, 0.0)
 # Requirements whose checks switch on a light that accepts invalid commands.

@@ -18,8 +18,7 @@ from dataclasses import replace
 import math
 
 from illuminator_ros.illuminator.checks.requirements import REQUIREMENTS
-from illuminator_ros.illuminator.model import Mode, StrobeRange
-from illuminator_ros.illuminator.simulated import properties
+from illuminator_ros.illuminator.model import Mode
 from illuminator_ros.illuminator.simulated_properties import (
     FAULTS,
     IlluminatorProperties,
@@ -27,7 +26,6 @@ from illuminator_ros.illuminator.simulated_properties import (
 )
 from illuminator_ros.mavlink.messages import Address
 from illuminator_ros.payload.checks.requirement import Verdict
-from illuminator_ros.payload.identity import Identity
 from illuminator_ros.payload.simulated import Effect
 import pytest
 from support.conformance_run import Run
@@ -85,8 +83,8 @@ RANDOM = {
 PROPERTIES = {
     'address': IlluminatorProperties(address=Address(255, 0)),
     'status-mode': IlluminatorProperties(mode_bitmask=0),
-    'strobe-limits': IlluminatorProperties(strobe_range=StrobeRange(5.0, 1.0)),
-    'information-text': IlluminatorProperties(identity=Identity('\x01\x02', 'm', '1', '1', '1')),
+    'strobe-limits': IlluminatorProperties(min_strobe_period=5.0, max_strobe_period=1.0),
+    'information-text': IlluminatorProperties(vendor='\x01\x02'),
     'mode-internal': IlluminatorProperties(modes=(), mode_bitmask=3),
 }
 # Profile -> all requirements that fail.
@@ -118,7 +116,7 @@ def test_properties_out_of_order_fail_their_requirement(name: str) -> None:
 
 @pytest.mark.parametrize('profile', PROFILES)
 def test_a_profile_fails_exactly_its_known_deviations_and_is_restored(profile: str) -> None:
-    run = Run(properties({'profile': profile}, PROFILES[profile].properties.address)).finish()
+    run = Run(PROFILES[profile].properties).finish()
     assert run.failed == DEVIATIONS[profile]
     assert run.runner.restored == 'the light is as it was'
 
@@ -201,7 +199,7 @@ def test_a_light_that_has_acknowledged_a_command_is_sent_each_attempt(
 
 
 LIE = 'MAV_RESULT_ACCEPTED, but then the status differs in '
-ARDUSUB = properties({'profile': 'ardusub'}, PROFILES['ardusub'].properties.address)
+ARDUSUB = PROFILES['ardusub'].properties
 
 
 @pytest.mark.parametrize(('light', 'fault', 'name', 'verdict', 'detail', 'line'), [

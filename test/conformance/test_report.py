@@ -24,14 +24,13 @@ from illuminator_ros.mavlink.messages import Address
 from illuminator_ros.payload.checks import report as reports
 from illuminator_ros.payload.checks.report import lines, RunReport, Table
 from illuminator_ros.payload.checks.requirement import Verdict
-from illuminator_ros.payload.identity import Identity
 import pytest
 from support.conformance_run import Run
 
 
 @pytest.fixture(scope='module')
 def run() -> Run:
-    return Run(IlluminatorProperties(identity=Identity('\x07bell', 'm', '1', '1', 'x&<y>')),
+    return Run(IlluminatorProperties(vendor='\x07bell', serial_number='x&<y>'),
                faults=('nan', 'any-target')).finish()
 
 

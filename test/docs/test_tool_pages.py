@@ -107,7 +107,7 @@ def test_the_thermal_model_is_listed_with_its_defaults() -> None:
     rows = table(SIMULATOR, 'value of `thermal`')
 
     assert [f'{name} {meaning.rpartition("(default: ")[2]}' for name, meaning in rows] == [
-        f'`{one.name}` {one.default:g})' for one in fields(ThermalProperties)[1:]]
+        f'`{one.name}` {one.default:g})' for one in fields(ThermalProperties)]
 
 
 def test_the_sample_file_of_the_simulator_is_valid() -> None:

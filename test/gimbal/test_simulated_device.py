@@ -21,13 +21,7 @@ import math
 
 from illuminator_ros.gimbal import messages as gimbal
 from illuminator_ros.gimbal.axes import Range
-from illuminator_ros.gimbal.simulated_device import (
-    GimbalBehaviour,
-    GimbalProperties,
-    MANAGER_TIMEOUT,
-    SIMULATED,
-    SimulatedGimbal,
-)
+from illuminator_ros.gimbal.simulated_device import MANAGER_TIMEOUT, SIMULATED, SimulatedGimbal
 from illuminator_ros.mavlink.dialect import mavlink
 from illuminator_ros.mavlink.messages import Address, CommandAck, CommandLong, Message
 from illuminator_ros.payload.messages import GimbalDeviceAttitudeStatus
@@ -264,7 +258,7 @@ def test_gm_2_the_frame_of_the_number_and_the_mode_of_the_axis_are_independent(
 
 
 def test_gm_5_an_axis_that_it_lacks_does_not_move_and_is_not_offered() -> None:
-    lacks = SIMULATED.settings['lacks'].read('has_yaw_axis, HAS_YAW_LOCK')
+    lacks = SIMULATED.all_settings['lacks'].read('has_yaw_axis, HAS_YAW_LOCK')
     bench = Bench(lacks=lacks)
     bench.point(0.0, -20.0, 30.0)
     assert bench.angles(2.0) == (0.0, -20.0, 0.0)
@@ -292,15 +286,9 @@ def test_a_person_turns_it_and_reads_its_state() -> None:
     ('roll_range', '-200,0', 'outside'), ('lacks', 'has_wings', 'is not one of has_retract')])
 def test_a_wrong_setting_is_refused_with_the_reason(name: str, text: str, reason: str) -> None:
     with pytest.raises(ValueError, match=reason):
-        SIMULATED.settings[name].read(text)
+        SIMULATED.all_settings[name].read(text)
 
 
 def test_a_yaw_without_a_stop_is_offered() -> None:
-    mechanics = Bench(yaw_range=Range(-math.pi, math.pi)).device.properties.mechanics
-    assert mechanics.capabilities & mavlink.GIMBAL_DEVICE_CAP_FLAGS_SUPPORTS_INFINITE_YAW
-
-
-def test_without_settings_it_is_the_gimbal_of_the_properties() -> None:
-    device = SIMULATED.make({}, DEVICE)
-    assert device.properties == GimbalProperties()
-    assert device.normal == GimbalBehaviour()
+    properties = Bench(yaw_range=Range(-math.pi, math.pi)).device.properties
+    assert properties.capabilities & mavlink.GIMBAL_DEVICE_CAP_FLAGS_SUPPORTS_INFINITE_YAW

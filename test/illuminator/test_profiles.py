@@ -14,7 +14,9 @@
 
 """The bridge serves each profile of the simulated light, which imitates a real light."""
 
-from illuminator_ros.illuminator.simulated import properties
+from dataclasses import replace
+from typing import Any
+
 from illuminator_ros.illuminator.simulated_properties import IlluminatorProperties, PROFILES
 from illuminator_ros.mavlink.dialect import encode, mavlink
 from illuminator_ros.mavlink.messages import CommandInt
@@ -25,9 +27,8 @@ from support.light_bench import LightBench
 ON_OFF, CONFIGURE = mavlink.MAV_CMD_ILLUMINATOR_ON_OFF, mavlink.MAV_CMD_DO_ILLUMINATOR_CONFIGURE
 
 
-def described(profile: str, **settings: object) -> IlluminatorProperties:
-    address = PROFILES[profile].properties.address
-    return properties({**settings, 'profile': profile}, address)
+def described(profile: str, **settings: Any) -> IlluminatorProperties:
+    return replace(PROFILES[profile].properties, **settings)
 
 
 @pytest.mark.parametrize(('profile', 'settings'), [
@@ -36,7 +37,7 @@ def described(profile: str, **settings: object) -> IlluminatorProperties:
     *(('default', {'mode_bitmask': bits}) for bits in (1, 3, 6)),
     ('default', {'status_interval': 0.0})])
 def test_each_kind_of_light_is_found_switched_configured_restored_and_never_lost(
-    profile: str, settings: dict[str, object],
+    profile: str, settings: dict[str, Any],
 ) -> None:
     pair = Pair([described(profile, **settings)]).settle()
     strobes = profile != 'ardusub'

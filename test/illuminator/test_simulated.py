@@ -22,7 +22,6 @@ from illuminator_ros.illuminator.simulated_properties import IlluminatorProperti
 from illuminator_ros.illuminator.thermal import ThermalProperties
 from illuminator_ros.mavlink import messages as mav
 from illuminator_ros.mavlink.dialect import encode, mavlink
-from illuminator_ros.payload.identity import Identity
 import pytest
 from support.light_bench import GROUND, LightBench
 from support.simulated_lights import simulated_lights
@@ -31,7 +30,8 @@ NAN, INF = float('nan'), float('inf')
 ON_OFF, CONFIGURE = mavlink.MAV_CMD_ILLUMINATOR_ON_OFF, mavlink.MAV_CMD_DO_ILLUMINATOR_CONFIGURE
 REQUEST, SET_INTERVAL = mavlink.MAV_CMD_REQUEST_MESSAGE, mavlink.MAV_CMD_SET_MESSAGE_INTERVAL
 ACCEPTED, DENIED = mavlink.MAV_RESULT_ACCEPTED, mavlink.MAV_RESULT_DENIED
-HOT = ThermalProperties(ambient=40.0, rise=80.0, time_constant=10.0)
+HOT: dict[str, Any] = {
+    'ambient': 40.0, 'thermal': ThermalProperties(rise=80.0, time_constant=10.0)}
 
 
 @pytest.fixture
@@ -61,7 +61,8 @@ def test_the_uptime_counts_from_the_start_and_wraps_at_32_bits(bench: LightBench
 
 
 def test_strings_that_are_too_long_are_cut_and_terminated() -> None:
-    bench = LightBench(identity=Identity('v' * 40, 'm' * 40, 's' * 40, 'h' * 40, 'n' * 40))
+    bench = LightBench(vendor='v' * 40, model='m' * 40, software_version='s' * 40,
+                       hardware_version='h' * 40, serial_number='n' * 40)
     _, information = bench.command(REQUEST, mav.INFORMATION_ID)
     assert encode(information)[16:] == (
         b'v' * 31 + b'\0' + b'm' * 31 + b'\0' + b's' * 23 + b'\0' + b'h' * 23 + b'\0'
@@ -120,7 +121,7 @@ def test_a_restart_resets_the_settings_and_keeps_the_temperature() -> None:
 
 
 def test_a_light_that_is_on_heats_and_dims_and_recovers() -> None:
-    bench = LightBench(thermal=HOT, status_interval=0.0)
+    bench = LightBench(**HOT, status_interval=0.0)
     bench.now = 100.0
     assert bench.status().temp_c == pytest.approx(40.0)
     bench.command(ON_OFF, 1)
@@ -139,7 +140,7 @@ def test_a_light_that_is_on_heats_and_dims_and_recovers() -> None:
 def test_a_strobe_heats_by_its_duty_cycle_and_not_at_0_percent(
     brightness: float, period: float, duty_cycle: float, rise: float,
 ) -> None:
-    bench = LightBench(thermal=HOT)
+    bench = LightBench(**HOT)
     bench.command(ON_OFF, 1)
     bench.command(CONFIGURE, 1, brightness, period, duty_cycle)
     bench.now = 100.0

@@ -24,8 +24,8 @@ THROTTLING = mavlink.ILLUMINATOR_ERROR_FLAGS_THERMAL_THROTTLING
 SHUTDOWN = mavlink.ILLUMINATOR_ERROR_FLAGS_OVER_TEMPERATURE_SHUTDOWN
 
 
-def model(**properties: float) -> ThermalModel:
-    return ThermalModel(ThermalProperties(**properties))
+def model(ambient: float = 25.0, **properties: float) -> ThermalModel:
+    return ThermalModel(ThermalProperties(**properties), ambient)
 
 
 @pytest.mark.parametrize(('seconds', 'power', 'temperature'), [

@@ -23,7 +23,7 @@ from illuminator_ros.mavlink.messages import Address
 from illuminator_ros.payload.checks.requirement import Conditions, Verdict
 from illuminator_ros.payload.checks.runner import CheckRunner
 from illuminator_ros.payload.simulated import Description, SimulatedComponents
-from payloads.winch import SimulatedWinch, WINCH
+from payloads.winch import SIMULATED, SimulatedWinch, WINCH
 from payloads.winch_checks import REQUIREMENTS
 import pytest
 from support.simulated_lights import describe
@@ -35,7 +35,7 @@ DECK = Address(1, 169)
 @pytest.mark.parametrize(('fault', 'failed'), [('', set()), ('lie', {'release'})])
 def test_a_winch_is_checked_and_restored_by_its_own_requirements_and_those_of_every_component(
         fault: str, failed: set[str]) -> None:
-    winch, checks = SimulatedWinch(), WINCH.load('checks')
+    winch, checks = SimulatedWinch(SIMULATED.properties), WINCH.load('checks')
     described: list[Description[Any]] = [
         describe(IlluminatorProperties()), Description(DECK, winch)]
     devices = SimulatedComponents(described, START)

@@ -185,8 +185,8 @@ class SimulatedWinch(simulated.SimulatedDevice):
     changes = frozenset({mavlink.MAV_CMD_DO_WINCH})
     sends = (WinchStatus,)
 
-    def __init__(self) -> None:
-        super().__init__(Behaviour(heartbeat_type=mavlink.MAV_TYPE_WINCH))
+    def __init__(self, properties: simulated.Properties) -> None:
+        super().__init__(properties)
         self.line_length = 0.0
 
     def streams(self) -> Mapping[int, float]:
@@ -220,5 +220,5 @@ class SimulatedWinch(simulated.SimulatedDevice):
 
 
 SIMULATED = simulated.SimulatedType(
-    'winch', 'winches', SimulatedWinch, make=lambda settings, address: SimulatedWinch(),
-    address=lambda settings: mav.Address(1, 169))
+    'winch', 'winches', SimulatedWinch, simulated.Properties(
+        mav.Address(1, 169), Behaviour(heartbeat_type=mavlink.MAV_TYPE_WINCH)))

@@ -26,7 +26,7 @@ from illuminator_ros.payload.simulated import Description, SimulatedComponents
 from illuminator_ros.rededge.checks import CHECKS, REQUIREMENTS
 from illuminator_ros.rededge.messages import CAPTURES as CAPTURES_FIRMWARE
 from illuminator_ros.rededge.messages import Firmware, PARAMETERS
-from illuminator_ros.rededge.simulated import FAULTS, SimulatedRedEdge
+from illuminator_ros.rededge.simulated import FAULTS, RedEdgeProperties, SimulatedRedEdge
 import pytest
 from support.checks_run import ChecksRun
 from support.virtual_link import START
@@ -89,14 +89,14 @@ def start(
 
     :param others: component ids of further cameras.
     """
-    camera = SimulatedRedEdge(
-        address, own_gps=GeoPoint(47.0, 8.0, 400.0), firmware=firmware)
+    camera = SimulatedRedEdge(RedEdgeProperties(
+        address, firmware=firmware, own_gps=GeoPoint(47.0, 8.0, 400.0)))
     if fault:
         camera.behave(FAULTS.add(camera.behaviour, fault), START)
     camera.set_clock(UTC + START, START)
     cameras = SimulatedComponents([
         Description(address, camera, seed=seed),
-        *(Description(one, SimulatedRedEdge(one))
+        *(Description(one, SimulatedRedEdge(RedEdgeProperties(one)))
           for one in (Address(255, other) for other in others))], START)
     return ChecksRun(CHECKS, cameras, version=version, utc=UTC, **options)
 

@@ -37,7 +37,7 @@ from illuminator_ros.rededge.input_states import (
     Stamp,
     UNKNOWN,
 )
-from illuminator_ros.rededge.simulated import COLUMNS, SimulatedRedEdge
+from illuminator_ros.rededge.simulated import COLUMNS, RedEdgeProperties, SimulatedRedEdge
 import pytest
 from support.virtual_link import START, VirtualLink
 
@@ -79,8 +79,8 @@ class Rig:
         self.flight = flight
         commands = CommandSender(Address(1, 191))
         self.client = RedEdgeClient(commands, Settings(settings))
-        self.camera = SimulatedRedEdge(
-            Address(255, 100), interval=IMAGE_INTERVAL, own_gps=GeoPoint(0.0, 0.0, 0.0))
+        self.camera = SimulatedRedEdge(RedEdgeProperties(
+            interval=IMAGE_INTERVAL, own_gps=GeoPoint(0.0, 0.0, 0.0)))
         cameras = SimulatedComponents([Description(Address(255, 100), self.camera)], START)
         self.camera.set_clock(UTC, START)
         self.link = PullableLink(Component(commands, [self.client]), cameras, version=1)

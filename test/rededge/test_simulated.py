@@ -38,6 +38,7 @@ from illuminator_ros.rededge.simulated import (
     FAULTS,
     Image,
     MAX_IMAGES,
+    RedEdgeProperties,
     SIMULATED,
     SimulatedRedEdge,
     Source,
@@ -71,8 +72,7 @@ class Camera:
     """A simulated camera whose clock a test moves."""
 
     def __init__(self, fault: str = '', **settings: Any) -> None:
-        self.device = SimulatedRedEdge(
-            Address(255, 100), **{'own_gps': OWN_PLACE, **settings})
+        self.device = SimulatedRedEdge(RedEdgeProperties(**{'own_gps': OWN_PLACE, **settings}))
         if fault:
             self.device.behave(FAULTS.add(self.device.behaviour, fault), START)
         self.endpoint = SimulatedComponents([Description(Address(255, 100), self.device)], START)
@@ -301,12 +301,11 @@ def test_line_of_the_view_has_the_sources_of_the_next_image() -> None:
 
 
 def test_settings_make_a_camera() -> None:
-    settings = {name: setting.read(text) for name, setting, text in (
-        (name, SIMULATED.all_settings[name], text) for name, text in (
-            ('interval', '2'), ('validity', '30'), ('own_gps', 'none')))}
+    settings = {name: SIMULATED.all_settings[name].read(text) for name, text in (
+        ('interval', '2'), ('validity', '30'), ('own_gps', 'none'))}
     device = SIMULATED.make(settings, Address(255, 100))
 
-    assert (device.own_gps, device.behaviour.validity) == (None, 30.0)
+    assert (device.own_gps, device.properties.validity) == (None, 30.0)
     assert device.next_deadline() == 2.0
     assert SIMULATED.make({}, Address(255, 100)).own_gps is not None
 

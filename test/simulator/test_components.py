@@ -21,9 +21,10 @@ from typing import Any, cast
 from illuminator_ros.cli.simulator import components
 from illuminator_ros.cli.simulator.options import parser
 from illuminator_ros.gimbal.simulated_manager import SIMULATED as MANAGERS
-from illuminator_ros.illuminator.model import Mode, StrobeRange
+from illuminator_ros.illuminator.model import Mode
 from illuminator_ros.illuminator.simulated import SIMULATED, SimulatedIlluminator
 from illuminator_ros.illuminator.simulated_properties import IlluminatorProperties
+from illuminator_ros.illuminator.thermal import ThermalProperties
 from illuminator_ros.mavlink.messages import Address
 from illuminator_ros.payload.simulated import Description, SimulatedType
 import pytest
@@ -67,8 +68,7 @@ def test_lights_are_counted_or_listed_or_have_the_address_of_their_profile(
 
 def test_without_arguments_a_light_follows_the_protocol() -> None:
     (light,), (one,) = described(), properties()
-    assert (one.strobe_range, one.reported_bitmask, one.identity.serial_number) == (
-        StrobeRange(0.05, 10.0), 3, 'SIM-1-243')
+    assert one == IlluminatorProperties()
     assert faults(light) == []
 
 
@@ -78,19 +78,17 @@ def test_each_option_sets_its_property() -> None:
         'B', '--serial-number', '0815', '--min-strobe-period', '0.2', '--max-strobe-period',
         '5', '--modes', 'internal_control', '--status-interval', '0.5', '--ambient', '40',
         '--thermal', 'rise=80,time_constant=30', '--time-scale', '10')
-    identity, thermal = light.identity, light.thermal
-    assert (identity.vendor, identity.model, identity.serial_number) == ('ACME', 'Sun', '0815')
-    assert (identity.software_version, identity.hardware_version) == ('2.0', 'B')
-    assert light.strobe_range == StrobeRange(0.2, 5.0)
-    assert (light.modes, light.reported_bitmask) == ((Mode.INTERNAL_CONTROL,), 1)
-    assert (light.status_interval, light.time_scale) == (0.5, 10.0)
-    assert (thermal.ambient, thermal.rise, thermal.time_constant) == (40, 80, 30)
+    assert light == IlluminatorProperties(
+        vendor='ACME', model='Sun', software_version='2.0', hardware_version='B',
+        serial_number='0815', min_strobe_period=0.2, max_strobe_period=5.0,
+        modes=(Mode.INTERNAL_CONTROL,), status_interval=0.5, ambient=40.0,
+        thermal=ThermalProperties(rise=80.0, time_constant=30.0), time_scale=10.0)
     assert [one.mode_bitmask for one in properties('--mode-bitmask', '0x6')] == [6]
     assert [one.seed for one in described('--seed', '3')] == [3]
 
 
 def test_several_lights_have_different_serial_numbers() -> None:
-    assert [one.identity.serial_number for one in properties(
+    assert [one.serial_number for one in properties(
         '--count', '2', '--serial-number', 'X')] == ['X-243', 'X-244']
 
 
@@ -107,8 +105,8 @@ def test_a_setting_is_for_every_kind_that_accepts_it() -> None:
     file = components.scenario({'managers': [{'id': '1/9', 'heading': 40}]}, 'f.yaml', types)
     light, manager = cast('list[Any]', components.components(parser(types).parse_args([
         '--profile', 'px4', '--fault', 'lie,frozen-axis', '--vendor', 'ACME']), file, types))
-    assert light.device.properties.identity.vendor == 'ACME'
-    assert manager.device.properties.gimbal.vendor == 'ACME'
+    assert light.device.properties.vendor == 'ACME'
+    assert manager.device.properties.vendor == 'ACME'
     assert [faults(one) for one in (light, manager)] == [['lie'], ['lie', 'frozen-axis']]
     assert not manager.device.behaviour.takes_pitchyaw
     with pytest.raises(components.SettingError, match="'ardusup' is not one of default"):
@@ -119,16 +117,16 @@ def test_a_setting_is_for_every_kind_that_accepts_it() -> None:
 def test_a_file_has_settings_for_all_lights_and_for_each() -> None:
     bow, other = described(file=FILE)
     first, second = properties(file=FILE)
-    assert (str(bow.address), bow.name, first.identity.serial_number) == ('1/243', 'bow', '815')
-    assert bow.device.behaviour.extension is not None
-    assert (first.thermal.ambient, first.thermal.rise, first.thermal.time_constant) == (60, 70, 60)
+    assert (str(bow.address), bow.name, first.serial_number) == ('1/243', 'bow', '815')
+    assert bow.device.properties.extension
+    assert (first.ambient, first.thermal.rise, first.thermal.time_constant) == (60, 70, 60)
     assert (second.modes, second.status_interval) == ((Mode.INTERNAL_CONTROL,), 0.2)
     assert (faults(bow), faults(other)) == (['lie'], ['drop', 'lie', 'thermistor'])
 
 
 def test_the_command_line_takes_precedence_over_the_file() -> None:
     lights = described('--ambient', '10', '--fault', 'bow:nan', file=FILE)
-    assert [one.device.properties.thermal.ambient for one in lights] == [10, 10]
+    assert [one.device.properties.ambient for one in lights] == [10, 10]
     assert faults(lights[0]) == ['lie', 'nan']
 
 
@@ -162,11 +160,9 @@ def test_an_error_in_a_file_names_its_place_and_the_reason(content: object, reas
       for option in ('--count', '--system-id', '--component-id')),
     (['--fault', '1/9:drop'], "there is no light '1/9'"),
     (['--fault', 'nope'], "no fault 'nope'"),
-    (['--min-strobe-period', '5', '--max-strobe-period', '1'],
-     'min_strobe_period is above max_strobe_period'),
     (['--thermal', 'throttle_until=90'], 'throttling thresholds are not in order'),
     (['--modes', 'a'], "--modes: 'a' is not one of internal_control, external_sync"),
-    (['--thermal', 'rise'], "--thermal: 'rise' is not one of ambient=VALUE"),
+    (['--thermal', 'rise'], "--thermal: 'rise' is not one of rise=VALUE"),
     (['--profile', 'x'], "--profile: 'x' is not one of default"),
     (['--ambient', 'x'], "--ambient: 'x' is not a number")])
 def test_options_that_contradict_each_other_are_refused_with_the_reason(

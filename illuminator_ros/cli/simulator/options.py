@@ -40,8 +40,8 @@ def payload_types(args: Iterable[str] | None, payloads: Mapping[str, PayloadType
 
 
 def _epilog(types: Types) -> str:
-    profiles = '\n'.join(f'  {name:10} {description}' for one in types
-                         for name, description in one.profiles.items())
+    profiles = '\n'.join(f'  {name:10} {profile.description}' for one in types
+                         for name, profile in one.profiles.items())
     paragraphs = [
         *([f'profiles:\n{profiles}'] if profiles else []),
         *(one.notes for one in types if one.notes),
