@@ -34,6 +34,11 @@ SOURCE = Endpoint(
     'source', String, "only with `sources`: the source that holds the device, `''` for none")
 RELEASE = Endpoint('release', Trigger, 'the source gives the device back; the answer names the '
                    'next holder')
+# Their values in the diagnostics, with their meanings for the pages.
+HOLDER_VALUES = {
+    'holder': 'only with `sources`: the source that holds the device, or `none`',
+    'held_s': 'for how long it does, s',
+}
 SOURCE_PARAMETERS = (
     ParameterSpec('sources', [],
                   'sources of commands, the highest first; empty = commands have no sources'),

@@ -25,7 +25,13 @@ from typing import Any
 import xml.etree.ElementTree as ET
 
 from diagnostic_msgs.msg import DiagnosticArray
+from illuminator_ros.gimbal.ros.diagnostics import DEVICE_VALUES
+from illuminator_ros.gimbal.ros.manager_node import MANAGER_VALUES
+from illuminator_ros.illuminator.ros.diagnostics import LAMP_VALUES
 from illuminator_ros.mavlink.link import Link
+from illuminator_ros.rededge.input_states import Input
+from illuminator_ros.rededge.ros.diagnostics import CAMERA_VALUES
+from illuminator_ros.ros.diagnostics import LINK_VALUES
 import pytest
 from rcl_interfaces.srv import SetParameters
 from rclpy.parameter import parameter_dict_from_yaml_file
@@ -178,6 +184,18 @@ def test_page_has_the_topics_and_services_of_the_node(name: str, running: Runnin
     for topic, _, quality, *_ in rows:
         if quality in QOS:
             assert running.qos[topic.replace('~', f'/{name}')] == QOS[quality], topic
+
+
+def test_pages_have_each_value_of_the_diagnostics_of_all_nodes(running: Running) -> None:
+    documented = {'link': LINK_VALUES, 'lamp': LAMP_VALUES, 'device': DEVICE_VALUES,
+                  'manager': MANAGER_VALUES, 'camera': CAMERA_VALUES}
+    inputs = '|'.join(name.value for name in Input)
+
+    for status, keys in running.reported.items():
+        node, _, part = status.partition(': ')
+        names = {re.sub(rf'^({inputs})(?=_|$)', 'INPUT', key) if part == 'camera' else
+                 key.replace('gimbals', 'lights') for key in keys}
+        assert names <= {*documented[part], 'level', 'node'}, status
 
 
 @each_node

@@ -38,6 +38,21 @@ from ...ros.diagnostics import (
 # The camera adopts the system id of the host, so only the component id identifies it.
 HARDWARE_ID = f'mavlink:{mavlink.MAV_COMP_ID_CAMERA}'
 
+# The values of the status of a camera, with their meanings for the pages.
+CAMERA_VALUES = {
+    'address': 'system and component id',
+    'connected': '`true` or `false`',
+    'heard_s_ago': 'age of the last heartbeat, s',
+    'round_trip_ms': 'of the last answered PING',
+    'pings_unanswered': 'PINGs without a reply since the last reply',
+    'images': 'images that were reported since the start',
+    'image_index': 'number of the newest image',
+    'INPUT': f'state of an input, such as `fix`: {", ".join(one.value for one in InputState)}',
+    'INPUT_s_ago': 'its age, s',
+    **dict.fromkeys(('INPUT_refused', 'INPUT_refused_s_ago', 'INPUT_refusal'), 'only after a '
+                    'refusal: how often, age of the last one in s, and its reason'),
+}
+
 
 def reports(
     link: LinkDiagnostics, *, camera: CameraSnapshot, feeder: FeederSnapshot, started: float,
