@@ -17,12 +17,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 import math
 
 from . import events
 from .command_sources import LightSources
 from .light_configuration import LightConfiguration
+from .light_queries import LightQueries, STATUS
 from .light_switch import LightSwitch, RULES, SwitchRule
 from .messages import STATUS_ID
 from .model import Changes, SafetyLimits, Status, StrobeRange
@@ -33,12 +34,7 @@ from ..mavlink.messages import Address
 from ..payload.arbitration import Cause, HolderChanged
 from ..payload.attempt import Done, Result, Target
 from ..payload.command_sources import DEFAULT, SourceSettings
-from ..payload.identity import Identity, IdentityQuery
-
-# s without a status after which the light is asked for one, and between the requests.
-STATUS_TIMEOUT = 2.5
-# s; enough for two commands in sequence, each with its tries, and for their messages.
-REFRESH_LIMIT = 5.0
+from ..payload.identity import Identity
 
 
 @dataclass(frozen=True)
@@ -101,81 +97,6 @@ class _Newest:
         return status.temperature
 
 
-@dataclass(eq=False)
-class _Refresh:
-    """
-    A request for COMPONENT_INFORMATION_BASIC and ILLUMINATOR_STATUS.
-
-    It succeeds when a status has come: not every light has an identity.
-
-    :param outcomes: '' for a message that has come, else why it has not.
-    """
-
-    done: Done
-    started: float
-    outcomes: dict[str, str] = field(default_factory=dict)
-
-    def has_ended(self, now: float) -> bool:
-        return len(self.outcomes) == 2 or now >= self.started + REFRESH_LIMIT
-
-    def result(self, now: float) -> Result:
-        failures = [(name, self.outcomes.get(name, 'nothing came'))
-                    for name in ('ILLUMINATOR_STATUS', 'COMPONENT_INFORMATION_BASIC')]
-        parts = [f'{name}: {failure or "received"}' for name, failure in failures]
-        return Result(not failures[0][1],
-                      f'{", ".join(parts)} ({format_seconds(now - self.started)})')
-
-
-class _StatusQuery:
-    """
-    Requests the status of a light that does not send it by itself.
-
-    :param interval: s between the statuses that the light was asked for; 0 for its own.
-    :param heartbeat_timeout: s of silence after which the light is lost.
-    """
-
-    def __init__(self, target: Target, interval: float, heartbeat_timeout: float) -> None:
-        self._target = target
-        self._timeout = max(STATUS_TIMEOUT, 2.5 * interval)
-        # s of silence after which the light is asked for a status, so that its answer arrives
-        # within the heartbeat timeout.
-        self._longest_silence = min(STATUS_TIMEOUT, heartbeat_timeout / 1.2)
-        self._asked_at = -math.inf
-        self._due = math.inf
-
-    def begin(self, now: float) -> None:
-        """Request a status now: the light is heard, or has restarted."""
-        self._due = now + STATUS_TIMEOUT
-        self._target.request_status(now)
-
-    def end(self) -> None:
-        """Request none: the light is lost."""
-        self._due = math.inf
-
-    def reported(self, now: float) -> None:
-        """Note a status."""
-        self._due = now + self._timeout
-
-    def need(self, due: float) -> None:
-        """Request a status at a time, s, or before."""
-        self._due = min(self._due, due)
-
-    def poll(self, now: float, silent_since: float) -> None:
-        """Request a status that is due."""
-        if now >= self.next_deadline(silent_since):
-            self._asked_at, self._due = now, now + STATUS_TIMEOUT
-            self._target.request_status(now)
-
-    def next_deadline(self, silent_since: float) -> float:
-        """
-        Return when a status is requested, s.
-
-        :param silent_since: the time of the last message, s; infinity while the light is lost.
-        """
-        # The light may have no heartbeat, and a status interval above the heartbeat timeout.
-        return min(self._due, max(silent_since, self._asked_at) + self._longest_silence)
-
-
 class Light:
     """
     One component that is an illuminator: liveness, identity, switch and configuration. No I/O.
@@ -209,9 +130,8 @@ class Light:
         self._changed = changed
         self._target = Target(
             address, commands, self._command_ended, kind='light', status_id=STATUS_ID,
-            status_name='ILLUMINATOR_STATUS')
-        self._identity_query = IdentityQuery(self._target)
-        self._status_query = _StatusQuery(
+            status_name=STATUS)
+        self._queries = LightQueries(
             self._target, settings.status_interval, settings.heartbeat_timeout)
         self._configuration = LightConfiguration(
             self._target, emit, limits=settings.limits, restore=settings.restore_configuration,
@@ -227,7 +147,6 @@ class Light:
         self._is_shared = False
         self._link_failure = ''
         self._sources = LightSources(settings.sources)
-        self._refreshes: list[_Refresh] = []
 
     def _command_ended(self, result: CommandResult, now: float) -> None:
         self.has_answered |= result.result is not None
@@ -246,7 +165,7 @@ class Light:
             # A status request that was sent to the silent light may be resent only half a second
             # later.
             self._target.cancel_status_request(now)
-            self._set_up(now)
+            self._queries.begin(now)
             self._emit(events.LightConnected(self.address))
 
     def take_status(self, status: Status, now: float, sender: int = 0) -> None:
@@ -261,10 +180,9 @@ class Light:
             commanded=self._switch.is_changing or self._configuration.is_changing)
         if report is None:
             if self._tracker.proof_due < math.inf:
-                self._status_query.need(self._tracker.proof_due)
+                self._queries.need_status(self._tracker.proof_due)
             return
         self._newest.take(status, now)
-        self._status_query.reported(now)
         if restarted:
             self._restarted(now)
         if self._is_shared is not report.shared_address:
@@ -277,17 +195,14 @@ class Light:
             switched_at=self._switch.switched_at,
             brightness_is_switch=self._switch.brightness.is_switch)
         self._tracker.checked()
-        if self._refreshes:
-            for refresh in self._refreshes:
-                refresh.outcomes['ILLUMINATOR_STATUS'] = ''
-            self._check_refreshes(now)
+        self._queries.take_status(now)
         # Last, so that a caller has its answer before topics show the change.
         self._emit(events.StatusReceived(self.address, status, now, self._newest.temperature))
 
     def take_identity(self, identity: Identity, now: float) -> None:
         """Take a COMPONENT_INFORMATION_BASIC."""
         self.heard(now)
-        self._identity_query.take(identity, now)
+        self._queries.take_identity(identity, now)
         self._emit(events.LightIdentified(self.address, identity))
 
     def lose(self, reason: str, now: float) -> None:
@@ -296,7 +211,7 @@ class Light:
             self.connected = False
             self.lost_at = now
             self._tracker.lost()
-            self._status_query.end()
+            self._queries.end()
             self._emit(events.LightLost(self.address, reason))
             message = self.unreachable(now)
             # An OFF may reach the light at any time.
@@ -317,17 +232,8 @@ class Light:
         self._switch.keep_off()
         is_on = self.status.enabled if self.status else None
         self._emit(events.LightRestarted(self.address, self._switch.state.enabled, is_on))
-        self._set_up(now)
+        self._queries.begin(now)
         self._configuration.restarted(now)
-
-    def _set_up(self, now: float) -> None:
-        """Request what a light does not send by itself, when it is heard or has restarted."""
-        interval = self._settings.status_interval
-        if interval > 0:
-            self._target.send(
-                mavlink.MAV_CMD_SET_MESSAGE_INTERVAL, (float(STATUS_ID), interval * 1e6), now)
-        self._status_query.begin(now)
-        self._identity_query.ask(now)
 
     # Values
 
@@ -351,12 +257,12 @@ class Light:
 
     def snapshot(self, now: float) -> events.LightSnapshot:
         """Return the state, for any thread."""
-        configuration, query = self._configuration, self._identity_query
+        configuration, queries = self._configuration, self._queries
         return events.LightSnapshot(
             self.address, self.connected, self.heard_at, self.status, self._newest.at,
             self._settings.status_interval, self.restarts, self._newest.temperature,
             configuration.confirmed, configuration.discrepancy, configuration.guard.exceeded,
-            query.identity, query.is_settled(now), self._tracker.conflict.detected,
+            queries.identity, queries.identity_is_settled(now), self._tracker.conflict.detected,
             self.unreachable(now), self._sources.shown_holder, self._sources.since)
 
     def change_settings(self, settings: Settings, now: float) -> None:
@@ -555,9 +461,7 @@ class Light:
         self._sources = LightSources(None)
         self._switch.close(refusal, now)
         self._configuration.replace(refusal, now)
-        refreshes, self._refreshes = self._refreshes, []
-        for refresh in refreshes:
-            refresh.done(Result(False, refusal), now)
+        self._queries.close(refusal, now)
         self._changed(self, now)
 
     def switch_off_finally(self, now: float, report: Done) -> None:
@@ -578,29 +482,9 @@ class Light:
 
     def refresh(self, now: float, done: Done) -> None:
         """Ask for identity and status again; ``done`` is called once with the result."""
-        if not self._can_reach(now, done):
-            return
-        refresh = _Refresh(done, now)
-        self._refreshes.append(refresh)
-
-        def identified(failure: str, now: float) -> None:
-            refresh.outcomes['COMPONENT_INFORMATION_BASIC'] = failure
-            self._check_refreshes(now)
-
-        def answered(result: CommandResult, now: float) -> None:
-            if not result.accepted:
-                refresh.outcomes.setdefault('ILLUMINATOR_STATUS', result.describe_failure())
-                self._check_refreshes(now)
-
-        self._identity_query.ask(now, identified)
-        self._target.request_status(now, answered)
-        self._changed(self, now)
-
-    def _check_refreshes(self, now: float) -> None:
-        ended = [one for one in self._refreshes if one.has_ended(now)]
-        self._refreshes = [one for one in self._refreshes if one not in ended]
-        for refresh in ended:
-            refresh.done(refresh.result(now), now)
+        if self._can_reach(now, done):
+            self._queries.refresh(now, done)
+            self._changed(self, now)
 
     def request_status(self, now: float) -> None:
         """Ask for a status, unless such a request is under way."""
@@ -617,21 +501,17 @@ class Light:
         # Compute the same sum as next_deadline(); the difference is rounded differently.
         if self.connected and now >= self.heard_at + self._settings.heartbeat_timeout:
             self.lose(f'no heartbeat for {format_seconds(now - self.heard_at)}', now)
-        self._status_query.poll(now, self._silent_since)
-        self._identity_query.poll(now)
+        self._queries.poll(now, self._silent_since)
         self._change_holder(self._sources.poll(now), now)
         self._switch.poll(now, connected=self.connected)
         self._configuration.poll(now, connected=self.connected)
-        self._check_refreshes(now)
 
     def next_deadline(self) -> float:
         """Return when :meth:`poll` has something to do."""
         connected = self.connected
         return min(
-            self._status_query.next_deadline(self._silent_since),
-            self._identity_query.next_deadline(),
+            self._queries.next_deadline(self._silent_since),
             self._switch.next_deadline(connected=connected),
             self._configuration.next_deadline(connected=connected),
             self.heard_at + self._settings.heartbeat_timeout if connected else math.inf,
-            min((one.started for one in self._refreshes), default=math.inf) + REFRESH_LIMIT,
             self._sources.next_deadline())

@@ -22,8 +22,8 @@ command before it that is not confirmed yet, and the confirmed ones for the rest
 from __future__ import annotations
 
 from collections.abc import Callable, Container
-from dataclasses import dataclass, replace
-from enum import Enum
+from dataclasses import dataclass, field, replace
+from enum import IntEnum
 import math
 
 from . import events
@@ -68,13 +68,13 @@ REPEATS = 3
 REPEAT_INTERVAL = 2.0
 
 
-class Requirement(Enum):
-    """The reason why values must be sent that no request has asked for."""
+class Requirement(IntEnum):
+    """The reason why values must be sent that no request has asked for; the highest counts."""
 
-    OVERRIDE = 'override'
-    RESTART = 'restart'
-    LIMIT = 'limit'
-    OTHER_SENDER = 'other sender'
+    OTHER_SENDER = 0
+    OVERRIDE = 1
+    LIMIT = 2
+    RESTART = 3
 
 
 # Values with these reasons are dropped when the light has accepted and not applied them; a
@@ -87,16 +87,19 @@ class Required:
     """
     Values that must be sent, see :class:`Requirement`.
 
+    :param values: empty if there are none.
     :param attempts: how often the light has accepted them but then reported others.
     :param due: when they are sent next, s.
+    :param is_sent: whether a command with them was sent.
     :param has_ended: whether a command with them has ended, or none can be sent.
     :param failure: why the last attempt failed, '' if it did not.
     """
 
-    values: Changes
-    requirement: Requirement
-    due: float
+    values: Changes = field(default_factory=dict)
+    requirement: Requirement = Requirement.OTHER_SENDER
+    due: float = math.inf
     attempts: int = 0
+    is_sent: bool = False
     has_ended: bool = False
     failure: str = ''
 
@@ -104,6 +107,18 @@ class Required:
     def limit(self) -> float:
         """Return s that the next attempt may take."""
         return RETRY_LIMIT if self.has_ended else CONFIGURE_LIMIT
+
+    @property
+    def delays_on(self) -> bool:
+        """Whether an ON waits until a command with them has ended."""
+        return (bool(self.values) and not self.has_ended
+                and self.requirement is not Requirement.OTHER_SENDER)
+
+    def and_also(self, values: Changes, requirement: Requirement, due: float) -> Required:
+        """Return these values and others; only overrides replace values that wait."""
+        merged = ({**self.values, **values} if requirement is Requirement.OVERRIDE
+                  else {**values, **self.values})
+        return Required(merged, max(requirement, self.requirement), due)
 
 
 @dataclass
@@ -197,9 +212,7 @@ class LightConfiguration:
         self._reconciler: Reconciler[Status] = Reconciler(target, self._ended)
         self._report: StatusReport[Status] | None = None
         self._setpoint: float | None = None
-        # The values that must be sent, and those of the last attempt.
-        self._required: Required | None = None
-        self._sending: Required | None = None
+        self._required = Required()
         self._unapplied = _Unapplied(None, None, '')
         # The result of the last command, None before the first.
         self._outcome: Result | None = None
@@ -210,7 +223,7 @@ class LightConfiguration:
     @property
     def discrepancy(self) -> str:
         """Why the light does not have a configuration that it should have, '' if it has."""
-        return (self._required.failure if self._required else '') or self._unapplied.failure
+        return self._required.failure or self._unapplied.failure
 
     @property
     def is_changing(self) -> bool:
@@ -221,20 +234,18 @@ class LightConfiguration:
     def has_values_to_send(self) -> bool:
         """Whether a command of ours is under way, or values wait."""
         return (self._reconciler.is_busy or self._setpoint is not None
-                or self._required is not None)
+                or bool(self._required.values))
 
     @property
     def may_send_after_restart(self) -> bool:
         """Whether a light that has restarted may be sent a configuration."""
-        return (self.guard.is_limiting or self._required is not None
+        return (self.guard.is_limiting or bool(self._required.values)
                 or self._restores and self.confirmed is not None)
 
     @property
     def must_send_before_on(self) -> bool:
         """Whether the light must be sent a configuration before it is switched on."""
-        required = self._required
-        return (required is not None and not required.has_ended
-                and required.requirement is not Requirement.OTHER_SENDER)
+        return self._required.delays_on
 
     @property
     def sent_at(self) -> float:
@@ -255,8 +266,8 @@ class LightConfiguration:
         """Replace the limits, and bring a light that exceeds them back within them."""
         self.guard.limits = limits
         self.guard.renew()
-        if self._required and self._required.requirement is Requirement.LIMIT:
-            self._required = None
+        if self._required.requirement is Requirement.LIMIT:
+            self._required = Required()
         desired = self._reconciler.desired
         if desired is not None and isinstance(desired.change, Configure):
             goal = desired.change.configuration
@@ -274,8 +285,8 @@ class LightConfiguration:
     def change_reassert(self, reassert: bool) -> None:
         """Undo changes by other senders from now on, or follow them."""
         self._undoing = undoing_limit(reassert)
-        if self._required and self._required.requirement is Requirement.OTHER_SENDER:
-            self._required = None
+        if self._required.requirement is Requirement.OTHER_SENDER:
+            self._required = Required()
 
     # Requests
 
@@ -318,20 +329,11 @@ class LightConfiguration:
 
         :param values: by name, checked, except against the limits that the light reports.
         """
-        self._require({**self._required_values, **values}, Requirement.OVERRIDE,
-                      self._first_due(now))
+        self._required = self._required.and_also(
+            values, Requirement.OVERRIDE, self._first_due(now))
 
     def _first_due(self, now: float) -> float:
         return now if self.confirmed else now + FIRST_STATUS_TIMEOUT
-
-    def _require(self, values: Changes, requirement: Requirement, due: float) -> None:
-        """Send values when they are due; the reason of values that already wait is kept."""
-        self._required = Required(
-            values, self._required.requirement if self._required else requirement, due)
-
-    @property
-    def _required_values(self) -> Changes:
-        return self._required.values if self._required else {}
 
     def replace(self, message: str, now: float) -> None:
         """End all requests, and drop the required values: an OFF or the end replaces them."""
@@ -347,18 +349,17 @@ class LightConfiguration:
 
     def drop_required(self) -> None:
         """Drop the required values: an OFF replaces them, and they would be an ON."""
-        if self._required and self._required.requirement is Requirement.LIMIT:
+        if self._required.requirement is Requirement.LIMIT:
             # The light may be switched on beyond the limit.
             self.guard.renew()
-        self._required = None
+        self._required = Required()
 
     def _drop_fields(self, names: Container[str]) -> None:
         """Remove fields from the required values."""
-        if self._required:
-            self._required.values = {name: value for name, value in self._required.values.items()
-                                     if name not in names}
-            if not self._required.values:
-                self._required = None
+        self._required.values = {name: value for name, value in self._required.values.items()
+                                 if name not in names}
+        if not self._required.values:
+            self._required = Required()
 
     def _checked(self, changes: Changes) -> dict[str, float]:
         return {name: checked(name, value, self._strobe_range) for name, value in changes.items()}
@@ -418,7 +419,7 @@ class LightConfiguration:
         assert isinstance(change, Configure)
         self._outcome = result
         if result.success:
-            self._drop_fields([name for name, value in self._required_values.items()
+            self._drop_fields([name for name, value in self._required.values.items()
                                if name in change.names
                                or value == getattr(change.configuration, name)])
             self._accept(change.configuration, status)
@@ -433,17 +434,15 @@ class LightConfiguration:
         required = self._required
         if result.success:
             self._restored(True, result.message)
-        elif required is None or required is not self._sending:
-            return
-        elif result.superseded:
+        elif required.is_sent and result.superseded:
             required.due = now
-        else:
+        elif required.is_sent:
             required.has_ended = True
             required.failure = result.message
             required.attempts += result.contradicted
             if (result.permanent or required.attempts >= MAX_CONTRADICTIONS
                     or required.attempts and required.requirement in _SENT_ONCE):
-                self._required = None
+                self._required = Required()
                 self._unapplied.failure = result.message
                 self._restored(False, result.message)
 
@@ -455,19 +454,17 @@ class LightConfiguration:
             confirmed = self.confirmed
             values = {name: getattr(confirmed, name) for name in FIELDS
                       if name != 'mode' or confirmed.mode}
-            # Overrides that have not been sent yet replace confirmed values.
-            self._required = Required(
-                {**values, **self._required_values}, Requirement.RESTART, now)
-        elif self._required and self._required.requirement in _SENT_ONCE:
+            self._required = self._required.and_also(values, Requirement.RESTART, now)
+        elif self._required.requirement in _SENT_ONCE:
             # The light has other values now.
-            self._required = None
+            self._required = Required()
         # The restart may have undone the command that brought the light within the limits.
         self.guard.renew()
 
     def retry_required(self, now: float) -> None:
         """Make required values due, since the light is heard or a command was cancelled."""
         required = self._required
-        if required and required.due < math.inf:
+        if required.due < math.inf:
             required.due, required.has_ended = self._first_due(now), False
 
     def lost(self, message: str, now: float) -> None:
@@ -512,17 +509,17 @@ class LightConfiguration:
         required = self._required
         if self.confirmed is None:
             self._adopt(reported, events.ChangeCause.FIRST_STATUS)
-            if required:
+            if required.values:
                 required.due, required.has_ended = min(required.due, now), False
-        elif required and not report.shared_address and (
+        elif required.values and not report.shared_address and (
                 shown := self._shown_goal(required, self.confirmed, reported, status)):
             # The light has kept the values, another sender has restored them, or our command was
             # acknowledged too late.
-            self._required = None
+            self._required = Required()
             self._accept(shown, status)
             if required.has_ended:
                 self._restored(True, f'{shown.describe(list(required.values))}, {CONFIRMED}')
-        elif ((required is None or required.requirement is Requirement.OVERRIDE)
+        elif ((not required.values or required.requirement is Requirement.OVERRIDE)
                 and can_follow and not report.shared_address):
             self._follow(status, self.confirmed, reported, now, switched_at=switched_at,
                          brightness_is_switch=brightness_is_switch)
@@ -614,9 +611,8 @@ class LightConfiguration:
             return False
         due = self._undoing.take(now)
         if due is not None:
-            self._require(
-                {**{name: getattr(confirmed, name) for name in names}, **self._required_values},
-                Requirement.OTHER_SENDER, due)
+            self._required = self._required.and_also(
+                {name: getattr(confirmed, name) for name in names}, Requirement.OTHER_SENDER, due)
         self._emit(events.ChangedByOther(
             self._address, reported.describe(names), due is not None))
         return due is not None
@@ -624,14 +620,12 @@ class LightConfiguration:
     def _keep_limits(self, reported: Configuration, now: float) -> None:
         """Bring a light that exceeds a limit back within it, once."""
         # Values that undo a change by another sender may be due only later.
-        is_free = (self._required is None
-                   or self._required.requirement is Requirement.OTHER_SENDER)
-        if (self.guard.check(reported, self._strobe_range) and is_free
+        if (self.guard.check(reported, self._strobe_range)
+                and self._required.requirement is Requirement.OTHER_SENDER
                 and (due := self.guard.due(now)) is not None):
             limited = self.guard.limits.clipped(reported, self._strobe_range)
             values = {name: getattr(limited, name) for name in reported.differences(limited)}
-            self._required = Required(
-                {**values, **self._required_values}, Requirement.LIMIT, due)
+            self._required = self._required.and_also(values, Requirement.LIMIT, due)
 
     def _is_own(
         self, name: str, reported: Configuration, switched_at: float, now: float,
@@ -677,9 +671,7 @@ class LightConfiguration:
 
     @property
     def _required_due(self) -> float:
-        if self._required is None or self._must_wait():
-            return math.inf
-        return self._required.due
+        return math.inf if self._must_wait() else self._required.due
 
     def _send_setpoint(self, value: float, now: float) -> None:
         is_unconfirmed = self._reconciler.is_busy or (
@@ -703,7 +695,6 @@ class LightConfiguration:
 
     def _send_required(self, now: float) -> None:
         required = self._required
-        assert required is not None
         limit = required.limit
         required.due = now + RESTORE_INTERVAL + limit - CONFIGURE_LIMIT
         for name, value in list(required.values.items()):
@@ -725,7 +716,7 @@ class LightConfiguration:
             return
         if self.confirmed is None:
             required.due += FIRST_STATUS_TIMEOUT
-        self._sending = required
+        required.is_sent = True
         self._reconciler.want(Desired(change, _REQUIRED, since=now, limit=limit), now)
 
     def next_deadline(self, *, connected: bool) -> float:

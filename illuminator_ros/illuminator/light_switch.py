@@ -191,7 +191,7 @@ class LightSwitch:
         """Undo switches by other senders from now on, or follow them."""
         self._undoing = undoing_limit(reassert)
         undone, self.state.undoing = self.state.undoing, None
-        if undone is not None and self._reconciler.desired == undone:
+        if undone is not None and self._reconciler.desired is undone:
             self._reconciler.cancel('superseded by external_changes', now, superseded=True)
 
     # Desired values
@@ -244,6 +244,9 @@ class LightSwitch:
         desired, self._due = decide(self._rules, state, now)
         if desired is None:
             return
+        # A rule may make an equal value each time.
+        known = (state.off, state.undoing, state.asked)
+        desired = next((one for one in known if one == desired), desired)
         if state.asked and desired.change == state.asked.change:
             desired = state.asked
         elif done is not None:
@@ -252,15 +255,15 @@ class LightSwitch:
             done(Result(False, desired.reason), now)
             done = None
         if _is_off(desired.change):
-            if desired not in (state.off, state.asked, state.undoing):
+            if desired not in known:
                 if self.is_known_off(now):
                     return
                 self._require_off(desired)
-            if self.brightness.is_switch and desired != self._reconciler.desired:
+            if self.brightness.is_switch and desired is not self._reconciler.desired:
                 # A brightness that is sent later would be an ON.
                 self._configuration.replace('superseded by off', now)
             self._undoes_off = False
-        if desired != self._reconciler.desired:
+        if desired is not self._reconciler.desired:
             self._due = -math.inf
         self._reconciler.want(desired, now, done, is_stream=is_stream)
 
@@ -279,9 +282,9 @@ class LightSwitch:
         detail = desired.reason
         if desired is state.asked:
             state.asked, detail = None, self._detail
-        elif desired == state.off:
+        elif desired is state.off:
             state.off = self._failed(desired, result, now + REPEAT_INTERVAL)
-        elif desired == state.undoing:
+        elif desired is state.undoing:
             state.undoing = self._failed(
                 desired, result,
                 self._undoing.take(now) if self._undoing and not result.success else None)

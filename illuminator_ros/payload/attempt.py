@@ -118,11 +118,9 @@ class Target:
         """Request one message of the device or of another component."""
         self.send(mavlink.MAV_CMD_REQUEST_MESSAGE, (float(message_id),), now, done, to=to)
 
-    def request_status(self, now: float, done: command_sender.Done | None = None) -> None:
-        """Request the status; without ``done`` only where no such request is under way."""
-        if done is not None:
-            self.request_message(self._status_id, now, done, to=self._status_source)
-        elif self._status_request is None:
+    def request_status(self, now: float) -> None:
+        """Request the status, unless such a request is under way."""
+        if self._status_request is None:
             self._status_request = command_sender.Command(
                 self._status_source, mavlink.MAV_CMD_REQUEST_MESSAGE, (float(self._status_id),))
             self.start(self._status_request, now, self._status_answered)
@@ -264,53 +262,45 @@ class Evidence(Generic[S]):
     The statuses since a command, compared with its change.
 
     :param before: the newest status when the command was sent, None if there was none.
-    :ivar sent_at: when the command was last sent, s.
+    :ivar sent_at: only a status that was sent later than this time, s, is evidence.
     :ivar was_repeated: whether a status may show an earlier command of the attempt.
-    :ivar has_status: whether the device has ever sent a status.
+    :ivar delay: by how much the last status may have been late, s.
     :ivar contradiction: why the last status does not confirm the change, '' if it does.
     :ivar is_outdated: whether a status may have been older than the command.
     """
 
-    def __init__(self, target: Target, change: Change[S], before: S | None) -> None:
-        self.sent_at = -math.inf
+    def __init__(self, target: Target, change: Change[S], before: S | None = None) -> None:
+        self.sent_at = math.inf
         self.was_repeated = False
-        self.has_status = before is not None
+        self.delay = 0.0
         self.contradiction = ''
         self.is_outdated = False
         self._target = target
         self._change = change
         self._differs_before = before is not None and change.shown_by(before) is False
-        self._outdated_wait = OUTDATED_INTERVAL
 
-    def outdated_wait(self) -> float:
-        """Return the time until the next request after an outdated status, s."""
-        self._outdated_wait *= 2
-        return self._outdated_wait / 2
-
-    def judge(
-        self, report: StatusReport[S], now: float, *, delay: float, is_accepted: bool,
-    ) -> Verdict:
+    def judge(self, report: StatusReport[S], now: float, *, is_accepted: bool) -> Verdict:
         """
-        Compare a status that has come after the acknowledgement.
+        Compare a status that has just come.
 
-        :param delay: by how much the status may be late, s.
-        :param is_accepted: whether the device has accepted the command.
+        :param is_accepted: whether the device has accepted the command, which decides where the
+            status cannot show the change.
         """
-        shown = self._change.shown_by(report.status)
+        target, change = self._target, self._change
+        self.delay = target.status_delay(now, has_clock=report.has_clock)
+        shown = change.shown_by(report.status)
         if shown is None:
-            # Then the acknowledgement decides.
             shown = is_accepted
-        if shown and not self.was_repeated and self._differs_before:
-            self._target.note_status_delay(now - self.sent_at)
+        if shown and self._differs_before and not self.was_repeated:
             self._differs_before = False
-        if report.sent_by - delay < self.sent_at:
+            target.note_status_delay(now - self.sent_at)
+        if report.sent_by - self.delay < self.sent_at:
             # With a late acknowledgement, a status from before the command would even confirm a
             # change that was never made.
             self.is_outdated = True
             return Verdict.OUTDATED
-        target = self._target
         reasons = [] if shown else [
-            f'{target.status_name} shows {self._change.actual(report.status)}']
+            f'{target.status_name} shows {change.actual(report.status)}']
         if report.shared_address:
             reasons.append(f'several {target.kind}s answer as {target.address}')
         self.contradiction = ', '.join(reasons)
@@ -342,10 +332,12 @@ class Attempt(Generic[S]):
         self._deadline = deadline
         self._command = target.command(change)
         self._evidence = Evidence(target, change, before)
+        self._has_status = before is not None
         # How often it must be sent again, since acknowledgements of an earlier command may come.
         self._repeats: int | None = None
         self._outcome: command_sender.CommandResult | None = None
         self._acknowledged_at = self._confirm_until = self._ask_at = math.inf
+        self._outdated_wait = OUTDATED_INTERVAL
         self._overtake = overtake
 
     @property
@@ -422,19 +414,17 @@ class Attempt(Generic[S]):
 
     def reported(self, report: StatusReport[S], now: float) -> None:
         """Take a status that is newer than all before."""
-        evidence = self._evidence
-        evidence.has_status = True
+        self._has_status = True
         if self.phase is not Phase.CONFIRMING:
             return
-        delay = self._target.status_delay(now, has_clock=report.has_clock)
+        verdict = self._evidence.judge(report, now, is_accepted=self.is_accepted)
         self._confirm_until = max(self._confirm_until, min(
-            self._acknowledged_at + delay + ASK_INTERVAL, self._deadline))
-        verdict = evidence.judge(
-            report, now, delay=delay, is_accepted=self.is_accepted)
+            self._acknowledged_at + self._evidence.delay + ASK_INTERVAL, self._deadline))
         if verdict is Verdict.SHOWN:
             self._succeed(self.change.evidence(report.status), now, report.status)
         elif verdict is Verdict.OUTDATED:
-            self._ask_at = min(self._ask_at, now + evidence.outdated_wait())
+            self._ask_at = min(self._ask_at, now + self._outdated_wait)
+            self._outdated_wait *= 2
         elif not self.is_accepted and now >= self._acknowledged_at + ASK_INTERVAL:
             self._unconfirmed(now)
 
@@ -474,7 +464,7 @@ class Attempt(Generic[S]):
         target, evidence = self._target, self._evidence
         if not self.is_accepted:
             self._refused(now)
-        elif not (evidence.has_status or target.needs_status):
+        elif not (self._has_status or target.needs_status):
             self._succeed(f'accepted, not confirmed (the {target.kind} sends no '
                           f'{target.status_name})', now)
         else:

@@ -19,7 +19,16 @@ from __future__ import annotations
 import math
 from typing import Generic, TypeVar
 
-from .attempt import Change, Done, PERMANENT_RESULTS, Result, StatusReport, Target
+from .attempt import (
+    Change,
+    Done,
+    Evidence,
+    PERMANENT_RESULTS,
+    Result,
+    StatusReport,
+    Target,
+    Verdict,
+)
 from ..mavlink.command_sender import CommandResult, format_seconds
 
 # s between commands that are not confirmed, and from a status that is too old to the request for
@@ -51,6 +60,7 @@ class LastChange(Generic[S]):
         self._report = report
         self._counts_from = counts_from
         self._begun_at = math.inf
+        self._evidence = Evidence(target, change)
         self._send_due = self._ask_due = -math.inf
         self._is_under_way = self._is_confirmed = False
         self._reason = ''
@@ -75,15 +85,14 @@ class LastChange(Generic[S]):
 
     def reported(self, report: StatusReport[S], now: float) -> None:
         """Take a status that is newer than all before."""
-        delay = self._target.status_delay(now, has_clock=report.has_clock)
-        if not self._change.shown_by(report.status):
-            if self._is_confirmed:
-                self._is_confirmed = False
-                self._send_due = now
-                self._again(f'it shows {self._change.actual(report.status)} again', now)
-        elif report.sent_by - delay < max(self._begun_at, self._counts_from):
+        verdict = self._evidence.judge(report, now, is_accepted=False)
+        if verdict is Verdict.OUTDATED:
             self._ask_due = min(self._ask_due, now + ASK_INTERVAL)
-        elif not (self._is_confirmed or report.shared_address):
+        elif verdict is Verdict.CONTRADICTED and self._is_confirmed:
+            self._is_confirmed = False
+            self._send_due = now
+            self._again(self._evidence.contradiction, now)
+        elif verdict is Verdict.SHOWN and not self._is_confirmed:
             self._is_confirmed = True
             self._send_due = self._ask_due = math.inf
             self._report(Result(True, (
@@ -94,7 +103,9 @@ class LastChange(Generic[S]):
         """Send the command or ask for a status, if that is due; the device must be connected."""
         if now >= self._send_due:
             self._send_due = now + INTERVAL
-            self._begun_at = min(self._begun_at, now)
+            if self._begun_at == math.inf:
+                self._begun_at = now
+                self._evidence.sent_at = max(now, self._counts_from)
             if not self._is_under_way:
                 self._is_under_way = True
                 self._again(self._reason, now)

@@ -1,0 +1,135 @@
+# Copyright 2026 The illuminator_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""The messages that are requested of one light: its status and its identity."""
+
+from __future__ import annotations
+
+import functools
+import math
+
+from .messages import STATUS_ID
+from ..mavlink.command_sender import format_seconds
+from ..mavlink.dialect import mavlink
+from ..mavlink.messages import ComponentInformationBasic
+from ..payload.attempt import Done, Result, Target
+from ..payload.identity import Identity
+from ..payload.message_query import MessageQuery
+
+# s without a status after which the light is asked for one, and between the requests.
+STATUS_TIMEOUT = 2.5
+# s from the first request until the identity counts as unknown.
+SETTLING_TIME = 2.0
+STATUS, IDENTITY = 'ILLUMINATOR_STATUS', 'COMPONENT_INFORMATION_BASIC'
+
+
+class LightQueries:
+    """
+    Requests what a light does not send by itself. No I/O; times are s.
+
+    :param interval: s between the statuses that the light is asked for; 0 for its own.
+    :param heartbeat_timeout: s of silence after which the light is lost.
+    :ivar identity: None before the light has sent it.
+    """
+
+    def __init__(self, target: Target, interval: float, heartbeat_timeout: float) -> None:
+        self.identity: Identity | None = None
+        self._target = target
+        self._interval = interval
+        self._timeout = max(STATUS_TIMEOUT, 2.5 * interval)
+        # s of silence after which the light is asked for a status, so that its answer arrives
+        # within the heartbeat timeout.
+        self._longest_silence = min(STATUS_TIMEOUT, heartbeat_timeout / 1.2)
+        self._asked_at = -math.inf
+        self._due = math.inf
+        self._queries = {STATUS: MessageQuery(target, STATUS_ID),
+                         IDENTITY: MessageQuery(target, ComponentInformationBasic.id)}
+
+    def begin(self, now: float) -> None:
+        """Request interval, status and identity: the light is heard, or has restarted."""
+        if self._interval > 0:
+            self._target.send(mavlink.MAV_CMD_SET_MESSAGE_INTERVAL,
+                              (float(STATUS_ID), self._interval * 1e6), now)
+        self._due = now + STATUS_TIMEOUT
+        self._target.request_status(now)
+        self._queries[IDENTITY].ask(now)
+
+    def end(self) -> None:
+        """Request no status: the light is lost."""
+        self._due = math.inf
+
+    def close(self, reason: str, now: float) -> None:
+        """Answer all who wait for a message."""
+        for query in self._queries.values():
+            query.finish(reason, now)
+
+    def take_status(self, now: float) -> None:
+        """Note that a status has come."""
+        self._due = now + self._timeout
+        self._queries[STATUS].finish('', now)
+
+    def take_identity(self, identity: Identity, now: float) -> None:
+        """Take the identity."""
+        self.identity = identity
+        self._queries[IDENTITY].finish('', now)
+
+    def identity_is_settled(self, now: float) -> bool:
+        """Return whether the identity is known, or will not be known soon."""
+        query = self._queries[IDENTITY]
+        return (self.identity is not None or bool(query.failure)
+                or now >= query.first_asked + SETTLING_TIME)
+
+    def need_status(self, due: float) -> None:
+        """Request a status at a time, s, or before."""
+        self._due = min(self._due, due)
+
+    def refresh(self, now: float, done: Done) -> None:
+        """
+        Request status and identity; ``done`` is called once with the result.
+
+        It is a success when a status has come: not every light has an identity.
+        """
+        outcomes: dict[str, str] = {}
+
+        def answered(name: str, failure: str, at: float) -> None:
+            outcomes[name] = failure
+            if len(outcomes) == len(self._queries):
+                parts = [f'{one}: {outcomes[one] or "received"}' for one in self._queries]
+                refusal = self._target.commands.refusal
+                done(Result(not (refusal or outcomes[STATUS]), refusal or (
+                    f'{", ".join(parts)} ({format_seconds(at - now)})')), at)
+
+        for name, query in self._queries.items():
+            query.ask(now, functools.partial(answered, name))
+
+    def poll(self, now: float, silent_since: float) -> None:
+        """
+        Request what is due.
+
+        :param silent_since: the time of the last message, s; infinity while the light is lost.
+        """
+        if now >= self._status_due(silent_since):
+            self._asked_at, self._due = now, now + STATUS_TIMEOUT
+            self._target.request_status(now)
+        for query in self._queries.values():
+            query.poll(now)
+
+    def _status_due(self, silent_since: float) -> float:
+        # The light may have no heartbeat, and a status interval above the heartbeat timeout.
+        return min(self._due, max(silent_since, self._asked_at) + self._longest_silence)
+
+    def next_deadline(self, silent_since: float) -> float:
+        """Return when :meth:`poll` has something to do."""
+        return min(self._status_due(silent_since),
+                   *(query.next_deadline() for query in self._queries.values()))
