@@ -261,9 +261,10 @@ class Light:
         return events.LightSnapshot(
             self.address, self.connected, self.heard_at, self.status, self._newest.at,
             self._settings.status_interval, self.restarts, self._newest.temperature,
-            configuration.confirmed, configuration.discrepancy, configuration.guard.exceeded,
-            queries.identity, queries.identity_is_settled(now), self._tracker.conflict.detected,
-            self.unreachable(now), self._sources.shown_holder, self._sources.since)
+            configuration.agreed.confirmed, configuration.discrepancy,
+            configuration.guard.exceeded, queries.identity, queries.identity_is_settled(now),
+            self._tracker.conflict.detected, self.unreachable(now), self._sources.shown_holder,
+            self._sources.since)
 
     def change_settings(self, settings: Settings, now: float) -> None:
         """

@@ -27,6 +27,7 @@ from enum import IntEnum
 import math
 
 from . import events
+from .agreed_configuration import AgreedConfiguration
 from .commands import Configure, CONFIRMED
 from .model import (
     Changes,
@@ -121,20 +122,6 @@ class Required:
         return Required(merged, max(requirement, self.requirement), due)
 
 
-@dataclass
-class _Unapplied:
-    """
-    A configuration that the light has accepted but does not report.
-
-    :param shown: the status that it reported instead, None if there was none.
-    :param failure: why it, or values that are required no more, were not set.
-    """
-
-    configuration: Configuration | None
-    shown: Status | None
-    failure: str
-
-
 def undoing_limit(reassert: bool) -> RepeatLimit | None:
     """Return the limit on undoing changes by other senders, None if these are followed."""
     return RepeatLimit(REPEATS, REPEAT_INTERVAL) if reassert else None
@@ -192,8 +179,7 @@ class LightConfiguration:
     :param reassert: whether changes by other senders are undone.
     :param must_wait: returns whether no required values may be sent now: the process ends, or an
         OFF is under way and a brightness may be an ON.
-    :ivar confirmed: the configuration that the light last accepted from us or, if another sender
-        has changed it since, last reported; None before either.
+    :ivar agreed: the configuration agreed with the light.
     :ivar guard: how the light exceeds the limits.
     """
 
@@ -202,7 +188,7 @@ class LightConfiguration:
         limits: SafetyLimits, restore: bool = True, reassert: bool = False,
         must_wait: Callable[[], bool] = lambda: False,
     ) -> None:
-        self.confirmed: Configuration | None = None
+        self.agreed = AgreedConfiguration(target.address, emit)
         self.guard = LimitGuard(limits, emit, events.LimitExceeded(target.address, (), ''))
         self._address = target.address
         self._emit = emit
@@ -213,17 +199,13 @@ class LightConfiguration:
         self._report: StatusReport[Status] | None = None
         self._setpoint: float | None = None
         self._required = Required()
-        self._unapplied = _Unapplied(None, None, '')
         # The result of the last command, None before the first.
         self._outcome: Result | None = None
-        # The last configuration that was requested or reported as changed: small steps away
-        # from it add up to a change.
-        self._reference: Configuration | None = None
 
     @property
     def discrepancy(self) -> str:
         """Why the light does not have a configuration that it should have, '' if it has."""
-        return self._required.failure or self._unapplied.failure
+        return self._required.failure or self.agreed.discrepancy
 
     @property
     def is_changing(self) -> bool:
@@ -240,7 +222,7 @@ class LightConfiguration:
     def may_send_after_restart(self) -> bool:
         """Whether a light that has restarted may be sent a configuration."""
         return (self.guard.is_limiting or bool(self._required.values)
-                or self._restores and self.confirmed is not None)
+                or self._restores and self.agreed.confirmed is not None)
 
     @property
     def must_send_before_on(self) -> bool:
@@ -279,8 +261,8 @@ class LightConfiguration:
                 self._reconciler.cancel(
                     ', '.join(limits.excess(goal)) or 'a limit was changed', now,
                     superseded=desired.reason == _SETPOINT)
-        if self._status is not None and (self.confirmed or self._status.complete):
-            self._keep_limits(self._status.configuration(self.confirmed or NOTHING), now)
+        if self._status is not None and (self.agreed.confirmed or self._status.complete):
+            self._keep_limits(self._status.configuration(self.agreed.confirmed or NOTHING), now)
 
     def change_reassert(self, reassert: bool) -> None:
         """Undo changes by other senders from now on, or follow them."""
@@ -333,7 +315,7 @@ class LightConfiguration:
             values, Requirement.OVERRIDE, self._first_due(now))
 
     def _first_due(self, now: float) -> float:
-        return now if self.confirmed else now + FIRST_STATUS_TIMEOUT
+        return now if self.agreed.confirmed else now + FIRST_STATUS_TIMEOUT
 
     def replace(self, message: str, now: float) -> None:
         """End all requests, and drop the required values: an OFF or the end replaces them."""
@@ -372,7 +354,7 @@ class LightConfiguration:
         """
         note, names = '', list(values)
         desired = self._reconciler.desired
-        base = self.confirmed
+        base = self.agreed.confirmed
         if desired is not None and isinstance(desired.change, Configure):
             base, names = desired.change.configuration, [*desired.change.names, *names]
         if base is None:
@@ -422,9 +404,9 @@ class LightConfiguration:
             self._drop_fields([name for name, value in self._required.values.items()
                                if name in change.names
                                or value == getattr(change.configuration, name)])
-            self._accept(change.configuration, status)
+            self.agreed.accept(change.configuration, status)
         elif result.contradicted:
-            self._unapplied = _Unapplied(change.configuration, self._status, result.message)
+            self.agreed.contradicted(change.configuration, self._status, result.message)
         if desired.reason == _REQUIRED:
             self._required_ended(result, now)
         elif desired.reason == _SETPOINT and not (result.success or result.superseded):
@@ -443,15 +425,15 @@ class LightConfiguration:
             if (result.permanent or required.attempts >= MAX_CONTRADICTIONS
                     or required.attempts and required.requirement in _SENT_ONCE):
                 self._required = Required()
-                self._unapplied.failure = result.message
+                self.agreed.failed(result.message)
                 self._restored(False, result.message)
 
     # Reports
 
     def restarted(self, now: float) -> None:
         """Note that the light has restarted, so that its configuration may be lost."""
-        if self._restores and self.confirmed is not None:
-            confirmed = self.confirmed
+        if self._restores and self.agreed.confirmed is not None:
+            confirmed = self.agreed.confirmed
             values = {name: getattr(confirmed, name) for name in FIELDS
                       if name != 'mode' or confirmed.mode}
             self._required = self._required.and_also(values, Requirement.RESTART, now)
@@ -491,9 +473,9 @@ class LightConfiguration:
         was_changing = self.is_changing
         self._reconciler.reported(report, now)
         status = report.status
-        if self.confirmed is None and (was_changing or not status.complete):
+        if self.agreed.confirmed is None and (was_changing or not status.complete):
             return
-        reported = status.configuration(self.confirmed or NOTHING)
+        reported = status.configuration(self.agreed.confirmed or NOTHING)
         if not was_changing:
             self._take(report, reported, now, can_follow=can_follow, switched_at=switched_at,
                        brightness_is_switch=brightness_is_switch)
@@ -505,38 +487,58 @@ class LightConfiguration:
         can_follow: bool, switched_at: float, brightness_is_switch: bool,
     ) -> None:
         status = report.status
-        self._end_discrepancy(reported, status)
+        self.agreed.end_discrepancy(reported, status.error_flags)
         required = self._required
-        if self.confirmed is None:
-            self._adopt(reported, events.ChangeCause.FIRST_STATUS)
+        if self.agreed.confirmed is None:
+            self.agreed.adopt(reported, events.ChangeCause.FIRST_STATUS)
             if required.values:
                 required.due, required.has_ended = min(required.due, now), False
         elif required.values and not report.shared_address and (
-                shown := self._shown_goal(required, self.confirmed, reported, status)):
+                shown := self._shown_goal(required, self.agreed.confirmed, reported, status)):
             # The light has kept the values, another sender has restored them, or our command was
             # acknowledged too late.
             self._required = Required()
-            self._accept(shown, status)
+            self.agreed.accept(shown, status)
             if required.has_ended:
                 self._restored(True, f'{shown.describe(list(required.values))}, {CONFIRMED}')
         elif ((not required.values or required.requirement is Requirement.OVERRIDE)
                 and can_follow and not report.shared_address):
-            self._follow(status, self.confirmed, reported, now, switched_at=switched_at,
+            self._follow(status, self.agreed.confirmed, reported, now, switched_at=switched_at,
                          brightness_is_switch=brightness_is_switch)
 
-    def _end_discrepancy(self, reported: Configuration, status: Status) -> None:
-        """Forget that a configuration was not applied once the light shows something else."""
-        unapplied = self._unapplied
-        if unapplied.configuration is None or unapplied.shown is None:
+    def _follow(
+        self, status: Status, confirmed: Configuration, reported: Configuration, now: float, *,
+        switched_at: float, brightness_is_switch: bool,
+    ) -> None:
+        """Follow the change of another sender, or undo it."""
+        names = unexpected_differences(confirmed, reported, status.error_flags, step=False)
+        if not names:
             return
+        far = self.agreed.changed_fields(reported, status.error_flags)
+        cause = events.ChangeCause.ROUNDING
+        if far:
+            own = all(self._is_own(name, reported, switched_at, now) for name in far)
+            cause = events.ChangeCause.REQUEST if own else events.ChangeCause.LIGHT
+        # Where brightness is the switch, each command to a light that is off is an ON.
+        if not (cause is events.ChangeCause.LIGHT
+                and not (brightness_is_switch and status.enabled is False)
+                and self._undo_change(status, confirmed, reported, now)):
+            self.agreed.follow(reported, names, cause)
 
-        def differs(before: Configuration) -> bool:
-            return bool(unexpected_differences(before, reported, status.error_flags, step=True))
-
-        # It was applied late, or another sender has replaced it.
-        if (not differs(unapplied.configuration)
-                or differs(unapplied.shown.configuration(NOTHING))):
-            self._unapplied = _Unapplied(None, None, '')
+    def _is_own(
+        self, name: str, reported: Configuration, switched_at: float, now: float,
+    ) -> bool:
+        """Return whether a change is a late or implied effect of a command of ours."""
+        if now <= switched_at + IMPLIED_TIME:
+            return True
+        sent = self._reconciler.last_sent
+        if sent is None or now > sent.at + LATE_TIME or not isinstance(sent.change, Configure):
+            return False
+        if name not in sent.change.configuration.differences(reported):
+            return True
+        was_accepted = self._outcome and (self._outcome.success or self._outcome.contradicted)
+        return bool(was_accepted and name not in sent.change.names
+                    and now <= sent.at + IMPLIED_TIME)
 
     def _shown_goal(
         self, required: Required, confirmed: Configuration, reported: Configuration,
@@ -555,52 +557,6 @@ class LightConfiguration:
         if status.error_flags & DIMMING_FLAGS:
             not_shown.append('brightness')
         return None if any(name in required.values for name in not_shown) else goal
-
-    def _accept(self, goal: Configuration, status: Status | None) -> None:
-        """
-        Note that the light has accepted a configuration, with the status that shows it.
-
-        Values that the light rounds to its own steps are confirmed as it shows them; values that
-        differ for another reason (heat, external sync) as they were sent.
-        """
-        if status:
-            reported = status.configuration(goal)
-            far = goal.differences(reported)
-            goal = replace(goal, **{
-                name: getattr(reported, name)
-                for name in goal.differences(reported, step=False) if name not in far})
-        self._unapplied = _Unapplied(None, None, '')
-        self._adopt(goal, events.ChangeCause.REQUEST)
-
-    def _adopt(self, configuration: Configuration, cause: events.ChangeCause) -> None:
-        old, self.confirmed = self.confirmed, configuration
-        if cause is not events.ChangeCause.ROUNDING:
-            self._reference = configuration
-        names = [name for name in FIELDS
-                 if old is None or getattr(old, name) != getattr(configuration, name)]
-        if names:
-            self._emit(events.ConfigurationChanged(self._address, configuration, names, cause))
-
-    def _follow(
-        self, status: Status, confirmed: Configuration, reported: Configuration, now: float, *,
-        switched_at: float, brightness_is_switch: bool,
-    ) -> None:
-        names = unexpected_differences(confirmed, reported, status.error_flags, step=False)
-        if not names:
-            return
-        far = unexpected_differences(
-            self._reference or confirmed, reported, status.error_flags, step=True)
-        cause = events.ChangeCause.ROUNDING
-        if far:
-            own = all(self._is_own(name, reported, switched_at, now) for name in far)
-            cause = events.ChangeCause.REQUEST if own else events.ChangeCause.LIGHT
-        # Where brightness is the switch, each command to a light that is off is an ON.
-        if (cause is events.ChangeCause.LIGHT
-                and not (brightness_is_switch and status.enabled is False)
-                and self._undo_change(status, confirmed, reported, now)):
-            return
-        self._adopt(
-            replace(confirmed, **{name: getattr(reported, name) for name in names}), cause)
 
     def _undo_change(
         self, status: Status, confirmed: Configuration, reported: Configuration, now: float,
@@ -627,21 +583,6 @@ class LightConfiguration:
             values = {name: getattr(limited, name) for name in reported.differences(limited)}
             self._required = self._required.and_also(values, Requirement.LIMIT, due)
 
-    def _is_own(
-        self, name: str, reported: Configuration, switched_at: float, now: float,
-    ) -> bool:
-        """Return whether a change is a late or implied effect of a command of ours."""
-        if now <= switched_at + IMPLIED_TIME:
-            return True
-        sent = self._reconciler.last_sent
-        if sent is None or now > sent.at + LATE_TIME or not isinstance(sent.change, Configure):
-            return False
-        if name not in sent.change.configuration.differences(reported):
-            return True
-        was_accepted = self._outcome and (self._outcome.success or self._outcome.contradicted)
-        return bool(was_accepted and name not in sent.change.names
-                    and now <= sent.at + IMPLIED_TIME)
-
     # Time
 
     def poll(self, now: float, *, connected: bool) -> None:
@@ -650,7 +591,7 @@ class LightConfiguration:
         desired = self._reconciler.desired
         if connected and self._is_free and desired and isinstance(desired.change, Configure):
             # The light has accepted a setpoint, and a newer one need not wait for the status.
-            self._accept(desired.change.configuration, None)
+            self.agreed.accept(desired.change.configuration, None)
         # Required values go first, since a stream of setpoints may never end.
         if connected and self._is_free and now >= self._required_due:
             self._send_required(now)
@@ -676,7 +617,7 @@ class LightConfiguration:
     def _send_setpoint(self, value: float, now: float) -> None:
         is_unconfirmed = self._reconciler.is_busy or (
             self._outcome is not None and not self._outcome.success)
-        if (self.confirmed is not None and self.confirmed.brightness == value
+        if (self.agreed.confirmed is not None and self.agreed.confirmed.brightness == value
                 and not is_unconfirmed and not (self._report and self._report.shared_address)):
             return
         try:
@@ -714,7 +655,7 @@ class LightConfiguration:
             required.failure = f'{", ".join(required.values)} not sent: {error}'
             self._restored(False, required.failure)
             return
-        if self.confirmed is None:
+        if self.agreed.confirmed is None:
             required.due += FIRST_STATUS_TIMEOUT
         required.is_sent = True
         self._reconciler.want(Desired(change, _REQUIRED, since=now, limit=limit), now)

@@ -400,7 +400,7 @@ class LightSwitch:
         last, self._report = self._report, report
         self._was_on |= bool(enabled)
         if enabled is False:
-            confirmed = self._configuration.confirmed
+            confirmed = self._configuration.agreed.confirmed
             self.brightness.reported(
                 report.status, was_dimmed=bool(before and confirmed and confirmed.brightness)
                 and not self._configuration.is_changing)
