@@ -19,7 +19,7 @@ from dataclasses import replace
 from typing import Any
 
 from illuminator_ros.illuminator.checks.requirements import REQUIREMENTS
-from illuminator_ros.illuminator.checks.tester import LightTester
+from illuminator_ros.illuminator.checks.session import LightSession
 from illuminator_ros.illuminator.model import Configuration, Mode
 from illuminator_ros.illuminator.simulated_properties import FAULTS
 from illuminator_ros.payload.checks.requirement import Requirement, Verdict
@@ -75,8 +75,8 @@ def test_restoring_is_not_interrupted() -> None:
 
 
 def test_a_check_with_an_internal_error_fails_and_the_light_is_restored() -> None:
-    async def broken(tester: LightTester) -> None:
-        await tester.switch(False)
+    async def broken(light: LightSession) -> None:
+        await light.switch(False)
         raise ZeroDivisionError('oops')
 
     run = used(requirements=[

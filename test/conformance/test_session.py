@@ -27,6 +27,7 @@ from illuminator_ros.illuminator.simulated_properties import (
 )
 from illuminator_ros.mavlink.messages import Address, CommandAck, heartbeat
 from illuminator_ros.payload.checks.record import MAX_ENTRIES
+from illuminator_ros.payload.checks.session import Conditions
 import pytest
 from support.checks_run import TESTER
 from support.conformance_run import Run
@@ -89,7 +90,7 @@ def test_a_check_that_needs_an_unused_address_is_skipped_on_a_link_without_one(
 
 
 def test_a_flood_from_the_light_takes_a_bounded_memory() -> None:
-    session = CHECKS.session(TESTER)
+    session = CHECKS.session(Conditions(TESTER))
     status = IlluminatorStatus(1, 0, 3, 0, 1, 10.0, 0.0, 0.0, 20.0, 0.05, 10.0)
     flood = (heartbeat(44), status, CommandAck(405, 0))
 

@@ -32,6 +32,7 @@ from illuminator_ros.mavlink.messages import (
     CommandLong,
 )
 from illuminator_ros.payload.checks.requirement import PayloadChecks, Verdict
+from illuminator_ros.payload.checks.session import Conditions
 from illuminator_ros.payload.messages import GimbalDeviceAttitudeStatus as AttitudeStatus
 from illuminator_ros.payload.simulated import (
     CommandReply,
@@ -310,7 +311,7 @@ def test_an_interrupted_run_turns_the_gimbal_back(kind: str, after: float) -> No
     motion = one.device.mount.motion
     motion.turn(-0.5, 0.4, one.link.now)
     one.link.run(after)
-    one.session.interrupt(one.link.now)
+    one.session.runner.interrupt(one.link.now)
     one.finish()
     assert motion.angles == pytest.approx((0.0, -0.5, 0.4), abs=0.01)
     assert one.runner.restored in ('nothing was changed', f'the {one.checks.device} is as it was')
@@ -356,7 +357,7 @@ def test_a_manager_without_its_status_is_found_by_its_information() -> None:
 
 
 def test_the_attitude_of_a_manager_is_that_of_the_device_that_it_names() -> None:
-    session, managed = manager.CHECKS.session(Address(255, 190)), Address(1, 194)
+    session, managed = manager.CHECKS.session(Conditions(Address(255, 190))), Address(1, 194)
     session.receive(managed, gimbal.GimbalManagerStatus(0, 0, 154, 0, 0, 0, 0), 1.0)
     q = (1.0, 0.0, 0.0, 0.0)
     for component in (154, 171):

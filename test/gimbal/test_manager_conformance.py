@@ -23,8 +23,9 @@ from illuminator_ros.gimbal.checks.manager import CHECKS
 from illuminator_ros.gimbal.manager_control import ControlSettings, Role
 from illuminator_ros.mavlink.messages import Address
 from illuminator_ros.payload.arbitration import Policy
-from illuminator_ros.payload.checks.requirement import Conditions, Verdict
+from illuminator_ros.payload.checks.requirement import Verdict
 from illuminator_ros.payload.checks.runner import CheckRunner
+from illuminator_ros.payload.checks.session import Conditions
 import pytest
 from support.gimbal_manager import OURS
 from support.gimbal_vehicle import managed_vehicle
@@ -39,10 +40,10 @@ SERVO: dict[str, Any] = {
 def test_the_manager_conforms_with_and_without_a_mavlink_device(
         policy: Policy, settings: dict[str, Any]) -> None:
     manager, _, vehicle = managed_vehicle(ControlSettings(policy), START, **settings)
-    session = CHECKS.session(Address(255, 190), OURS)
+    session = CHECKS.session(Conditions(Address(255, 190), OURS))
+    session.consent = True
     link = VirtualLink(session, vehicle)
-    runner: CheckRunner[Any] = CheckRunner(
-        CHECKS, session, Conditions(True, lambda: 0, {}), CHECKS.requirements)
+    runner = CheckRunner(CHECKS, session, CHECKS.requirements)
 
     async def main() -> None:
         await session.find(10.0, 4.5)

@@ -20,8 +20,9 @@ from typing import Any
 from illuminator_ros.cli import conformance
 from illuminator_ros.illuminator.simulated_properties import IlluminatorProperties
 from illuminator_ros.mavlink.messages import Address
-from illuminator_ros.payload.checks.requirement import Conditions, Verdict
+from illuminator_ros.payload.checks.requirement import Verdict
 from illuminator_ros.payload.checks.runner import CheckRunner
+from illuminator_ros.payload.checks.session import Conditions
 from illuminator_ros.payload.simulated import Description, SimulatedComponents
 from payloads.winch import SIMULATED, SimulatedWinch, WINCH
 from payloads.winch_checks import REQUIREMENTS
@@ -42,8 +43,8 @@ def test_a_winch_is_checked_and_restored_by_its_own_requirements_and_those_of_ev
     component = devices.components[1]
     if fault:
         component.behave(winch.faults.add(component.behaviour, fault), START)
-    session = checks.session(Address(255, 190))
-    suite = CheckRunner(checks, session, Conditions(), checks.requirements)
+    session = checks.session(Conditions(Address(255, 190)))
+    suite = CheckRunner(checks, session, checks.requirements)
 
     async def run() -> None:
         await session.find(10.0, 2.0)

@@ -17,56 +17,63 @@
 from __future__ import annotations
 
 from illuminator_ros.mavlink.dialect import mavlink
-from illuminator_ros.mavlink.messages import Heartbeat
+from illuminator_ros.mavlink.messages import Heartbeat, Message
 from illuminator_ros.payload.checks import component_requirements as component
-from illuminator_ros.payload.checks import requirement as base
-from illuminator_ros.payload.checks.requirement import MESSAGES
-from illuminator_ros.payload.checks.session import Session
+from illuminator_ros.payload.checks.requirement import PayloadChecks, Requirement, requirement
+from illuminator_ros.payload.checks.session import Session, Transaction
+from illuminator_ros.payload.checks.specifications import MESSAGES
 from payloads.winch import WinchStatus
 
 
-class WinchTester:
+class WinchSession(Session):
     """Releases line, and winds it in at the end."""
 
-    def __init__(self, session: Session, conditions: base.Conditions) -> None:
-        self.session = session
-        self.conditions = conditions
-        self.saved = ''
+    messages = (*Session.messages, WinchStatus)
+    before: float | None = None
 
-    async def length(self) -> float:
-        """Return the released length, m; NaN if the winch does not report it."""
-        status = await self.session.request(WinchStatus)
-        return status.line_length if status else float('nan')
+    def is_device(self, message: Message) -> bool:
+        """See :class:`Session`."""
+        return isinstance(message, Heartbeat) and message.type == mavlink.MAV_TYPE_WINCH
+
+    async def length(self) -> float | None:
+        """Return the released length, m; None if the winch does not report it."""
+        status = await self.request(WinchStatus)
+        return status.line_length if status else None
+
+    async def release(self, length: float) -> Transaction:
+        """Release line, m."""
+        return await self.command(
+            mavlink.MAV_CMD_DO_WINCH, 1, mavlink.WINCH_RELATIVE_LENGTH_CONTROL, length)
 
     async def save(self) -> bool:
-        """See :class:`Tester`."""
-        self.saved = self.saved or str(await self.length())
-        return self.saved != 'nan'
+        """See :class:`Session`."""
+        self.before = await self.length() if self.before is None else self.before
+        return self.before is not None
+
+    @property
+    def saved(self) -> str:
+        """See :class:`Session`."""
+        return f'{self.before} m'
 
     async def restore(self) -> list[str]:
-        """See :class:`Tester`."""
-        change = float(self.saved) - await self.length()
-        await self.session.command(mavlink.MAV_CMD_DO_WINCH, 1,
-                                   mavlink.WINCH_RELATIVE_LENGTH_CONTROL, change)
-        return [] if await self.length() == float(self.saved) else ['line_length']
+        """See :class:`Session`."""
+        await self.release((self.before or 0.0) - (await self.length() or 0.0))
+        return [] if await self.length() == self.before else ['line_length']
 
 
-@base.requirement(
+@requirement(
     'release', 'releases line when commanded', MESSAGES, 'MAV_CMD_DO_WINCH', changes=True)
-async def release(tester: WinchTester) -> None:
+async def release(winch: WinchSession) -> None:
     """Release 2 m, and compare the status."""
-    before = await tester.length()
-    one = await tester.session.command(mavlink.MAV_CMD_DO_WINCH, 1,
-                                       mavlink.WINCH_RELATIVE_LENGTH_CONTROL, 2.0)
-    after = await tester.length()
-    if after != before + 2.0:
+    before = await winch.length()
+    one = await winch.release(2.0)
+    after = await winch.length()
+    if before is None or after != before + 2.0:
         raise one.failure(f'{before} m, then {after} m')
 
 
-REQUIREMENTS: tuple[base.Requirement[WinchTester], ...] = (
+REQUIREMENTS: tuple[Requirement[WinchSession], ...] = (
     component.heartbeat, component.heartbeat_autopilot, component.unknown_command,
     *component.interval_requirements(WinchStatus), release, *component.ACKNOWLEDGEMENTS)
-CHECKS = base.PayloadChecks(
-    'winch', 'winch', (WinchStatus,),
-    lambda message: isinstance(message, Heartbeat) and message.type == mavlink.MAV_TYPE_WINCH,
-    'HEARTBEAT with MAV_TYPE_WINCH', WinchTester, REQUIREMENTS)
+CHECKS = PayloadChecks('winch', 'winch', WinchSession, 'HEARTBEAT with MAV_TYPE_WINCH',
+                       REQUIREMENTS)

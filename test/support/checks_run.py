@@ -26,6 +26,7 @@ from illuminator_ros.mavlink.messages import Address
 from illuminator_ros.payload.checks import requirement
 from illuminator_ros.payload.checks.coroutines import Interrupted
 from illuminator_ros.payload.checks.runner import absence, CheckRunner
+from illuminator_ros.payload.checks.session import Conditions
 from illuminator_ros.payload.simulated import SimulatedComponents
 from support.virtual_link import VirtualLink
 
@@ -55,15 +56,15 @@ class ChecksRun:
         if isinstance(devices, SimulatedComponents):
             self.component = devices.components[0]
             self.device: Any = self.component.device
-        self.session = checks.session(TESTER, target)
-        self.link = VirtualLink(self.session, devices, version)
         defaults = {one.name: one.default for one in checks.options}
+        self.session = checks.session(Conditions(
+            TESTER, target, {**defaults, **options},
+            lambda: self.link.decoders[0].counters.crc_errors, lambda: utc + self.link.now))
+        self.session.consent = consent
+        self.link = VirtualLink(self.session, devices, version)
         self.runner = CheckRunner(
-            checks, self.session, requirement.Conditions(
-                consent, lambda: self.link.decoders[0].counters.crc_errors,
-                {**defaults, **options}, lambda: utc + self.link.now),
-            [one for one in requirements or checks.requirements
-             if not only or one.name in only])
+            checks, self.session, [one for one in requirements or checks.requirements
+                                   if not only or one.name in only])
         self.session.runner.run(self._main())
 
     async def _main(self) -> None:

@@ -80,7 +80,7 @@ class Run(ChecksRun):
 
     def interrupt(self) -> None:
         """Interrupt the run."""
-        self.session.interrupt(self.link.now)
+        self.session.runner.interrupt(self.link.now)
 
     def watch(self) -> list[Configuration]:
         """Return a list that gets the configuration after each change that leaves it on."""

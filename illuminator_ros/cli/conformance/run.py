@@ -28,10 +28,8 @@ import queue
 import select
 import signal
 import sys
-import threading
 import time
 from types import FrameType
-from typing import Any
 
 from ..arguments import invocation, option, Parser
 from ..entry_point import print_output
@@ -45,10 +43,12 @@ from ...mavlink.messages import Address
 from ...mavlink.signing import Signing
 from ...mavlink.signing_files import TimestampStore
 from ...mavlink.url import parse_url, Url
+from ...payload.checks.components import names
 from ...payload.checks.coroutines import Main
-from ...payload.checks.report import as_json, as_junit, catalogue, RunReport, Table
-from ...payload.checks.requirement import AnyChecks, AnyRequirement, Conditions, Result, Verdict
-from ...payload.checks.runner import absence, CheckRunner, names
+from ...payload.checks.report import as_json, as_junit, catalogue, lines, RunReport, unreached
+from ...payload.checks.requirement import AnyChecks, Result, Verdict
+from ...payload.checks.runner import absence, CheckRunner
+from ...payload.checks.session import Conditions, Session
 from ...payload.payload_type import PayloadType
 from ...payload.simulated_settings import integer, number
 
@@ -180,19 +180,19 @@ class Conformance:
         self._options = options
         self._checks = checks
         self._payload_options = {one.name: getattr(options, one.name) for one in checks.options}
-        self._requirements: list[AnyRequirement] = [
-            one for one in checks.requirements
-            if not options.only or one.name in options.only]
-        # The main thread writes them: a blocked terminal must not delay the link's thread.
-        self._texts: queue.SimpleQueue[str] = queue.SimpleQueue()
-        self._table = Table(verbose=options.verbose)
-        self._session = checks.session(address, options.target)
+        self._requirements = [one for one in checks.requirements
+                              if not options.only or one.name in options.only]
+        # The main thread writes them: a blocked terminal must not delay the link's thread. None
+        # is the end of a coroutine.
+        self._texts: queue.SimpleQueue[str | None] = queue.SimpleQueue()
+        self._session: Session = checks.session(Conditions(
+            address, options.target, self._payload_options,
+            lambda: self._link_state().decoding.crc_errors, time.time))
         self._link = Link(url, self._session, label=options.url, on_event=self._link_event,
                           signing=signs, store=store,
                           mavlink_version=mavlink_version(
                               options.mavlink_version, {checks.device: checks.mavlink_version}))
-        self._traces = f', besides {checks.traces}' if checks.traces else ''
-        self._runner: CheckRunner[Any] | None = None
+        self._runner = CheckRunner(checks, self._session, self._requirements, self._show)
         self._signals = 0
         self._written = True
         # Written by the link's thread before the main thread reads them.
@@ -201,7 +201,7 @@ class Conformance:
 
     def run(self) -> int:
         """Find the device, ask for consent, check the device, and write the reports."""
-        checks, options = self._checks, self._options
+        checks, options, runner = self._checks, self._options, self._runner
         for one in SIGNALS:
             if signal.getsignal(one) != signal.SIG_IGN:
                 signal.signal(one, self._handle)
@@ -215,20 +215,16 @@ class Conformance:
             _complain(f'{missing}; nothing was checked')
             return 2
         self._write_line(*self._announcement)
-        conditions = Conditions(
-            bool(self._announcement) and self._consent(),
-            lambda: self._link_state().decoding.crc_errors, self._payload_options, time.time)
-        runner = self._runner = CheckRunner(
-            checks, self._session, conditions, self._requirements, self._show)
+        self._session.consent = bool(self._announcement) and self._consent()
         self._finish(runner.run(missing))
         self._link.stop()
-        self._write_line(*self._table.end())
         report = RunReport(
             checks.payload, checks.device, options.url, self._describe_device(),
             tuple(runner.results), runner.restored, self._link.clock() - begun, runner.passed)
         # A failed check has already given the reason why there is no device.
         explained = missing and any(one.verdict is Verdict.FAIL for one in report.results)
-        self._write_line('', *(() if explained else (report.device,)), report.summary)
+        self._write_line(*unreached(report.results), '', *(() if explained else (report.device,)),
+                         report.summary)
         for path, text in ((options.junit, as_junit(report)), (options.json, as_json(report))):
             try:
                 if path is not None:
@@ -245,18 +241,15 @@ class Conformance:
 
     def _finish(self, main: Main) -> None:
         """Run a coroutine of the session to its end, and print the texts that come meanwhile."""
-        ended = threading.Event()
-
         async def until_end() -> None:
             try:
                 await main
             finally:
-                ended.set()
+                self._texts.put(None)
 
         self._link.call(lambda now: self._session.runner.run(until_end()))
-        while not ended.is_set() or not self._texts.empty():
-            with contextlib.suppress(queue.Empty):
-                self._write_line(self._texts.get(timeout=0.1))
+        while (text := self._texts.get()) is not None:
+            self._write_line(text)
 
     def _link_state(self) -> LinkSnapshot:
         # The checks run in the link's thread.
@@ -268,8 +261,8 @@ class Conformance:
             self._texts.put(str(event))
 
     def _show(self, result: Result) -> None:
-        for line in self._table.add(result):
-            self._texts.put(line)
+        if result.reached:
+            self._texts.put('\n'.join(lines(result, verbose=self._options.verbose)))
 
     async def _find(self) -> None:
         """Find the device; record the other components on the link, or why it was not found."""
@@ -283,7 +276,7 @@ class Conformance:
             return
         changed = any(one.changes for one in self._requirements)
         self._announcement = [f'found {checks.device} {components.found}, which ' + (
-            f'the checks will change and then restore{self._traces}' if changed else
+            f'the checks will change and then restore{checks.traces}' if changed else
             'stays unchanged')]
         if others := components.devices - {components.found}:
             self._announcement.append(
@@ -317,19 +310,18 @@ class Conformance:
         if self._signals and number == signal.SIGHUP:
             return
         self._signals += 1
-        changed = self._runner is not None and self._runner.changed
-        device = self._checks.device
+        changed, device = self._runner.changed, self._checks.device
         if self._signals > 1:
             _complain(f'ended; the {device} is not as it was' if changed else 'ended')
             os._exit(1)
-        self._link.call(self._session.interrupt)
+        self._link.call(self._session.runner.interrupt)
         _complain(f'interrupted; restoring the {device}; a second signal ends without it'
                   if changed else 'interrupted')
 
     def _describe_device(self) -> str:
         session, device = self._session, self._checks.device
         found = session.components.found
-        name, detail = (f'{device} {found}', session.record.identity) if found else (
+        name, detail = (f'{device} {found}', session.identity) if found else (
             f'no {device}', self._missing)
         return f'{name}: {detail}' if detail else name
 

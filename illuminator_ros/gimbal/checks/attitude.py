@@ -16,35 +16,36 @@
 
 from __future__ import annotations
 
-from collections.abc import Awaitable, Callable, Iterable
+from collections.abc import Awaitable, Callable
 from dataclasses import replace
 from functools import partial
 from itertools import pairwise
 import math
 from typing import TypeAlias, TypeVar
 
-from .tester import GimbalTester, Information, Limits, NAN, Pose, PROPOSAL, RATE, STEP, TOLERANCE
-from ..axes import AT_LIMIT, LEVEL
+from .session import (
+    FORWARD,
+    GimbalSession,
+    Information,
+    Limits,
+    NAN,
+    NORTH,
+    Pose,
+    PROPOSAL,
+    RATE,
+    STEP,
+    TOLERANCE,
+)
+from ..axes import AT_LIMIT
 from ...mavlink.dialect import flag_names, mavlink, short_names
 from ...mavlink.messages import Message
-from ...payload.checks.component_requirements import (
-    check_command_int,
-    none_of,
-    REQUEST_TIMEOUT,
-    uptime,
-)
+from ...payload.checks.component_requirements import check_command_int, none_of, uptime
 from ...payload.checks.outcomes import Failed, Skipped
-from ...payload.checks.requirement import (
-    AnyRequirement,
-    COMMAND,
-    MESSAGES,
-    Requirement,
-    requirement,
-    Specification,
-)
+from ...payload.checks.requirement import AnyRequirement, Requirement, requirement
 from ...payload.checks.session import Transaction
+from ...payload.checks.specifications import COMMAND, MESSAGES, Specification
 from ...payload.messages import GimbalDeviceAttitudeStatus as AttitudeStatus
-from ...payload.mount_attitude import AXES, yaw_frame
+from ...payload.mount_attitude import AXES
 from ...payload.rotation import Quaternion
 
 STATUS = 'GIMBAL_DEVICE_ATTITUDE_STATUS'
@@ -63,8 +64,10 @@ NO_FAILURES = (sum(AT_LIMIT) | mavlink.GIMBAL_DEVICE_ERROR_FLAGS_CALIBRATION_RUN
                | mavlink.GIMBAL_DEVICE_ERROR_FLAGS_NO_MANAGER)
 FRAMES = (mavlink.GIMBAL_DEVICE_FLAGS_YAW_IN_EARTH_FRAME
           | mavlink.GIMBAL_DEVICE_FLAGS_YAW_IN_VEHICLE_FRAME)
+# The flags from which the frame of the yaw follows.
+FRAME_FLAGS = FRAMES | mavlink.GIMBAL_DEVICE_FLAGS_YAW_LOCK
 
-T = TypeVar('T', bound=GimbalTester)
+T = TypeVar('T', bound=GimbalSession)
 # Sends a setpoint; returns the transaction if the setpoint is a command.
 Send: TypeAlias = Callable[[T, Pose], Awaitable[Transaction | None]]
 
@@ -77,14 +80,14 @@ def reaches(
 ) -> Requirement[T]:
     """Return the requirement that a gimbal turns to a commanded attitude, and then back."""
     @moves(name, title, specification, section)
-    async def check(tester: T) -> str:
-        await tester.begin()
+    async def check(gimbal: T) -> str:
+        await gimbal.begin()
         for angles in ((-2 * STEP, yaw), (-STEP, 0.0)):
-            target = await tester.target(*angles)
-            if one := await send(tester, target):
+            target = await gimbal.target(*angles)
+            if one := await send(gimbal, target):
                 one.expect(accepted=True)
-            await tester.reach(target)
-        return str(await tester.pose())
+            await gimbal.reach(target)
+        return str(await gimbal.pose())
     return check
 
 
@@ -93,10 +96,10 @@ def ignores(
 ) -> Requirement[T]:
     """Return the requirement that a gimbal keeps its attitude after a call of ``send``."""
     @moves(name, title, specification, section)
-    async def check(tester: T) -> None:
-        before = await tester.begin()
-        one = await send(tester, await tester.target(-2 * STEP, STEP))
-        await tester.stays(before, cause)
+    async def check(gimbal: T) -> None:
+        before = await gimbal.begin()
+        one = await send(gimbal, await gimbal.target(-2 * STEP, STEP))
+        await gimbal.stays(before, cause)
         if one:
             one.expect(accepted=False)
     return check
@@ -116,13 +119,13 @@ def turns(
         not limit it.
     """
     @moves(name, title, specification, section)
-    async def check(tester: T) -> str:
-        before = await tester.begin()
-        direction = await tester.free_direction(before, 2 * speed * seconds)
-        one = await send(tester, direction * speed)
-        await tester.pause(seconds)
-        after = await tester.pose()
-        await send(tester, 0.0)
+    async def check(gimbal: T) -> str:
+        before = await gimbal.begin()
+        direction = await gimbal.free_direction(before, 2 * speed * seconds)
+        one = await send(gimbal, direction * speed)
+        await gimbal.pause(seconds)
+        after = await gimbal.pose()
+        await send(gimbal, 0.0)
         if one:
             one.expect(accepted=True)
         turned = after.pitch - before.pitch
@@ -135,23 +138,36 @@ def turns(
     return check
 
 
+async def turn_from_north(gimbal: GimbalSession, heading: float) -> str:
+    """
+    Command a yaw relative to north without locking it, and return it as text.
+
+    :param heading: of the vehicle, degrees.
+    """
+    target = await gimbal.target(-STEP, STEP)
+    yaw = math.remainder(target.yaw + heading, 360.0)
+    await gimbal.point(replace(target, yaw=yaw), flags=NORTH)
+    text = f'{yaw:.1f} deg from north'
+    await gimbal.reach(target, f'{text} at a heading of {heading:.1f} deg')
+    return text
+
+
 # INFORMATION
 
-def information(cls: type[Information]) -> tuple[Requirement[GimbalTester], ...]:
+def information(cls: type[Information]) -> tuple[Requirement[GimbalSession], ...]:
     """Return the requirements on an INFORMATION message."""
     @requirement('information-static', f'sends the same {cls.msgname} at all times', PROPOSAL,
                  'Messaging (GM-10)')
-    async def static(tester: GimbalTester) -> None:
-        first, second = [await tester.session.required(cls) for _ in range(2)]
+    async def static(gimbal: GimbalSession) -> None:
+        first, second = [await gimbal.required(cls) for _ in range(2)]
         # Compare texts, since NaN is not equal to NaN.
         if str(Limits.from_message(first)) != str(Limits.from_message(second)):
             raise Failed('two requests returned different limits or capabilities')
 
     @requirement('limits', 'reports a range of each axis whose ends are in order, and in rad',
                  MESSAGES, cls.msgname)
-    async def limits(tester: GimbalTester) -> str:
-        found = await tester.limits()
-        ranges = dict(zip(AXES, (found.roll, found.pitch, found.yaw), strict=True))
+    async def limits(gimbal: GimbalSession) -> str:
+        ranges = dict(zip(AXES, (await gimbal.limits())[:3], strict=True))
         failures = [
             f'{axis} {math.radians(low):g} to {math.radians(high):g} rad: {reason}'
             for axis, (low, high) in ranges.items() if (reason := _implausible(axis, low, high))]
@@ -161,8 +177,8 @@ def information(cls: type[Information]) -> tuple[Requirement[GimbalTester], ...]
 
     @requirement('pitch-axis', 'reports a pitch axis, if it reports a range of its pitch',
                  PROPOSAL, 'Gimbals (GM-1)')
-    async def pitch_axis(tester: GimbalTester) -> None:
-        found = await tester.limits()
+    async def pitch_axis(gimbal: GimbalSession) -> None:
+        found = await gimbal.limits()
         if not found.capabilities & mavlink.GIMBAL_DEVICE_CAP_FLAGS_HAS_PITCH_AXIS:
             text = f'{cls.msgname} has the capabilities 0x{found.capabilities:x}'
             raise Failed(text) if found.pitch.low < found.pitch.high else Skipped(text)
@@ -180,17 +196,14 @@ def _implausible(axis: str, low: float, high: float) -> str:
         is_far) else ''
 
 
-def command_int(cls: type[Message]) -> Requirement[GimbalTester]:
+def command_int(cls: type[Message]) -> Requirement[GimbalSession]:
     """Return the requirement on COMMAND_INT, with a request of a message."""
     @requirement('command-int', 'executes a command as COMMAND_INT, if it takes that message',
                  COMMAND, 'Use COMMAND_INT or COMMAND_LONG?')
-    async def check(tester: GimbalTester) -> str:
-        session = tester.session
-        before = session.received(cls).total
-        one = await session.command(mavlink.MAV_CMD_REQUEST_MESSAGE, cls.id, as_int=True)
+    async def check(gimbal: GimbalSession) -> str:
+        one, message = await gimbal.ask(cls, as_int=True)
         check_command_int(one)
-        if one.accepted and not await session.runner.until(
-                lambda: session.received(cls).total > before, REQUEST_TIMEOUT):
+        if one.accepted and message is None:
             raise Failed(f'COMMAND_INT {one.text}: {one.answer}, but no {cls.msgname}', one.lines)
         return one.answer
     return check
@@ -198,17 +211,18 @@ def command_int(cls: type[Message]) -> Requirement[GimbalTester]:
 
 # GIMBAL_DEVICE_ATTITUDE_STATUS
 
-def _statuses(
-    name: str, title: str, section: str, deviation: Callable[[AttitudeStatus], str],
-) -> Requirement[GimbalTester]:
+def statuses(
+    name: str, title: str, deviation: Callable[[AttitudeStatus], str],
+    specification: Specification = MESSAGES, section: str = STATUS,
+) -> Requirement[GimbalSession]:
     """
     Return a requirement on each status of the run.
 
     :param deviation: returns the error in a status, '' if there is none.
     """
-    @requirement(name, title, MESSAGES, section, whole_run=True)
-    async def check(tester: GimbalTester) -> str:
-        received = [one for _, one in tester.session.received(AttitudeStatus)]
+    @requirement(name, title, specification, section, whole_run=True)
+    async def check(gimbal: GimbalSession) -> str:
+        received = [one for _, one in gimbal.received(AttitudeStatus)]
         if not received:
             raise Skipped('none was received')
         return none_of([Failed(text, []) for one in received if (text := deviation(one))],
@@ -228,53 +242,50 @@ def _frame(status: AttitudeStatus) -> str:
     return f'flags 0x{status.flags:x} name both frames' if found == FRAMES else ''
 
 
+def _speed(status: AttitudeStatus) -> float:
+    """Return the angular velocity, deg/s; NaN without the rate of each axis."""
+    return math.degrees(math.hypot(
+        status.angular_velocity_x, status.angular_velocity_y, status.angular_velocity_z))
+
+
+def _are_comparable(one: AttitudeStatus, other: AttitudeStatus) -> bool:
+    """Return whether two statuses say how far the gimbal turned between them."""
+    return not (math.isnan(_speed(one) + _speed(other)) or _content(one) or _content(other)
+                or other.time_boot_ms < one.time_boot_ms
+                or (one.flags ^ other.flags) & FRAME_FLAGS)
+
+
 @requirement('continuous', 'reports no attitude that its angular velocity does not explain',
              MESSAGES, STATUS, whole_run=True)
-async def continuous(tester: GimbalTester) -> str:
+async def continuous(gimbal: GimbalSession) -> str:
     """Compare consecutive statuses in the same frame."""
-    received = list(tester.session.received(AttitudeStatus))
     failures, count = [], 0
-    for (before, one), (at, other) in pairwise(received):
-        speeds = [math.hypot(
-            status.angular_velocity_x, status.angular_velocity_y, status.angular_velocity_z)
-            for status in (one, other)]
-        # Without the rate of each axis the statuses do not say how far the gimbal turned.
-        if any(map(math.isnan, speeds)):
-            continue
-        if _content(one) or _content(other) or other.time_boot_ms < one.time_boot_ms:
-            continue
-        try:
-            if yaw_frame(one.flags) is not yaw_frame(other.flags):
-                continue
-        except ValueError:
-            # The requirement "yaw-frame" covers this error.
-            continue
-        count += 1
-        turned = math.degrees(Quaternion(*one.q).normalized().angle_to(
-            Quaternion(*other.q).normalized()))
-        explained = math.degrees(max(speeds)) * (at - before)
-        if turned > 1.5 * explained + JUMP:
-            failures.append(Failed(
-                f'{turned:.0f} deg in {at - before:.2f} s, and at most '
-                f'{math.degrees(max(speeds)):.0f} deg/s', []))
+    for (before, one), (at, other) in pairwise(gimbal.received(AttitudeStatus)):
+        if _are_comparable(one, other):
+            count += 1
+            turned = math.degrees(Quaternion(*one.q).normalized().angle_to(
+                Quaternion(*other.q).normalized()))
+            speed = max(_speed(one), _speed(other))
+            if turned > 1.5 * speed * (at - before) + JUMP:
+                failures.append(Failed(f'{turned:.0f} deg in {at - before:.2f} s, and at most '
+                                       f'{speed:.0f} deg/s', []))
     if not count:
         raise Skipped('fewer than two were received')
     return none_of(failures, count, 'pairs')
 
 
 STATUSES = (
-    _statuses('attitude', 'reports a unit quaternion', STATUS, _content),
-    _statuses('yaw-frame', 'names the one frame of the reported yaw (GM-2)', STATUS, _frame),
+    statuses('attitude', 'reports a unit quaternion', _content),
+    statuses('yaw-frame', 'names the one frame of the reported yaw (GM-2)', _frame),
     continuous, uptime(AttitudeStatus, 'time_boot_ms'),
 )
 
 
 @requirement('failures-at-rest', 'reports no failure before the first command', MESSAGES,
              'GIMBAL_DEVICE_ERROR_FLAGS')
-async def failures_at_rest(tester: GimbalTester) -> None:
+async def failures_at_rest(gimbal: GimbalSession) -> None:
     """Read the flags, except those of normal operation."""
-    seen = {one.failure_flags & ~NO_FAILURES
-            for _, one in tester.session.idle(AttitudeStatus)}
+    seen = {one.failure_flags & ~NO_FAILURES for _, one in gimbal.idle(AttitudeStatus)}
     if names := [name for flag, name in short_names('GIMBAL_DEVICE_ERROR_FLAGS').items()
                  if any(one & flag for one in seen)]:
         raise Failed(', '.join(names))
@@ -285,41 +296,40 @@ async def failures_at_rest(tester: GimbalTester) -> None:
 # Motion
 
 @moves('stop', 'stops at a rate of 0', MESSAGES, 'GIMBAL_DEVICE_SET_ATTITUDE')
-async def stop(tester: GimbalTester) -> None:
+async def stop(gimbal: GimbalSession) -> None:
     """Turn down or up, then send a rate of 0."""
-    direction = await tester.free_direction(await tester.begin(), 2 * RATE)
-    await tester.point(None, rates=(NAN, direction * RATE, NAN))
-    await tester.pause(0.8)
-    await tester.point(None, rates=(NAN, 0.0, NAN))
-    await tester.pause(0.5)
-    await tester.stays(await tester.steady(), 'after a rate of 0')
+    direction = await gimbal.free_direction(await gimbal.begin(), 2 * RATE)
+    await gimbal.point(None, rates=(NAN, direction * RATE, NAN))
+    await gimbal.pause(0.8)
+    await gimbal.point(None, rates=(NAN, 0.0, NAN))
+    await gimbal.pause(1.0)
+    await gimbal.stays(await gimbal.pose(), 'after a rate of 0')
 
 
-async def _end_of_pitch(tester: GimbalTester) -> tuple[int, float, float]:
+async def _command_end_of_pitch(gimbal: GimbalSession) -> tuple[int, float, float]:
     """
-    Return an end of the range of pitch, and a pitch to command, degrees.
+    Command a pitch beyond the range, or else the steepest one.
 
-    :return: 1 for the upper end, or -1 for the lower one; the end; a pitch beyond it, or else the
-        steepest one.
+    :return: 1 for the upper end, or -1 for the lower one; this end, and the commanded pitch,
+        degrees.
     """
-    await tester.requires(mavlink.GIMBAL_DEVICE_CAP_FLAGS_HAS_PITCH_AXIS)
-    low, high = (await tester.limits()).pitch
+    await gimbal.requires(mavlink.GIMBAL_DEVICE_CAP_FLAGS_HAS_PITCH_AXIS)
+    low, high = (await gimbal.limits()).pitch
     if not (math.isfinite(low) and math.isfinite(high)):
         raise Skipped('it does not report the range of its pitch')
-    if high > STEEP and low >= -STEEP:
-        return -1, low, low - STEP
-    return 1, high, STEEP if high > STEEP else high + STEP
+    sign, limit = (-1, low) if high > STEEP and low >= -STEEP else (1, high)
+    commanded = STEEP if limit > STEEP else limit + sign * STEP
+    await gimbal.point(replace(await gimbal.begin(), roll=0.0, pitch=commanded))
+    return sign, limit, commanded
 
 
 @moves('range', 'keeps within the range that it reports', MESSAGES, 'GIMBAL_DEVICE_INFORMATION')
-async def within_range(tester: GimbalTester) -> str:
+async def within_range(gimbal: GimbalSession) -> str:
     """Command a pitch beyond the range, or the steepest one in it."""
-    sign, limit, commanded = await _end_of_pitch(tester)
-    start = await tester.begin()
-    await tester.point(replace(start, roll=0.0, pitch=commanded))
-    await tester.until(lambda pose: abs(pose.pitch - limit) < 0.5)
-    await tester.pause(0.5)
-    reached = await tester.pose()
+    sign, limit, commanded = await _command_end_of_pitch(gimbal)
+    await gimbal.pose_when(lambda pose: abs(pose.pitch - limit) < 0.5)
+    await gimbal.pause(0.5)
+    reached = await gimbal.pose()
     text = f'commanded {commanded:.1f} deg, turned to {reached.pitch:.1f} deg'
     beyond = sign * (reached.pitch - limit)
     if beyond > TOLERANCE:
@@ -334,55 +344,45 @@ async def within_range(tester: GimbalTester) -> str:
 
 @moves('limit-flags', 'reports that the commanded pitch is beyond its range', MESSAGES,
        'GIMBAL_DEVICE_ERROR_FLAGS')
-async def limit_flags(tester: GimbalTester) -> None:
+async def limit_flags(gimbal: GimbalSession) -> None:
     """Command a pitch beyond the range, and wait for AT_PITCH_LIMIT."""
-    sign, limit, commanded = await _end_of_pitch(tester)
+    sign, limit, commanded = await _command_end_of_pitch(gimbal)
     if sign * (commanded - limit) <= 0:
         raise Skipped(UNREACHABLE)
-    start = await tester.begin()
-    await tester.point(replace(start, roll=0.0, pitch=commanded))
-    pose = await tester.until(
-        lambda pose: bool(pose.failures & mavlink.GIMBAL_DEVICE_ERROR_FLAGS_AT_PITCH_LIMIT)
-        and abs(pose.pitch - limit) <= TOLERANCE)
+    flag = mavlink.GIMBAL_DEVICE_ERROR_FLAGS_AT_PITCH_LIMIT
+    pose = await gimbal.pose_when(
+        lambda pose: bool(pose.failures & flag) and abs(pose.pitch - limit) <= TOLERANCE)
     if abs(pose.pitch - limit) > TOLERANCE:
         raise Skipped(f'its pitch is {pose.pitch:.1f} deg, and its limit {limit:.1f} deg')
-    if not pose.failures & mavlink.GIMBAL_DEVICE_ERROR_FLAGS_AT_PITCH_LIMIT:
+    if not pose.failures & flag:
         raise Failed(f'commanded {commanded:.1f} deg, stopped at {pose.pitch:.1f} deg, no '
                      'AT_PITCH_LIMIT')
 
 
-def _position(flag: int, capability: int) -> Requirement[GimbalTester]:
+def _position(flag: int, capability: int) -> Requirement[GimbalSession]:
     [name] = flag_names('GIMBAL_DEVICE_FLAGS', flag)
 
     @moves(name, f'reports {name.upper()} when it is commanded to', MESSAGES,
            'GIMBAL_DEVICE_FLAGS')
-    async def check(tester: GimbalTester) -> str:
-        await tester.requires(capability)
-        await tester.begin()
-        await tester.point(None, flags=flag | LEVEL
-                           | mavlink.GIMBAL_DEVICE_FLAGS_YAW_IN_VEHICLE_FRAME)
-        pose = await tester.until(lambda pose: bool(pose.flags & flag), 2.0)
+    async def check(gimbal: GimbalSession) -> str:
+        await gimbal.requires(capability)
+        await gimbal.begin()
+        await gimbal.point(None, flags=flag | FORWARD)
+        pose = await gimbal.pose_when(lambda pose: bool(pose.flags & flag), 2.0)
         if not pose.flags & flag:
             raise Failed(f'flags 0x{pose.flags:x}')
-        await tester.pause(1.0)
-        return str(await tester.pose())
+        await gimbal.pause(1.0)
+        return str(await gimbal.pose())
     return check
 
 
-POSITIONS = (_position(mavlink.GIMBAL_DEVICE_FLAGS_NEUTRAL,
-                       mavlink.GIMBAL_DEVICE_CAP_FLAGS_HAS_NEUTRAL),
-             _position(mavlink.GIMBAL_DEVICE_FLAGS_RETRACT,
-                       mavlink.GIMBAL_DEVICE_CAP_FLAGS_HAS_RETRACT))
 MOTION: tuple[AnyRequirement, ...] = (
     ignores('hold', 'keeps its attitude when attitude and rates are unset', MESSAGES,
             'GIMBAL_DEVICE_SET_ATTITUDE', 'a setpoint of NaN',
-            lambda tester, pose: tester.point(None)),
+            lambda gimbal, pose: gimbal.point(None)),
     turns('rate', 'turns at a rate', MESSAGES, 'GIMBAL_DEVICE_SET_ATTITUDE',
-          lambda tester, speed: tester.point(None, rates=(NAN, speed, NAN)), RATE,
+          lambda gimbal, speed: gimbal.point(None, rates=(NAN, speed, NAN)), RATE,
           seconds=1.5, slowest=1 / 3, fastest=2.0),
-    stop, within_range, limit_flags, *POSITIONS)
-
-
-def earth_yaw(poses: Iterable[Pose]) -> list[float]:
-    """Return the yaws relative to north, degrees."""
-    return [math.remainder(pose.yaw + pose.heading, 360.0) for pose in poses]
+    stop, within_range, limit_flags,
+    _position(mavlink.GIMBAL_DEVICE_FLAGS_NEUTRAL, mavlink.GIMBAL_DEVICE_CAP_FLAGS_HAS_NEUTRAL),
+    _position(mavlink.GIMBAL_DEVICE_FLAGS_RETRACT, mavlink.GIMBAL_DEVICE_CAP_FLAGS_HAS_RETRACT))

@@ -23,53 +23,34 @@ from __future__ import annotations
 
 from collections.abc import AsyncIterator
 import contextlib
-from dataclasses import replace
 import math
 
 from . import attitude
-from .attitude import earth_yaw, ignores, moves, reaches
-from .tester import (
-    describe,
-    GIMBAL,
-    GimbalTester,
-    NAN,
-    Pose,
-    PROPOSAL,
-    quaternion_of,
-    radians,
-    STEP,
-    TOLERANCE,
-)
+from .attitude import ignores, moves, reaches
+from .session import FORWARD, GIMBAL, GimbalSession, NAN, Pose, PROPOSAL, STEP, TOLERANCE
 from .. import messages as gimbal
 from ..axes import LEVEL
 from ...mavlink.dialect import mavlink
 from ...mavlink.messages import Address, CommandLong, Heartbeat, heartbeat, Message, target_of
 from ...payload.checks import component_requirements as component
 from ...payload.checks.outcomes import Failed, Skipped
-from ...payload.checks.requirement import (
-    Conditions,
-    MESSAGES,
-    Option,
-    PayloadChecks,
-    Requirement,
-    requirement,
-    ROUTING,
-)
-from ...payload.checks.session import Session
+from ...payload.checks.requirement import Option, PayloadChecks, Requirement, requirement
+from ...payload.checks.session import Conditions, Session
+from ...payload.checks.specifications import MESSAGES, ROUTING
 from ...payload.messages import GimbalDeviceAttitudeStatus as AttitudeStatus
-from ...payload.mount_attitude import UNSET_VECTOR
-from ...payload.rotation import Quaternion
+from ...payload.mount_attitude import Components, UNSET_VECTOR
+from ...payload.rotation import Quaternion, Vector
 
+INFORMATION = gimbal.GimbalDeviceInformation
 # s
 ANNOUNCE_INTERVAL = 0.4
 # mavlink.MAV_COMP_ID_ONBOARD_COMPUTER
 MANAGER_ID = 191
-VEHICLE_FRAME = mavlink.GIMBAL_DEVICE_FLAGS_YAW_IN_VEHICLE_FRAME
 # ESTIMATOR_STATUS_FLAGS: only the attitude of the vehicle is valid.
 ESTIMATOR_ATTITUDE = 1
 
 
-class DeviceTester(GimbalTester):
+class DeviceSession(GimbalSession):
     """
     Plays the gimbal manager of a device.
 
@@ -77,83 +58,78 @@ class DeviceTester(GimbalTester):
         to send none.
     """
 
-    information = gimbal.GimbalDeviceInformation
+    messages = (*Session.messages, INFORMATION, AttitudeStatus)
+    information = INFORMATION
     status = AttitudeStatus
 
-    def __init__(self, session: Session, conditions: Conditions) -> None:
-        super().__init__(session, conditions)
+    def __init__(self, conditions: Conditions) -> None:
+        super().__init__(conditions)
         self.heading: float | None = None
 
+    def is_device(self, message: Message) -> bool:
+        """See :class:`Session`."""
+        # Gimbal managers send these messages with a gimbal_device_id.
+        return (isinstance(message, INFORMATION | AttitudeStatus)
+                and message.gimbal_device_id == 0
+                or isinstance(message, Heartbeat) and message.type == mavlink.MAV_TYPE_GIMBAL)
+
     @property
-    def manager(self) -> Address:
+    def operator(self) -> Address:
         """Return the address of the manager that is played."""
-        return Address(self.session.device.system,
-                       int(self.conditions.options.get('manager', MANAGER_ID)))
+        return Address(
+            self.device.system, int(self.conditions.options.get('manager', MANAGER_ID)))
 
     def announce(self, manager: Address) -> None:
         """Announce a manager of the device."""
-        self.session.send(heartbeat(mavlink.MAV_TYPE_ONBOARD_CONTROLLER), manager)
-        self.session.send(gimbal.GimbalManagerStatus(
-            0, int(LEVEL), self.session.device.component, *manager, 0, 0), manager)
+        self.send(heartbeat(mavlink.MAV_TYPE_ONBOARD_CONTROLLER), manager)
+        self.send(gimbal.GimbalManagerStatus(
+            0, int(LEVEL), self.device.component, *manager, 0, 0), manager)
         if self.heading is not None:
             q = Quaternion.from_euler(0.0, 0.0, math.radians(self.heading))
-            self.session.send(gimbal.AutopilotStateForGimbalDevice(
-                *self.session.device, int(self.session.now * 1e6), q, 0, NAN, NAN, NAN, 0, NAN,
+            self.send(gimbal.AutopilotStateForGimbalDevice(
+                *self.device, int(self.now * 1e6), q, 0, NAN, NAN, NAN, 0, NAN,
                 ESTIMATOR_ATTITUDE, 0, 1e-5), manager)
 
     async def prepare(self) -> None:
-        """See :class:`GimbalTester`."""
+        """See :class:`GimbalSession`."""
         await self.pause(2 * ANNOUNCE_INTERVAL)
 
     async def pause(self, seconds: float) -> None:
-        """See :class:`GimbalTester`."""
-        end = self.session.now + seconds
-        while (left := end - self.session.now) > 0:
-            self.announce(self.manager)
-            await self.session.runner.sleep(min(ANNOUNCE_INTERVAL, left))
+        """See :class:`GimbalSession`."""
+        end = self.now + seconds
+        while (left := end - self.now) > 0:
+            self.announce(self.operator)
+            await self.sleep(min(ANNOUNCE_INTERVAL, left))
 
-    async def point(
-        self, pose: Pose | None, *, flags: int = LEVEL | VEHICLE_FRAME,
-        rates: tuple[float, float, float] = UNSET_VECTOR, source: Address | None = None,
-        target: Address | None = None,
-    ) -> None:
-        """See :class:`GimbalTester`; the default source is the manager."""
-        self.session.send(gimbal.GimbalDeviceSetAttitude(
-            *(target or self.session.device), flags, quaternion_of(pose), *radians(rates)),
-            source or self.manager)
+    def setpoint(
+        self, target: Address, device_id: int | None, flags: int, q: Components, rates: Vector,
+    ) -> Message:
+        """See :class:`GimbalSession`."""
+        return gimbal.GimbalDeviceSetAttitude(*target, flags, q, *rates)
 
 
 # GIMBAL_DEVICE_INFORMATION and GIMBAL_DEVICE_ATTITUDE_STATUS
 
-@requirement('status-to-all', 'sends its attitude to all components (GM-20)', GIMBAL,
-             'Gimbal Device Broadcast/Status Messages', whole_run=True)
-async def status_to_all(tester: DeviceTester) -> str:
-    """Read the target fields."""
-    received = [one for _, one in tester.session.received(AttitudeStatus)]
-    if not received:
-        raise Skipped('none was received')
-    return component.none_of([
-        Failed(f'to {target}', []) for target in map(target_of, received) if any(target)],
-        len(received), 'statuses')
+def _not_to_all(status: AttitudeStatus) -> str:
+    target = target_of(status)
+    return f'to {target}' if any(target) else ''
 
 
 @requirement('device-id', 'leaves gimbal_device_id 0, as it is a component of its own', MESSAGES,
              'GIMBAL_DEVICE_INFORMATION')
-async def device_id(tester: DeviceTester) -> None:
+async def device_id(device: DeviceSession) -> None:
     """Read it in INFORMATION and in the status."""
-    information = await tester.session.required(gimbal.GimbalDeviceInformation)
-    found = {information.gimbal_device_id, *(
-        one.gimbal_device_id for _, one in tester.session.received(AttitudeStatus))}
+    found = {(await device.required(INFORMATION)).gimbal_device_id, *(
+        one.gimbal_device_id for _, one in device.received(AttitudeStatus))}
     if found != {0}:
         raise Failed(f'gimbal_device_id {", ".join(map(str, sorted(found)))}')
 
 
 @requirement('north-needs-heading', 'accepts yaw relative to north only with a heading from the '
              'vehicle (GM-3)', MESSAGES, 'GIMBAL_DEVICE_CAP_FLAGS')
-async def north_needs_heading(tester: DeviceTester) -> None:
+async def north_needs_heading(device: DeviceSession) -> None:
     """Read the statuses before the first command, while the checks send no heading."""
-    unknown = [one for _, one in tester.session.idle(AttitudeStatus)
-               if math.isnan(one.delta_yaw)]
+    unknown = [one for _, one in device.idle(AttitudeStatus) if math.isnan(one.delta_yaw)]
     if not unknown:
         raise Skipped('its statuses have the heading')
     if any(one.flags & mavlink.GIMBAL_DEVICE_FLAGS_ACCEPTS_YAW_IN_EARTH_FRAME for one in unknown):
@@ -162,61 +138,62 @@ async def north_needs_heading(tester: DeviceTester) -> None:
 
 # Setpoints, and their sources
 
-async def _point_from_others(tester: DeviceTester, pose: Pose) -> None:
+async def _point_from_others(device: DeviceSession, pose: Pose) -> None:
     """Send setpoints from our own address and from another component of the device's system."""
-    for source in (tester.session.address, tester.session.components.free_component()):
-        await tester.point(pose, source=source)
+    for source in (device.address, device.components.free_component()):
+        await device.point(pose, source=source)
 
 
-async def _announce_other(tester: DeviceTester, pose: Pose) -> None:
+async def _announce_other(device: DeviceSession, pose: Pose) -> None:
     """Announce a second manager, and send setpoints from it."""
-    other = tester.session.components.free_component()
-    tester.announce(other)
-    await tester.pause(2 * ANNOUNCE_INTERVAL)
-    tester.announce(other)
-    await tester.point(pose, source=other)
+    other = device.components.free_component()
+    device.announce(other)
+    await device.pause(2 * ANNOUNCE_INTERVAL)
+    device.announce(other)
+    await device.point(pose, source=other)
 
 
-async def _send_to_manager(tester: DeviceTester, pose: Pose) -> None:
+async def _send_to_manager(device: DeviceSession, pose: Pose) -> None:
     """Send messages and a command for gimbal managers, from the device's manager."""
-    device = tester.session.device
+    address = device.device
+    ids = (*address, int(LEVEL), address.component)
     pitch, yaw = math.radians(pose.pitch), math.radians(pose.yaw)
-    ids = (*device, int(LEVEL), device.component)
     for message in (
-            gimbal.GimbalManagerSetAttitude(*ids, quaternion_of(pose), *UNSET_VECTOR),
+            gimbal.GimbalManagerSetAttitude(
+                *ids, Quaternion.from_euler(0.0, pitch, yaw), *UNSET_VECTOR),
             gimbal.GimbalManagerSetPitchyaw(*ids, pitch, yaw, NAN, NAN),
             gimbal.GimbalManagerSetManualControl(*ids, -0.5, 0.5, NAN, NAN),
-            CommandLong(*device, mavlink.MAV_CMD_DO_GIMBAL_MANAGER_PITCHYAW, 0, pose.pitch,
-                        pose.yaw, NAN, NAN, float(LEVEL), 0.0, float(device.component))):
-        tester.session.send(message, tester.manager)
+            CommandLong(*address, mavlink.MAV_CMD_DO_GIMBAL_MANAGER_PITCHYAW, 0, pose.pitch,
+                        pose.yaw, NAN, NAN, float(LEVEL), 0.0, float(address.component))):
+        device.send(message, device.operator)
 
 
-async def _point_others(tester: DeviceTester, pose: Pose) -> None:
+async def _point_others(device: DeviceSession, pose: Pose) -> None:
     """Send setpoints to addresses that do not exist."""
-    session = tester.session
-    for target in (session.components.free_component(200),
-                   Address(session.components.free_system(), session.device.component)):
-        await tester.point(pose, target=target)
+    others = device.components
+    for target in (others.free_component(200),
+                   Address(others.free_system(), device.device.component)):
+        await device.point(pose, target=target)
 
 
 # Yaw relative to north
 
 @contextlib.asynccontextmanager
-async def _heading(tester: DeviceTester, heading: float) -> AsyncIterator[None]:
+async def _heading(device: DeviceSession, heading: float) -> AsyncIterator[None]:
     """
     Send a heading of the vehicle, degrees, during the context.
 
     :raises Skipped: if the device lacks a yaw axis, or does not use the heading.
     """
-    await tester.requires(mavlink.GIMBAL_DEVICE_CAP_FLAGS_SUPPORTS_YAW_IN_EARTH_FRAME)
-    await tester.requires(mavlink.GIMBAL_DEVICE_CAP_FLAGS_HAS_YAW_AXIS)
-    if any(not math.isnan(one.delta_yaw) for _, one in tester.session.idle(AttitudeStatus)):
+    await device.requires(mavlink.GIMBAL_DEVICE_CAP_FLAGS_SUPPORTS_YAW_IN_EARTH_FRAME)
+    await device.requires(mavlink.GIMBAL_DEVICE_CAP_FLAGS_HAS_YAW_AXIS)
+    if any(not math.isnan(one.delta_yaw) for _, one in device.idle(AttitudeStatus)):
         raise Skipped('another component sends it a heading')
-    await tester.begin()
-    tester.heading = heading
+    await device.begin()
+    device.heading = heading
     try:
-        await tester.pause(2 * ANNOUNCE_INTERVAL)
-        pose = await tester.pose()
+        await device.pause(2 * ANNOUNCE_INTERVAL)
+        pose = await device.pose()
         if not pose.flags & mavlink.GIMBAL_DEVICE_FLAGS_ACCEPTS_YAW_IN_EARTH_FRAME:
             raise Skipped('it does not report ACCEPTS_YAW_IN_EARTH_FRAME')
         if abs(math.remainder(pose.heading - heading, 360.0)) > TOLERANCE:
@@ -224,44 +201,34 @@ async def _heading(tester: DeviceTester, heading: float) -> AsyncIterator[None]:
                           f'{pose.heading:.1f} deg')
         yield
     finally:
-        tester.heading = None
+        device.heading = None
         # End a lock, in which the yaw of an old device cannot be read without the heading.
-        await tester.point(None)
+        await device.point(None)
 
 
 @moves('earth-frame', 'takes and reports yaw relative to north (GM-2)', MESSAGES,
        'GIMBAL_DEVICE_SET_ATTITUDE')
-async def earth_frame(tester: DeviceTester) -> str:
-    """Send a heading of 40 degrees, and command a yaw of 55 degrees."""
-    async with _heading(tester, 40.0):
-        target = await tester.target(-STEP, STEP)
-        commanded = 40.0 + target.yaw
-        await tester.point(replace(target, yaw=commanded),
-                           flags=LEVEL | mavlink.GIMBAL_DEVICE_FLAGS_YAW_IN_EARTH_FRAME)
-        pose = await tester.settle(target)
-        (yaw,) = earth_yaw([pose])
-        # A device need not know the heading.
-        if not pose.near(target) or abs(yaw - commanded) > TOLERANCE:
-            raise Failed(f'commanded {commanded:g} deg from north at a heading of 40 deg: it '
-                         f'reports {pose}, {yaw:.1f} deg from north')
-        return f'{yaw:.1f} deg from north'
+async def earth_frame(device: DeviceSession) -> str:
+    """Send a heading of 40 degrees, and command a yaw relative to north."""
+    async with _heading(device, 40.0):
+        return await attitude.turn_from_north(device, 40.0)
 
 
 @moves('yaw-lock', 'holds a locked yaw against north while the vehicle turns (GM-3)', MESSAGES,
        'GIMBAL_DEVICE_FLAGS')
-async def yaw_lock(tester: DeviceTester) -> str:
+async def yaw_lock(device: DeviceSession) -> str:
     """Lock the yaw straight ahead, then send the heading of a vehicle that turns."""
-    await tester.requires(mavlink.GIMBAL_DEVICE_CAP_FLAGS_HAS_YAW_LOCK)
-    async with _heading(tester, 40.0):
-        start, target = await tester.target(-STEP, 0.0), await tester.target(-STEP, -STEP)
-        lock = mavlink.GIMBAL_DEVICE_FLAGS_YAW_LOCK
-        await tester.point(start, flags=LEVEL | lock | VEHICLE_FRAME)
-        await tester.pause(0.5)
-        pose = await tester.until(lambda pose: bool(pose.flags & lock), 1.5)
+    lock = mavlink.GIMBAL_DEVICE_FLAGS_YAW_LOCK
+    await device.requires(mavlink.GIMBAL_DEVICE_CAP_FLAGS_HAS_YAW_LOCK)
+    async with _heading(device, 40.0):
+        start, target = await device.target(-STEP, 0.0), await device.target(-STEP, -STEP)
+        await device.point(start, flags=FORWARD | lock)
+        await device.pause(0.5)
+        pose = await device.pose_when(lambda pose: bool(pose.flags & lock), 1.5)
         if not pose.flags & lock:
             raise Failed(f'flags 0x{pose.flags:x} without YAW_LOCK')
-        tester.heading = 40.0 + STEP
-        pose = await tester.settle(target)
+        device.heading = 40.0 + STEP
+        pose = await device.settle(target)
         if pose.near(start) and not start.near(target):
             raise Skipped('it did not turn; the vehicle did not, either')
         if not pose.near(target):
@@ -269,8 +236,7 @@ async def yaw_lock(tester: DeviceTester) -> str:
         return str(pose)
 
 
-INFORMATION = gimbal.GimbalDeviceInformation
-REQUIREMENTS: tuple[Requirement[DeviceTester], ...] = (
+REQUIREMENTS: tuple[Requirement[DeviceSession], ...] = (
     component.heartbeat,
     component.heartbeat_type(mavlink.MAV_TYPE_GIMBAL, 'GIMBAL', 'a gimbal'),
     component.heartbeat_autopilot, component.address,
@@ -283,7 +249,7 @@ REQUIREMENTS: tuple[Requirement[DeviceTester], ...] = (
     component.unknown_command, component.unknown_message, component.broadcast(INFORMATION),
     attitude.command_int(INFORMATION),
     reaches('setpoint', 'turns to an attitude that its manager commands', GIMBAL,
-            'Control of a Gimbal Device', lambda tester, pose: tester.point(pose)),
+            'Control of a Gimbal Device', DeviceSession.point),
     *attitude.MOTION, earth_frame, yaw_lock,
     ignores('only-manager', 'ignores setpoints of components that are not its manager (GM-19)',
             GIMBAL, 'Gimbal Manager and Gimbal Device',
@@ -297,25 +263,14 @@ REQUIREMENTS: tuple[Requirement[DeviceTester], ...] = (
     ignores('other-target', 'ignores setpoints for other components and systems', ROUTING,
             'Routing Detail', 'setpoints for other addresses', _point_others),
     *component.interval_requirements(AttitudeStatus),
-    component.heartbeat_rate, status_to_all, *attitude.STATUSES, *component.ACKNOWLEDGEMENTS,
-    component.checksums,
+    component.heartbeat_rate,
+    attitude.statuses('status-to-all', 'sends its attitude to all components (GM-20)', _not_to_all,
+                      GIMBAL, 'Gimbal Device Broadcast/Status Messages'),
+    *attitude.STATUSES, *component.ACKNOWLEDGEMENTS, component.checksums,
 )
-
-
-def is_device(message: Message) -> bool:
-    """Return whether a message identifies its sender as a gimbal device."""
-    # Gimbal managers send these messages with a gimbal_device_id.
-    return (isinstance(message, gimbal.GimbalDeviceInformation | AttitudeStatus)
-            and message.gimbal_device_id == 0
-            or isinstance(message, Heartbeat) and message.type == mavlink.MAV_TYPE_GIMBAL)
-
-
-CHECKS: PayloadChecks[DeviceTester] = PayloadChecks(
-    payload='gimbal', device='gimbal', messages=(INFORMATION, AttitudeStatus),
-    is_device=is_device,
+CHECKS: PayloadChecks[DeviceSession] = PayloadChecks(
+    payload='gimbal', device='gimbal', session=DeviceSession, requirements=REQUIREMENTS,
     evidence='HEARTBEAT with MAV_TYPE_GIMBAL, or GIMBAL_DEVICE_ATTITUDE_STATUS',
-    tester=DeviceTester, requirements=REQUIREMENTS,
-    describe=describe,
     risk='turn to all sides and to the end of its range',
     question='Most checks turn gimbal {device}, also to the end of its range and to its '
              'retracted position.\nAt the end it is turned back.\n'

@@ -21,34 +21,18 @@ from dataclasses import astuple
 from functools import partial
 import math
 
-from .tester import (
-    Change,
-    CONFIGURE,
-    DIM,
-    ILLUMINATOR,
-    LightTester,
-    LOW,
-    ON_OFF,
-    same,
-    status_text,
-)
+from .session import Change, CONFIGURE, DIM, LightSession, LOW, ON_OFF, same, status_text
 from ..messages import IlluminatorStatus
 from ..model import flag_names, float32, KNOWN_FLAGS, Mode, Status, StrobeRange
-from ...mavlink import messages
 from ...mavlink.dialect import mavlink
+from ...mavlink.messages import Address, ComponentInformationBasic
 from ...payload.checks import component_requirements as component
 from ...payload.checks.outcomes import fail_if, Failed, Skipped
-from ...payload.checks.requirement import (
-    COMMAND,
-    MESSAGES,
-    Option,
-    PayloadChecks,
-    Requirement,
-    requirement,
-    ROUTING,
-    Specification,
-)
+from ...payload.checks.requirement import Option, PayloadChecks, Requirement, requirement
+from ...payload.checks.specifications import COMMAND, MESSAGES, ROUTING, Specification
 
+ILLUMINATOR = Specification(
+    'illuminator protocol', 'https://mavlink.io/en/services/illuminator.html')
 CONFIGURE_SECTION = 'MAV_CMD_DO_ILLUMINATOR_CONFIGURE'
 INTERNAL = float(Mode.INTERNAL_CONTROL)
 
@@ -57,20 +41,17 @@ INTERNAL = float(Mode.INTERNAL_CONTROL)
 
 @requirement('other-target', 'ignores commands for other components and systems', ROUTING,
              'Routing Detail', changes=True)
-async def other_target(tester: LightTester) -> None:
+async def other_target(light: LightSession) -> None:
     """Send ON to addresses without a component, in the same and in another system."""
-    await tester.ensure_dim()
-    session = tester.session
-    others = (
-        session.components.free_component(200),
-        messages.Address(session.components.free_system(), session.device.component or 200))
+    await light.ensure_dim()
+    others = (light.components.free_component(200),
+              Address(light.components.free_system(), light.device.component or 200))
     failures = []
     for other in others:
-        one = await session.send_to_other(other, ON_OFF, 1)
-        status = await tester.status()
-        if status is not None and status.enabled:
+        one = await light.send_to_other(other, ON_OFF, 1)
+        if await light.enabled():
             failures.append(one.failure(f'switched on by a command for {other}'))
-            await tester.baseline()
+            await light.baseline()
         elif one.acks:
             failures.append(one.failure(f'answered a command for {other}: {one.answer}'))
     fail_if(failures)
@@ -78,10 +59,10 @@ async def other_target(tester: LightTester) -> None:
 
 @requirement('command-int', 'executes a command as COMMAND_INT, if it takes that message', COMMAND,
              'Use COMMAND_INT or COMMAND_LONG?', changes=True)
-async def command_int(tester: LightTester) -> str:
+async def command_int(light: LightSession) -> str:
     """Switch the light on with COMMAND_INT."""
-    await tester.ensure_dim()
-    change = await tester.switch(True, as_int=True)
+    await light.ensure_dim()
+    change = await light.switch(True, as_int=True)
     one = change.transaction
     component.check_command_int(one)
     if not one.accepted and one.result != mavlink.MAV_RESULT_COMMAND_LONG_ONLY:
@@ -92,65 +73,62 @@ async def command_int(tester: LightTester) -> str:
 
 @requirement('repeated', 'handles a repeated command like the first one', COMMAND,
              'COMMAND_LONG sequence', changes=True)
-async def repeated(tester: LightTester) -> None:
+async def repeated(light: LightSession) -> None:
     """Repeat ON, as after a lost acknowledgement."""
-    await tester.ensure_dim()
-    first = (await tester.switch(True)).transaction
+    await light.ensure_dim()
+    first = (await light.switch(True)).transaction
     if not first.accepted:
         raise Skipped(f'it cannot be switched on: {first.answer}')
-    status = await tester.status()
-    if status is None or not status.enabled:
+    if not await light.enabled():
         raise Skipped('the status does not show it on after the first command')
-    again = await tester.session.command(ON_OFF, 1, confirmation=1)
-    status = await tester.status()
+    again = await light.command(ON_OFF, 1, confirmation=1)
+    enabled = await light.enabled()
     if not again.accepted:
         raise Failed(f'the second {again.text}: {again.answer}')
-    if status is not None and status.enabled is False:
+    if enabled is False:
         raise Failed(f'the second {again.text} switched it off')
 
 
 # Switching and configuring
 
 @requirement('on', 'can be switched on', ILLUMINATOR, 'ON/OFF', changes=True)
-async def on(tester: LightTester) -> None:
+async def on(light: LightSession) -> None:
     """Switch the light on at low brightness."""
-    await tester.ensure_dim()
-    await _switch(tester, True)
+    await light.ensure_dim()
+    await _switch(light, True)
 
 
 @requirement('off', 'can be switched off', ILLUMINATOR, 'ON/OFF', changes=True)
-async def off(tester: LightTester) -> None:
+async def off(light: LightSession) -> None:
     """Switch the light off while it is on; a light that is already off shows no change."""
-    status = await tester.status()
-    if status is not None and not status.enabled:
-        await tester.ensure_dim()
-        await tester.switch(True)
-    await _switch(tester, False)
+    if await light.enabled() is False:
+        await light.ensure_dim()
+        await light.switch(True)
+    await _switch(light, False)
 
 
-async def _switch(tester: LightTester, on: bool) -> None:
-    before = await tester.status()
-    change = await tester.switch(on)
-    fail_if([change.unmet('enable')])
-    if before is not None and before.enabled is on:
+async def _switch(light: LightSession, on: bool) -> None:
+    before = await light.enabled()
+    fail_if([(await light.switch(on)).unmet('enable')])
+    if before is on:
         state, other = ('on', 'off') if on else ('off', 'on')
         raise Skipped(f'accepted, but it was {state} and could not be switched {other} before')
 
 
-async def _synchronise(tester: LightTester) -> Change:
+async def _synchronise(light: LightSession) -> Change:
     """Configure external sync; at 0 % without consent, because a signal may strobe the light."""
-    brightness = LOW if tester.conditions.consent else 0.0
-    return await tester.configure(Mode.EXTERNAL_SYNC, brightness=brightness)
+    brightness = LOW if light.consent else 0.0
+    return await light.configure(Mode.EXTERNAL_SYNC, brightness=brightness)
 
 
-async def _unmet_mode(tester: LightTester, one: Change, mode: Mode) -> Failed | None:
+async def _unmet_mode(light: LightSession, one: Change, mode: Mode) -> Failed | None:
     """
     Return why a mode was not configured, None if a status does not contradict.
 
     :raises Skipped: if the light rejects a mode that it does not list.
     """
     if one.transaction.result == mavlink.MAV_RESULT_DENIED:
-        status = await tester.status()
+        status = await light.status()
         bitmask = status.mode_bitmask if status else 0
         # Lights differ in the meaning of a bit: the value of the enum, or 1 << value.
         shifts = [shift for shift in (0, 1) if not bitmask & ~(3 << shift)]
@@ -161,33 +139,33 @@ async def _unmet_mode(tester: LightTester, one: Change, mode: Mode) -> Failed | 
 
 @requirement('mode-internal', 'accepts mode internal_control if mode_bitmask lists it',
              ILLUMINATOR, 'MODES', changes=True)
-async def internal(tester: LightTester) -> None:
+async def internal(light: LightSession) -> None:
     """Configure the mode, from external_sync if the light accepts that."""
-    await tester.baseline()
-    await _synchronise(tester)
-    before = await tester.status()
+    await light.baseline()
+    await _synchronise(light)
+    before = await light.status()
     # The brightness changes, too, because a light with only one mode would show no change.
-    one = await tester.configure(Mode.INTERNAL_CONTROL, brightness=DIM)
-    after = await tester.status()
+    one = await light.configure(Mode.INTERNAL_CONTROL, brightness=DIM)
+    after = await light.status()
     if before and after and same(before, after):
         fail_if([one.contradiction])
-    fail_if([await _unmet_mode(tester, one, Mode.INTERNAL_CONTROL)])
+    fail_if([await _unmet_mode(light, one, Mode.INTERNAL_CONTROL)])
 
 
 @requirement('mode-external', 'accepts mode external_sync if mode_bitmask lists it', ILLUMINATOR,
              'MODES', changes=True)
-async def external(tester: LightTester) -> None:
+async def external(light: LightSession) -> None:
     """Configure the mode."""
-    await tester.baseline()
-    fail_if([await _unmet_mode(tester, await _synchronise(tester), Mode.EXTERNAL_SYNC)])
+    await light.baseline()
+    fail_if([await _unmet_mode(light, await _synchronise(light), Mode.EXTERNAL_SYNC)])
 
 
 @requirement('brightness', 'applies a brightness', ILLUMINATOR, 'CONFIGURE', changes=True)
-async def brightness(tester: LightTester) -> str:
+async def brightness(light: LightSession) -> str:
     """Set several values, 100 % only with consent."""
-    await tester.baseline()
-    values = (50.0, 100.0, 33.3) if tester.conditions.consent else (5.0, DIM)
-    fail_if([(await tester.configure(brightness=value)).unmet('brightness') for value in values])
+    await light.baseline()
+    values = (50.0, 100.0, 33.3) if light.consent else (5.0, DIM)
+    fail_if([(await light.configure(brightness=value)).unmet('brightness') for value in values])
     return ', '.join(f'{value:g} %' for value in values)
 
 
@@ -195,9 +173,9 @@ async def brightness(tester: LightTester) -> str:
 
 def _rejects(
     name: str, title: str, *commands: tuple[float, ...],
-    state: Sequence[Callable[[LightTester], Awaitable[None]]] = (LightTester.baseline,),
+    state: Sequence[Callable[[LightSession], Awaitable[None]]] = (LightSession.baseline,),
     section: str = CONFIGURE_SECTION,
-) -> Requirement[LightTester]:
+) -> Requirement[LightSession]:
     """
     Return the requirement that a light rejects some commands.
 
@@ -205,16 +183,16 @@ def _rejects(
     :param state: steps that bring the light to the state in which the commands are sent.
     """
     @requirement(name, title, MESSAGES, section, changes=True)
-    async def check(tester: LightTester) -> None:
+    async def check(light: LightSession) -> None:
         for step in state:
-            await step(tester)
-        fail_if([await tester.rejected(int(command), *params) for command, *params in commands])
+            await step(light)
+        fail_if([await light.rejected(int(command), *params) for command, *params in commands])
     return check
 
 
 on_off_values = _rejects(
     'on-off-values', 'rejects ON_OFF values other than 0 and 1',
-    *((ON_OFF, value) for value in (-1.0, 2.0, 0.5, 255.0)), state=(LightTester.ensure_dim,),
+    *((ON_OFF, value) for value in (-1.0, 2.0, 0.5, 255.0)), state=(LightSession.ensure_dim,),
     section='MAV_CMD_ILLUMINATOR_ON_OFF')
 mode_values = _rejects(
     'mode-values', 'rejects undefined modes',
@@ -222,14 +200,14 @@ mode_values = _rejects(
 brightness_values = _rejects(
     'brightness-values', 'rejects a brightness outside 0 to 100 %',
     *((CONFIGURE, INTERNAL, value, 0.0, 0.0) for value in (-1.0, 101.0)),
-    state=(LightTester.ensure_unlit, LightTester.baseline))
+    state=(LightSession.ensure_unlit, LightSession.baseline))
 # In each parameter separately: every comparison with NaN is false, so it can pass range checks.
 not_a_number = _rejects(
     'not-a-number', 'rejects NaN and infinity in every parameter',
     *(command for value in map(float, ('nan', 'inf', '-inf')) for command in (
         (ON_OFF, value), (CONFIGURE, value, LOW, 0.0, 0.0), (CONFIGURE, INTERNAL, value, 0.0, 0.0),
         (CONFIGURE, INTERNAL, LOW, value, 0.0), (CONFIGURE, INTERNAL, LOW, 0.0, value))),
-    state=(LightTester.ensure_unlit, LightTester.ensure_dim))
+    state=(LightSession.ensure_unlit, LightSession.ensure_dim))
 
 
 # Strobe, which needs consent
@@ -237,7 +215,7 @@ not_a_number = _rejects(
 def _strobe(
     name: str, title: str, specification: Specification, section: str,
     values: Callable[[StrobeRange], list[tuple[float, float]]], *shown: str,
-) -> Requirement[LightTester]:
+) -> Requirement[LightSession]:
     """
     Return a requirement on strobe periods and duty cycles.
 
@@ -246,15 +224,15 @@ def _strobe(
         reject the values.
     """
     @requirement(name, title, specification, section, needs_consent=True)
-    async def check(tester: LightTester) -> str:
-        await tester.baseline()
-        status = await tester.status()
+    async def check(light: LightSession) -> str:
+        await light.baseline()
+        status = await light.status()
         if status is None or not status.strobe_range.known:
             raise Skipped('it reports no strobe limits')
         sent = values(status.strobe_range)
         fail_if([
-            (await tester.configure(period=period, duty=duty)).unmet(*shown) if shown
-            else await tester.rejected(CONFIGURE, INTERNAL, LOW, period, duty)
+            (await light.configure(period=period, duty=duty)).unmet(*shown) if shown
+            else await light.rejected(CONFIGURE, INTERNAL, LOW, period, duty)
             for period, duty in sent])
         return ', '.join(f'{period:g} s' for period in dict.fromkeys(one[0] for one in sent))
     return check
@@ -301,25 +279,25 @@ THERMAL = (mavlink.ILLUMINATOR_ERROR_FLAGS_THERMAL_THROTTLING,
 reports = partial(requirement, specification=MESSAGES, section='ILLUMINATOR_STATUS')
 
 
-async def _status(tester: LightTester) -> Status:
-    idle = tester.session.idle(IlluminatorStatus)
-    status = Status.from_message(idle[-1][1]) if idle else await tester.status()
+async def _status(light: LightSession) -> Status:
+    idle = light.idle(IlluminatorStatus)
+    status = Status.from_message(idle[-1][1]) if idle else await light.status()
     if status is None:
         raise Skipped('no ILLUMINATOR_STATUS was received')
     return status
 
 
 @reports('status-content', 'reports a valid value in every field of ILLUMINATOR_STATUS')
-async def content(tester: LightTester) -> None:
+async def content(light: LightSession) -> None:
     """Look for values out of range; a light without a thermometer may report NaN."""
-    if invalid := [one for one in (await _status(tester)).invalid if one != 'temp_c nan']:
+    if invalid := [one for one in (await _status(light)).invalid if one != 'temp_c nan']:
         raise Failed(', '.join(invalid))
 
 
 @reports('status-mode', 'lists its current mode in mode_bitmask')
-async def mode(tester: LightTester) -> str:
+async def mode(light: LightSession) -> str:
     """Accept both conventions of existing lights: the value of the enum, and 1 << value."""
-    status = await _status(tester)
+    status = await _status(light)
     if status.mode is Mode.UNKNOWN:
         raise Skipped('it reports mode unknown')
     if not status.mode_bitmask & (status.mode | 1 << status.mode):
@@ -329,9 +307,9 @@ async def mode(tester: LightTester) -> str:
 
 
 @reports('strobe-limits', 'reports a min_strobe_period that is at most max_strobe_period')
-async def limits(tester: LightTester) -> str:
+async def limits(light: LightSession) -> str:
     """Compare the limits."""
-    status = await _status(tester)
+    status = await _status(light)
     low, high = astuple(status.strobe_range)
     if low == high == 0:
         raise Skipped('both are 0: it reports no strobe limits')
@@ -342,9 +320,9 @@ async def limits(tester: LightTester) -> str:
 
 @requirement('flags-at-rest', 'reports no error flag before the first command', ILLUMINATOR,
              'ILLUMINATOR_ERROR_FLAGS')
-async def flags(tester: LightTester) -> None:
+async def flags(light: LightSession) -> None:
     """Read the flags of a cold light."""
-    status = await _status(tester)
+    status = await _status(light)
     if status.error_flags & ~KNOWN_FLAGS:
         raise Failed(f'undefined flags: 0x{status.error_flags & ~KNOWN_FLAGS:x}')
     if status.error_flags:
@@ -352,17 +330,17 @@ async def flags(tester: LightTester) -> None:
                      f'too hot for the checks ({status_text(status)})')
 
 
-def _compared(name: str, title: str, *, accepted: bool) -> Requirement[LightTester]:
+def _compared(name: str, title: str, *, accepted: bool) -> Requirement[LightSession]:
     """Return a requirement on the status after the accepted, or after the rejected changes."""
     kind = 'accepted' if accepted else 'rejected'
 
     @requirement(name, title, ILLUMINATOR, 'STATUS', whole_run=True)
-    async def check(tester: LightTester) -> str:
+    async def check(light: LightSession) -> str:
         count = sum(one.expected and one.command in (ON_OFF, CONFIGURE) and one.result is not None
-                    and one.accepted == accepted for one in tester.session.transactions)
+                    and one.accepted == accepted for one in light.transactions)
         if not count:
             raise Skipped(f'no change was {kind}')
-        failures = tester.disagreements if accepted else tester.rejected_but_applied
+        failures = light.disagreements if accepted else light.rejected_but_applied
         return component.none_of(failures, count, f'{kind} changes')
     return check
 
@@ -375,32 +353,32 @@ unchanged = _compared(
 
 @requirement('thermal-flags', 'sets thermal error flags according to its temperature', ILLUMINATOR,
              'ILLUMINATOR_ERROR_FLAGS', needs_consent=True)
-async def thermal(tester: LightTester) -> str:
+async def thermal(light: LightSession) -> str:
     """Keep the light at 100 % for some time, then off for as long, and compare."""
-    heat = tester.conditions.options['heat']
+    heat = light.conditions.options['heat']
     if not heat:
         raise Skipped('disabled by --heat 0')
-    await tester.baseline()
-    start = await tester.status()
+    await light.baseline()
+    start = await light.status()
     if start is None or start.temperature is None:
         raise Skipped('it reports no temperature')
     if start.error_flags & mavlink.ILLUMINATOR_ERROR_FLAGS_THERMISTOR_FAILURE:
         raise Skipped('its temperature sensor has failed')
-    await tester.configure(brightness=100.0)
-    on = (await tester.switch(True)).transaction
+    await light.configure(brightness=100.0)
+    on = (await light.switch(True)).transaction
     if not on.accepted:
         raise Skipped(f'it cannot be switched on: {on.answer}')
-    seen = [start, *await _sample(tester, heat)]
-    await tester.switch(False)
-    seen += await _sample(tester, heat)
+    seen = [start, *await _sample(light, heat)]
+    await light.switch(False)
+    seen += await _sample(light, heat)
     return _judge([one for one in seen if one.temperature is not None], heat)
 
 
-async def _sample(tester: LightTester, heat: float) -> list[Status]:
-    samples, until = [], tester.session.now + heat
-    while tester.session.now < until:
-        samples.append(await tester.status())
-        await tester.session.runner.sleep(min(0.5, heat / 5))
+async def _sample(light: LightSession, heat: float) -> list[Status]:
+    samples, until = [], light.now + heat
+    while light.now < until:
+        samples.append(await light.status())
+        await light.sleep(min(0.5, heat / 5))
     return [one for one in samples if one is not None]
 
 
@@ -436,7 +414,7 @@ def _judge(seen: list[Status], seconds: float) -> str:
 
 # All requirements
 
-REQUIREMENTS: tuple[Requirement[LightTester], ...] = (
+REQUIREMENTS: tuple[Requirement[LightSession], ...] = (
     component.heartbeat, component.heartbeat_type(
         mavlink.MAV_TYPE_ILLUMINATOR, 'ILLUMINATOR', 'an illuminator'),
     component.heartbeat_autopilot, component.address,
@@ -446,8 +424,8 @@ REQUIREMENTS: tuple[Requirement[LightTester], ...] = (
         'status-request', IlluminatorStatus, ILLUMINATOR, 'Illuminator Connection'),
     content, mode, limits, flags,
     component.sent_on_request(
-        'information-request', messages.ComponentInformationBasic, ILLUMINATOR,
-        'COMPONENT_INFORMATION_BASIC', lambda session: session.record.identity or 'no names'),
+        'information-request', ComponentInformationBasic, ILLUMINATOR,
+        'COMPONENT_INFORMATION_BASIC', lambda session: session.identity or 'no names'),
     *component.IDENTITY_STRINGS,
     component.unknown_command, component.unknown_message, component.broadcast(IlluminatorStatus),
     other_target, command_int, repeated,
@@ -459,26 +437,9 @@ REQUIREMENTS: tuple[Requirement[LightTester], ...] = (
     component.heartbeat_rate, component.uptime(IlluminatorStatus, 'uptime_ms'),
     *component.ACKNOWLEDGEMENTS, agrees, unchanged, component.checksums,
 )
-
-
-def is_light(message: messages.Message) -> bool:
-    """Return whether a message identifies its sender as a light."""
-    return (isinstance(message, IlluminatorStatus)
-            or isinstance(message, messages.Heartbeat)
-            and message.type == mavlink.MAV_TYPE_ILLUMINATOR)
-
-
-def describe(message: messages.Message) -> str:
-    """Return the text of an ILLUMINATOR_STATUS in one line, '' for another message."""
-    return f'{message.get_type()} {status_text(Status.from_message(message))}' if isinstance(
-        message, IlluminatorStatus) else ''
-
-
-CHECKS: PayloadChecks[LightTester] = PayloadChecks(
-    payload='illuminator', device='light', is_device=is_light,
-    messages=(IlluminatorStatus, messages.ComponentInformationBasic),
+CHECKS: PayloadChecks[LightSession] = PayloadChecks(
+    payload='illuminator', device='light', session=LightSession, requirements=REQUIREMENTS,
     evidence='HEARTBEAT with MAV_TYPE_ILLUMINATOR or ILLUMINATOR_STATUS',
-    describe=describe, tester=LightTester, requirements=REQUIREMENTS,
     risk='strobe, or shine at 100 %',
     question='Some checks make light {device} strobe, and shine at 100 % for {heat:g} s. '
              'Strobing can trigger\nseizures; do not look into the light. All other checks run '

@@ -23,26 +23,15 @@ import math
 from statistics import median_high
 
 from .outcomes import fail_if, Failed, Skipped
-from .requirement import (
-    COMMAND,
-    HEARTBEAT,
-    MESSAGES,
-    Requirement,
-    requirement,
-    ROUTING,
-    SERIALIZATION,
-    Specification,
-    Tester,
-)
+from .requirement import Requirement, requirement
 from .session import REJECTIONS, Session, Transaction
-from ...mavlink import messages
+from .specifications import COMMAND, HEARTBEAT, MESSAGES, ROUTING, SERIALIZATION, Specification
 from ...mavlink.dialect import mavlink, raw
-from ...mavlink.messages import Address, Heartbeat, Message
+from ...mavlink.messages import Address, ComponentInformationBasic, Heartbeat, Message
 
 # s
 HEARTBEAT_TIMEOUT = 5.0
 MAX_HEARTBEAT_GAP = 2.6
-REQUEST_TIMEOUT = 3.0
 INTERVAL = 0.25
 WATCH_TIME = 2.5
 DEFAULT_TIMEOUT = 5.0
@@ -66,76 +55,75 @@ def periods(received: Iterable[tuple[float, object]]) -> list[float]:
 
 @requirement('heartbeat', 'sends HEARTBEAT', HEARTBEAT, 'HEARTBEAT Broadcast Frequency',
              presence=True)
-async def heartbeat(tester: Tester) -> str:
+async def heartbeat(session: Session) -> str:
     """Wait for a HEARTBEAT."""
-    session = tester.session
     received = session.received(Heartbeat)
-    if not await session.runner.until(lambda: received, HEARTBEAT_TIMEOUT):
+    if not await session.until(lambda: received, HEARTBEAT_TIMEOUT):
         raise Failed(f'no HEARTBEAT in {HEARTBEAT_TIMEOUT:g} s')
     return f'from {session.device}'
 
 
-def _latest_heartbeat(tester: Tester) -> Heartbeat:
-    if received := tester.session.received(Heartbeat):
-        return received[-1][1]
-    raise Skipped('no HEARTBEAT was received')
-
-
-def heartbeat_type(mav_type: int, name: str, device: str) -> Requirement[Tester]:
-    """Return the requirement on HEARTBEAT.type of a device."""
-    @requirement('heartbeat-type', f'identifies itself as MAV_TYPE_{name} ({mav_type:d})',
-                 HEARTBEAT, 'Component Identity')
-    async def check(tester: Tester) -> None:
-        if (value := _latest_heartbeat(tester).type) != mav_type:
-            raise Failed(f'MAV_TYPE {value}: clients will not recognise it as {device}')
+def _heartbeat_field(
+    field: str, title: str, value: int, consequence: str,
+) -> Requirement[Session]:
+    """Return the requirement on a field of the latest HEARTBEAT."""
+    @requirement(f'heartbeat-{field}', title, HEARTBEAT, 'Component Identity')
+    async def check(session: Session) -> None:
+        if not (received := session.received(Heartbeat)):
+            raise Skipped('no HEARTBEAT was received')
+        if (found := getattr(received[-1][1], field)) != value:
+            raise Failed(f'MAV_{field.upper()} {found}: clients will {consequence}')
     return check
 
 
-@requirement('heartbeat-autopilot', 'sets autopilot to MAV_AUTOPILOT_INVALID (8)',
-             HEARTBEAT, 'Component Identity')
-async def heartbeat_autopilot(tester: Tester) -> None:
-    """Read the latest HEARTBEAT."""
-    if (value := _latest_heartbeat(tester).autopilot) != mavlink.MAV_AUTOPILOT_INVALID:
-        raise Failed(f'MAV_AUTOPILOT {value}: clients will take it for a flight controller')
+def heartbeat_type(mav_type: int, name: str, device: str) -> Requirement[Session]:
+    """Return the requirement on HEARTBEAT.type of a device."""
+    return _heartbeat_field('type', f'identifies itself as MAV_TYPE_{name} ({mav_type:d})',
+                            mav_type, f'not recognise it as {device}')
+
+
+heartbeat_autopilot = _heartbeat_field(
+    'autopilot', 'sets autopilot to MAV_AUTOPILOT_INVALID (8)', mavlink.MAV_AUTOPILOT_INVALID,
+    'take it for a flight controller')
 
 
 @requirement('address', 'has a system ID and a component ID other than 0', ROUTING,
              'ID allocation')
-async def address(tester: Tester) -> str:
+async def address(session: Session) -> str:
     """Read the address of the device; 0 is the broadcast address."""
-    device = tester.session.device
-    if 0 in device:
-        raise Failed(f'it sends from {device}: 0 means broadcast, so routers cannot find it')
-    return f'{device}'
+    if 0 in session.device:
+        raise Failed(
+            f'it sends from {session.device}: 0 means broadcast, so routers cannot find it')
+    return f'{session.device}'
 
 
 # The command protocol
 
 @requirement('unknown-command', 'answers an unknown command with MAV_RESULT_UNSUPPORTED',
              MESSAGES, 'MAV_RESULT')
-async def unknown_command(tester: Tester) -> None:
+async def unknown_command(session: Session) -> None:
     """Send a command that does not exist."""
-    one = await tester.session.command(UNKNOWN_COMMAND)
+    one = await session.command(UNKNOWN_COMMAND)
     if one.result != mavlink.MAV_RESULT_UNSUPPORTED:
         raise one.failure()
 
 
 @requirement('unknown-message', 'rejects a request for a message that it does not have',
              MESSAGES, 'MAV_CMD_REQUEST_MESSAGE')
-async def unknown_message(tester: Tester) -> str:
+async def unknown_message(session: Session) -> str:
     """Request a message that a real device does not send."""
-    one = await tester.session.command(mavlink.MAV_CMD_REQUEST_MESSAGE, UNKNOWN_MESSAGE)
+    one = await session.command(mavlink.MAV_CMD_REQUEST_MESSAGE, UNKNOWN_MESSAGE)
     if one.result is None or one.accepted:
         raise one.failure()
     return one.answer
 
 
-def broadcast(status: type[Message]) -> Requirement[Tester]:
+def broadcast(status: type[Message]) -> Requirement[Session]:
     """Return the requirement on broadcast commands; the command requests the status."""
     @requirement('broadcast', 'answers commands that are broadcast to its system and to all '
                  'systems', ROUTING, 'Routing Detail')
-    async def check(tester: Tester) -> None:
-        session, failures = tester.session, []
+    async def check(session: Session) -> None:
+        failures = []
         for target in (Address(session.device.system, 0), Address(0, 0)):
             one = await session.command(mavlink.MAV_CMD_REQUEST_MESSAGE, status.id, target=target)
             if one.result is None:
@@ -155,24 +143,20 @@ def check_command_int(one: Transaction) -> None:
 def sent_on_request(
     name: str, cls: type[Message], specification: Specification, section: str,
     measurement: Callable[[Session], str] = lambda session: '', *, optional: bool = False,
-) -> Requirement[Tester]:
+) -> Requirement[Session]:
     """
     Return the requirement that a device sends a message on request.
 
     :param optional: whether a device may reject the request.
     """
     @requirement(name, f'sends {cls.msgname} on request', specification, section)
-    async def check(tester: Tester) -> str:
-        session = tester.session
-        before = session.received(cls).total
-        one = await session.command(mavlink.MAV_CMD_REQUEST_MESSAGE, cls.id)
+    async def check(session: Session) -> str:
+        one, message = await session.ask(cls)
         if optional and one.result in UNAVAILABLE:
             raise Skipped(one.answer)
         if not one.accepted:
             raise Failed(one.answer)
-        if not await session.runner.until(
-                lambda: session.received(cls).total > before,
-                REQUEST_TIMEOUT) and await session.request(cls) is None:
+        if message is None and await session.request(cls) is None:
             raise Failed(f'MAV_RESULT_ACCEPTED, but no {cls.msgname}')
         return measurement(session)
     return check
@@ -180,19 +164,18 @@ def sent_on_request(
 
 def _identity_strings(
     name: str, title: str, deviation: Callable[[str, bytes], str],
-) -> Requirement[Tester]:
+) -> Requirement[Session]:
     """
     Return a requirement on each string of COMPONENT_INFORMATION_BASIC.
 
     :param deviation: returns the error in a field, '' if there is none; takes its name and value.
     """
-    @requirement(name, title, MESSAGES, messages.ComponentInformationBasic.msgname)
-    async def check(tester: Tester) -> None:
-        session, cls = tester.session, messages.ComponentInformationBasic
-        if not session.received(cls) and await session.request(cls) is None:
-            raise Skipped('no COMPONENT_INFORMATION_BASIC was received')
-        message = session.received(cls)[-1][1]
-        if wrong := [text for one in cls.fieldnames
+    @requirement(name, title, MESSAGES, ComponentInformationBasic.msgname)
+    async def check(session: Session) -> None:
+        received = session.received(ComponentInformationBasic)
+        message = received[-1][1] if received else await session.required(
+            ComponentInformationBasic)
+        if wrong := [text for one in message.fieldnames
                      if isinstance(value := raw(message, one), bytes)
                      and (text := deviation(one, value))]:
             raise Failed(', '.join(wrong))
@@ -220,7 +203,7 @@ IDENTITY_STRINGS = (
 
 def status_stream(
     status: type[Message], specification: Specification, section: str, *, optional: bool = False,
-) -> Requirement[Tester]:
+) -> Requirement[Session]:
     """
     Return the requirement on the regularity of the status.
 
@@ -228,8 +211,8 @@ def status_stream(
     """
     @requirement('status-stream', f'sends {status.msgname} at a regular rate', specification,
                  section)
-    async def check(tester: Tester) -> str:
-        times = periods(tester.session.idle(status))
+    async def check(session: Session) -> str:
+        times = periods(session.idle(status))
         if not times:
             text = 'it sends at most one without a request'
             raise Skipped(text) if optional else Failed(text)
@@ -239,7 +222,7 @@ def status_stream(
     return check
 
 
-def interval_requirements(status: type[Message]) -> tuple[Requirement[Tester], ...]:
+def interval_requirements(status: type[Message]) -> tuple[Requirement[Session], ...]:
     """
     Return the requirements ``interval``, ``interval-stop`` and ``interval-default``.
 
@@ -248,21 +231,21 @@ def interval_requirements(status: type[Message]) -> tuple[Requirement[Tester], .
     on_interval = partial(requirement, specification=MESSAGES,
                           section='MAV_CMD_SET_MESSAGE_INTERVAL', changes=True)
 
-    async def set_interval(tester: Tester, interval: float) -> None:
-        one = await tester.session.command(mavlink.MAV_CMD_SET_MESSAGE_INTERVAL, status.id,
-                                           interval)
+    async def set_interval(session: Session, microseconds: float) -> None:
+        one = await session.command(
+            mavlink.MAV_CMD_SET_MESSAGE_INTERVAL, status.id, microseconds)
         if one.result in UNAVAILABLE:
             raise Skipped(one.answer)
         one.expect(accepted=True)
 
     @on_interval('interval', f'sends {status.msgname} at the requested interval')
-    async def requested(tester: Tester) -> str:
-        usual = periods(tester.session.idle(status))
+    async def requested(session: Session) -> str:
+        usual = periods(session.idle(status))
         # The requested interval must differ from the default.
-        interval = 2 * INTERVAL if usual and median_high(usual) > INTERVAL / 2 and (
-            median_high(usual) < 2 * INTERVAL) else INTERVAL
-        await set_interval(tester, interval * 1e6)
-        times = periods(await tester.session.receive_more(
+        is_near = usual and INTERVAL / 2 < median_high(usual) < 2 * INTERVAL
+        interval = 2 * INTERVAL if is_near else INTERVAL
+        await set_interval(session, interval * 1e6)
+        times = periods(await session.receive_more(
             status, WATCH_TIME, round(10 * WATCH_TIME / interval)))
         if not times:
             raise Failed(f'accepted, but at most one was received in {WATCH_TIME:g} s')
@@ -272,21 +255,21 @@ def interval_requirements(status: type[Message]) -> tuple[Requirement[Tester], .
         return text
 
     @on_interval('interval-stop', 'stops the stream on interval -1')
-    async def stopped(tester: Tester) -> None:
-        await set_interval(tester, -1)
+    async def stopped(session: Session) -> None:
+        await set_interval(session, -1)
         # A message may be under way.
-        await tester.session.runner.sleep(0.3)
-        before = tester.session.received(status).total
-        await tester.session.runner.sleep(WATCH_TIME)
-        if count := tester.session.received(status).total - before:
+        await session.sleep(0.3)
+        before = session.received(status).total
+        await session.sleep(WATCH_TIME)
+        if count := session.received(status).total - before:
             raise Failed(f'accepted, but still received in {WATCH_TIME:g} s: {count}')
 
     @on_interval('interval-default', 'returns to its default rate on interval 0')
-    async def default(tester: Tester) -> None:
-        await set_interval(tester, 0)
-        if len(await tester.session.receive_more(status, DEFAULT_TIMEOUT, 2)) >= 2:
+    async def default(session: Session) -> None:
+        await set_interval(session, 0)
+        if len(await session.receive_more(status, DEFAULT_TIMEOUT, 2)) >= 2:
             return
-        if not tester.session.idle(status):
+        if not session.idle(status):
             raise Skipped('none was received, also not before the first command')
         raise Failed(f'accepted, but at most one was received in {DEFAULT_TIMEOUT:g} s')
 
@@ -311,25 +294,25 @@ async def restore_interval(session: Session, status: type[Message]) -> None:
 
 @requirement('heartbeat-rate', 'sends HEARTBEAT at about 1 Hz', HEARTBEAT,
              'HEARTBEAT Broadcast Frequency', whole_run=True)
-async def heartbeat_rate(tester: Tester) -> str:
+async def heartbeat_rate(session: Session) -> str:
     """Measure all intervals, and the time since the latest HEARTBEAT."""
-    received = tester.session.received(Heartbeat)
+    received = session.received(Heartbeat)
     gaps = periods(received)
     if not gaps:
         raise Skipped('fewer than two were received')
     text = f'every {median_high(gaps):.2f} s, at most {max(gaps):.2f} s apart'
-    last_gap = tester.session.now - received[-1][0]
+    last_gap = session.now - received[-1][0]
     if not 0.4 < median_high(gaps) < 2.0 or max(*gaps, last_gap) > MAX_HEARTBEAT_GAP:
         raise Failed(text)
     return text
 
 
-def uptime(cls: type[Message], field: str) -> Requirement[Tester]:
+def uptime(cls: type[Message], field: str) -> Requirement[Session]:
     """Return the requirement on the time since start, ms, in a field of a message."""
     @requirement('uptime', f'counts {field} in real time and never backwards', MESSAGES,
                  cls.msgname, whole_run=True)
-    async def check(tester: Tester) -> str:
-        seen = [(at, getattr(one, field)) for at, one in tester.session.received(cls)]
+    async def check(session: Session) -> str:
+        seen = [(at, getattr(one, field)) for at, one in session.received(cls)]
         if len(seen) < 2 or seen[-1][0] - seen[0][0] < 2:
             raise Skipped('too few statuses')
         for (_, one), (_, other) in pairwise(seen):
@@ -361,7 +344,7 @@ def none_of(failures: Sequence[Failed], total: int, objects: str) -> str:
 def _for_each_command(
     name: str, title: str, section: str, deviation: Callable[[Transaction, Address], str],
     measurement: Callable[[Sequence[Transaction]], str] = lambda every: '',
-) -> Requirement[Tester]:
+) -> Requirement[Session]:
     """
     Return a requirement on the acknowledgements of every command.
 
@@ -369,12 +352,12 @@ def _for_each_command(
     :param measurement: returns a text that follows the number of commands.
     """
     @requirement(name, title, COMMAND, section, whole_run=True)
-    async def check(tester: Tester) -> str:
-        every = [one for one in tester.session.transactions if one.expected]
+    async def check(session: Session) -> str:
+        every = [one for one in session.transactions if one.expected]
         if not every:
             raise Skipped('no command was sent')
         return none_of([Failed(f'{one.text} ({wrong})', one.lines) for one in every
-                        if (wrong := deviation(one, tester.session.address))],
+                        if (wrong := deviation(one, session.address))],
                        len(every), 'commands') + measurement(every)
     return check
 
@@ -404,9 +387,7 @@ def _to_others(one: Transaction, own: Address) -> str:
 
 def _unfinished(one: Transaction, own: Address) -> str:
     reports = [ack for ack in one.acks if ack.result == mavlink.MAV_RESULT_IN_PROGRESS]
-    if not reports:
-        return ''
-    if not one.finals:
+    if reports and not one.finals:
         return 'never'
     return 'progress above 100 %' if any(100 < ack.progress < 255 for ack in reports) else ''
 
@@ -436,7 +417,7 @@ ACKNOWLEDGEMENTS = (
 
 @requirement('checksums', 'sends frames with correct checksums', SERIALIZATION, 'Checksum',
              whole_run=True)
-async def checksums(tester: Tester) -> None:
+async def checksums(session: Session) -> None:
     """Count the frames that the link has dropped; noise on a serial line counts, too."""
-    if count := tester.conditions.checksum_errors():
+    if count := session.conditions.checksum_errors():
         raise Failed(f'{count} {"frame" if count == 1 else "frames"} with a wrong checksum')

@@ -16,20 +16,22 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from enum import Enum
+from collections.abc import Collection
 import math
 
 from .outcomes import Skipped
-from ...mavlink.messages import Address, Message
+from ...mavlink.messages import Address
+
+# The most addresses that are named in one text.
+MAX_NAMED = 8
 
 
-class Sender(Enum):
-    """The sender of a message."""
-
-    DEVICE = 'device'
-    PART = 'part'
-    OTHER = 'other'
+def names(addresses: Collection[Address]) -> str:
+    """Return addresses as text, the first few by name."""
+    *most, last = [str(one) for one in sorted(addresses)[:MAX_NAMED]]
+    if len(addresses) > MAX_NAMED:
+        most, last = [*most, last], f'{len(addresses) - MAX_NAMED} more'
+    return f'{", ".join(most)} and {last}' if most else last
 
 
 class Components:
@@ -37,50 +39,43 @@ class Components:
     Recognises the device.
 
     :param own: the address of the session.
-    :param is_device: whether a message identifies its sender as a device of this payload.
     :param target: the device; None selects the first that is heard.
     :param component: the component id that alone identifies the device, whose system id changes;
         None if its address stays the same.
-    :param part_of: returns the component id of a part of the device, from a message of the
-        device; 0 for no part.
     :ivar found: the present address of the device, once it is heard.
     :ivar heard: the addresses of all components that were heard.
     :ivar devices: the addresses of the devices of this payload among them.
     :ivar last_heard: when the device was heard, s.
     """
 
-    def __init__(
-        self, own: Address, is_device: Callable[[Message], bool], target: Address | None,
-        component: int | None, part_of: Callable[[Message], int],
-    ) -> None:
+    def __init__(self, own: Address, target: Address | None, component: int | None) -> None:
         self.target = target
         self.found: Address | None = None
         self.heard: set[Address] = set()
         self.devices: set[Address] = set()
         self.last_heard = -math.inf
         self._own = own
-        self._is_device = is_device
         self._component = component
-        self._part_of, self._part = part_of, 0
 
-    def hear(self, source: Address, message: Message, now: float) -> Sender:
-        """Take a message, and return who has sent it."""
+    def hear(self, source: Address, now: float, *, identifies: bool) -> bool:
+        """
+        Take a message, and return whether the device has sent it.
+
+        :param identifies: whether the message identifies its sender as a device of this payload.
+        """
         self.heard.add(source)
-        if self._component in (None, source.component) and self._is_device(message):
+        if identifies and self._component in (None, source.component):
             self.devices.add(source)
         if self.found is None and (self._is_same(source, self.target) if self.target
                                    else source in self.devices):
             self.found = source
-        if self.is_device(source):
-            if self.found is not None and source != self.found:
-                self.heard.discard(self.found)
-                self.devices.discard(self.found)
-            self.found = source
-            self.last_heard = now
-            self._part = self._part_of(message) or self._part
-            return Sender.DEVICE
-        is_part = self.found is not None and source == (self.found.system, self._part)
-        return Sender.PART if is_part else Sender.OTHER
+        if not self.is_device(source):
+            return False
+        if source != self.found:
+            self.heard.discard(self.device)
+            self.devices.discard(self.device)
+        self.found, self.last_heard = source, now
+        return True
 
     def is_device(self, source: Address) -> bool:
         """Return whether this is the address of the device that was found."""
@@ -103,7 +98,7 @@ class Components:
         :param first: the lowest component id.
         :raises Skipped: if all are in use.
         """
-        system, taken = self.device.system, self.heard | {self._own, self.device}
+        system, taken = self.device.system, {*self.heard, self._own}
         for component in range(first, 256):
             if (system, component) not in taken:
                 return Address(system, component)
@@ -115,7 +110,7 @@ class Components:
 
         :raises Skipped: if all are in use.
         """
-        taken = {one.system for one in self.heard | {self._own, self.device}}
+        taken = {one.system for one in (*self.heard, self._own)}
         for system in range(240, 0, -1):
             if system not in taken:
                 return system

@@ -17,25 +17,27 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Coroutine, Generator
-from dataclasses import dataclass
 import math
+import types
+from typing import NamedTuple
 
 
 class Interrupted(BaseException):
     """The run must end now."""
 
 
-@dataclass
-class _Wait:
+class _Wait(NamedTuple):
     condition: Callable[[], object]
     deadline: float
 
-    def __await__(self) -> Generator[_Wait, None, None]:
-        yield self
 
-
-# A coroutine that awaits :class:`_Wait`, directly or through other coroutines.
+# A coroutine that waits only by a :class:`CoroutineRunner`.
 Main = Coroutine[_Wait, None, None]
+
+
+@types.coroutine
+def _suspend(wait: _Wait) -> Generator[_Wait, None, None]:
+    yield wait
 
 
 class CoroutineRunner:
@@ -52,11 +54,11 @@ class CoroutineRunner:
         self.interrupted = False
         self.restoring = False
         self._main: Main | None = None
-        self._wait: _Wait | None = None
+        self._wait = _Wait(lambda: True, 0.0)
 
     def run(self, main: Main) -> None:
         """Run a coroutine from the next :meth:`advance` on."""
-        self._main, self._wait = main, None
+        self._main, self._wait = main, _Wait(lambda: True, self.now)
 
     @property
     def running(self) -> bool:
@@ -67,30 +69,21 @@ class CoroutineRunner:
         """Continue the coroutine if its condition holds or its time has come."""
         self.now = now
         while self._main is not None and (
-                self._wait is None or now >= self._wait.deadline or self._wait.condition()):
-            self._step(lambda main: main.send(None))
+                now >= self._wait.deadline or self._wait.condition()
+                or self.interrupted and not self.restoring):
+            try:
+                self._wait = self._main.send(None)
+            except (StopIteration, Interrupted):
+                self._main = None
 
     def next_deadline(self) -> float:
         """Return when :meth:`advance` is due, infinity if never."""
-        if self._main is None:
-            return math.inf
-        return self._wait.deadline if self._wait else self.now
+        return math.inf if self._main is None else self._wait.deadline
 
     def interrupt(self, now: float) -> None:
         """Raise :class:`Interrupted` in the coroutine, unless it restores the device."""
         self.interrupted = True
-        if not self.restoring:
-            self.advance(now)
-            self._step(lambda main: main.throw(Interrupted()))
-            self.advance(now)
-
-    def _step(self, step: Callable[[Main], _Wait]) -> None:
-        if self._main is None:
-            return
-        try:
-            self._wait = step(self._main)
-        except (StopIteration, Interrupted):
-            self._main = self._wait = None
+        self.advance(now)
 
     async def until(self, condition: Callable[[], object], timeout: float) -> bool:
         """
@@ -98,9 +91,10 @@ class CoroutineRunner:
 
         :raises Interrupted: if the run must end.
         """
+        if not self.interrupted or self.restoring:
+            await _suspend(_Wait(condition, self.now + timeout))
         if self.interrupted and not self.restoring:
             raise Interrupted
-        await _Wait(condition, self.now + timeout)
         return bool(condition())
 
     async def sleep(self, seconds: float) -> None:

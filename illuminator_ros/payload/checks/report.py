@@ -16,12 +16,14 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Iterable
 from dataclasses import dataclass
 import json
 from xml.etree import ElementTree
 
-from .requirement import AnyRequirement, HEARTBEAT, Result, Verdict
+from .requirement import AnyRequirement, Result, Verdict
+from .specifications import HEARTBEAT
 from ... import __version__
 
 SHOWN_LINES = 12
@@ -85,32 +87,11 @@ def lines(result: Result, *, verbose: bool = False) -> list[str]:
     return text
 
 
-class Table:
-    """
-    Formats results as lines; consecutive requirements that were not reached share one line.
-
-    :param verbose: as in :func:`lines`.
-    """
-
-    def __init__(self, *, verbose: bool = False) -> None:
-        self._verbose = verbose
-        self._unreached: list[Result] = []
-
-    def add(self, result: Result) -> list[str]:
-        """Add a result, and return the lines that are complete."""
-        if result.reached:
-            return [*self.end(), *lines(result, verbose=self._verbose)]
-        ended = self.end() if any(
-            one.detail != result.detail for one in self._unreached[:1]) else []
-        self._unreached.append(result)
-        return ended
-
-    def end(self) -> list[str]:
-        """Return the lines that were not complete before."""
-        held, self._unreached = self._unreached, []
-        if len(held) > 1:
-            return [f'{Verdict.SKIPPED.value:8}{len(held)} requirements: {held[0].detail}']
-        return [text for one in held for text in lines(one, verbose=self._verbose)]
+def unreached(results: Iterable[Result]) -> list[str]:
+    """Return a line for all requirements that were not reached for the same reason."""
+    reasons = Counter(one.detail for one in results if not one.reached)
+    return [f'{Verdict.SKIPPED.value:8}{count} not reached: {reason}'
+            for reason, count in reasons.items()]
 
 
 def catalogue(requirements: Iterable[AnyRequirement], kind: str) -> list[str]:

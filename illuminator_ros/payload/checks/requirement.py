@@ -16,33 +16,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Awaitable, Callable, Mapping
+from collections.abc import Awaitable, Callable
 from dataclasses import dataclass, field
 from enum import Enum
-from typing import Any, Generic, NamedTuple, Protocol, TypeVar
+from typing import Any, Generic, NamedTuple, TypeVar
 
-from .components import Components
-from .record import Record
 from .session import Session
-from ...mavlink.messages import Address, CommandAck, Heartbeat, Message
+from .specifications import Specification
 
 NOT_AGREED = 'not agreed to; see --yes'
-
-
-class Specification(NamedTuple):
-    """A page that contains requirements."""
-
-    title: str
-    url: str
-
-
-# Pages of the MAVLink guide.
-_GUIDE = 'https://mavlink.io/en/'
-HEARTBEAT = Specification('heartbeat protocol', _GUIDE + 'services/heartbeat.html')
-COMMAND = Specification('command protocol', _GUIDE + 'services/command.html')
-MESSAGES = Specification('common message set', _GUIDE + 'messages/common.html')
-ROUTING = Specification('routing', _GUIDE + 'guide/routing.html')
-SERIALIZATION = Specification('serialization', _GUIDE + 'guide/serialization.html')
+T = TypeVar('T', bound=Session, contravariant=True)
+Check = Callable[[T], Awaitable['str | None']]
 
 
 class Verdict(Enum):
@@ -51,49 +35,6 @@ class Verdict(Enum):
     PASS = 'PASS'
     FAIL = 'FAIL'
     SKIPPED = 'SKIPPED'
-
-
-@dataclass(frozen=True)
-class Conditions:
-    """
-    The conditions of a run.
-
-    :param consent: whether the operator has agreed to the checks that need consent.
-    :param checksum_errors: returns how many frames with a wrong checksum the link has dropped.
-    :param utc: returns the time, s since 1970.
-    :param options: the values of the options that only this payload has.
-    """
-
-    consent: bool = True
-    checksum_errors: Callable[[], int] = lambda: 0
-    options: Mapping[str, float] = field(default_factory=dict)
-    utc: Callable[[], float] = lambda: 0.0
-
-
-class Tester(Protocol):
-    """
-    The part of a payload that operates the device; the argument of each check.
-
-    :ivar session: the session with the device.
-    :ivar conditions: the conditions of the run.
-    """
-
-    session: Session
-    conditions: Conditions
-
-    @property
-    def saved(self) -> str:
-        """Return the saved state, as text."""
-
-    async def save(self) -> bool:
-        """Save the state of the device; return whether the device reports one."""
-
-    async def restore(self) -> list[str]:
-        """Restore the saved state; return the names of the values that still differ from it."""
-
-
-T = TypeVar('T', bound=Tester, contravariant=True)
-Check = Callable[[T], Awaitable['str | None']]
 
 
 @dataclass(frozen=True)
@@ -138,7 +79,7 @@ def requirement(
         name, title, specification, section, check, changes, **flags)
 
 
-# For the runner and the reports, which do not use the tester.
+# For the runner and the reports, which do not use the session.
 AnyRequirement = Requirement[Any]
 
 
@@ -179,46 +120,26 @@ class PayloadChecks(Generic[T]):
 
     :param payload: its name, as in ``--payload``.
     :param device: the kind of device.
-    :param messages: the classes of its messages.
-    :param is_device: whether a message identifies its sender as a device of this payload.
-    :param evidence: those messages, as text.
-    :param tester: returns a tester that operates the device of a session.
-    :param describe: returns the text of one of its messages, '' for the message's name.
+    :param session: a session with such a device.
+    :param evidence: the messages that identify a device, as text.
     :param risk: the actions of the device in the checks that need consent, as a clause.
     :param question: asked before these checks; ``{device}`` and the options are filled in.
-    :param options: options of the command line, for :attr:`Conditions.options`.
+    :param options: options of the command line, for :class:`Conditions`.
     :param mavlink_version: the version that the device needs, 1 or 2; None if it takes both.
-    :param component: the component id that alone identifies a device, see :class:`Components`.
     :param traces: the changes that remain after the device is restored, as text.
-    :param discovery: a message that is requested of all components until a device is found.
-    :param part_of: returns the component id of a part of the device, see :class:`Components`.
     """
 
     payload: str
     device: str
-    messages: tuple[type[Message], ...]
-    is_device: Callable[[Message], bool]
+    session: type[T]
     evidence: str
-    tester: Callable[[Session, Conditions], T]
     requirements: tuple[Requirement[T], ...]
-    describe: Callable[[Message], str] = lambda message: ''
     risk: str = ''
     question: str = ''
     options: tuple[Option, ...] = ()
     mavlink_version: int | None = None
-    component: int | None = None
     traces: str = ''
-    discovery: type[Message] | None = None
-    part_of: Callable[[Message], int] = lambda message: 0
-
-    def session(self, address: Address, target: Address | None = None) -> Session:
-        """Return a session with a device, from our address."""
-        received = (Heartbeat, CommandAck, *self.messages)
-        return Session(
-            address, received,
-            Components(address, self.is_device, target, self.component, self.part_of),
-            Record(received, self.describe), self.discovery)
 
 
-# For the command line, which does not use the tester.
+# For the command line, which does not use the operations of a session.
 AnyChecks = PayloadChecks[Any]

@@ -20,19 +20,17 @@ from collections.abc import Callable, Sequence
 import logging
 from typing import Generic
 
+from .components import names
 from .coroutines import Interrupted
 from .outcomes import DeviceLost, Failed, Skipped
-from .requirement import Conditions, NOT_AGREED, PayloadChecks, Requirement, Result, T, Verdict
+from .requirement import NOT_AGREED, PayloadChecks, Requirement, Result, T, Verdict
 from .session import Session
-from ...mavlink.messages import Address
 
 # s
 RESTORE_TIMEOUT = 10.0
 RESTORE_PAUSE = 0.5
 # The most lines of the log that are kept of one check.
 MAX_LINES = 60
-# The most addresses that are named in one text.
-MAX_NAMED = 8
 
 _log = logging.getLogger(__name__)
 
@@ -41,26 +39,17 @@ class _Unreached(Skipped):
     """There is no device to check."""
 
 
-def names(addresses: set[Address]) -> str:
-    """Return addresses as text, the first few by name."""
-    *most, last = [str(one) for one in sorted(addresses)[:MAX_NAMED]]
-    if len(addresses) > MAX_NAMED:
-        most, last = [*most, last], f'{len(addresses) - MAX_NAMED} more'
-    return f'{", ".join(most)} and {last}' if most else last
-
-
 def absence(session: Session, checks: PayloadChecks[T], timeout: float) -> str:
     """
     Return why there is no device to check.
 
     :param timeout: s for which the device was awaited.
     """
-    others = f'heard instead: {names(session.components.heard)}' if session.components.heard else (
-        'nothing else was heard')
-    if session.components.target is not None:
-        return f'{session.components.target} was not heard within {timeout:g} s; {others}'
-    return (f'no {checks.device} was heard within {timeout:g} s, that is, no {checks.evidence}; '
-            + others)
+    target, heard = session.components.target, session.components.heard
+    awaited = f'no {checks.device} was' if target is None else f'{target} was not'
+    evidence = '' if target else f', that is, no {checks.evidence}'
+    others = f'heard instead: {names(heard)}' if heard else 'nothing else was heard'
+    return f'{awaited} heard within {timeout:g} s{evidence}; {others}'
 
 
 class CheckRunner(Generic[T]):
@@ -77,8 +66,7 @@ class CheckRunner(Generic[T]):
     """
 
     def __init__(
-        self, checks: PayloadChecks[T], session: Session, conditions: Conditions,
-        requirements: Sequence[Requirement[T]],
+        self, checks: PayloadChecks[T], session: T, requirements: Sequence[Requirement[T]],
         on_result: Callable[[Result], None] = lambda result: None,
     ) -> None:
         self.results: list[Result] = []
@@ -87,10 +75,9 @@ class CheckRunner(Generic[T]):
         self.left_changed = False
         self._checks = checks
         self._session = session
-        self._tester = checks.tester(session, conditions)
         self._requirements = requirements
-        self._missing = ''
         self._on_result = on_result
+        # Why there is no device to check any more.
         self._lost = ''
 
     @property
@@ -106,12 +93,11 @@ class CheckRunner(Generic[T]):
 
         :param missing: why there is no device to check, '' if there is one.
         """
-        self._missing = missing
         try:
             for one in self._requirements:
                 # This raises Interrupted, also before the first check.
-                await self._session.runner.sleep(0.0)
-                self._add(await self._check(one))
+                await self._session.sleep(0.0)
+                self._add(await self._check(one, missing))
         except Interrupted:
             for one in self._requirements[len(self.results):]:
                 self._add(Result(one, Verdict.SKIPPED, 'interrupted', reached=False))
@@ -124,13 +110,13 @@ class CheckRunner(Generic[T]):
         self.results.append(result)
         self._on_result(result)
 
-    async def _check(self, one: Requirement[T]) -> Result:
-        session = self._session
-        begun, mark = session.now, session.record.log.total
+    async def _check(self, one: Requirement[T], missing: str) -> Result:
+        log = self._session.record.log
+        begun, mark = self._session.now, log.total
         verdict, lines, reached = Verdict.FAIL, None, True
         try:
-            await self._prepare(one)
-            verdict, detail = Verdict.PASS, await one.check(self._tester) or ''
+            await self._prepare(one, missing)
+            verdict, detail = Verdict.PASS, await one.check(self._session) or ''
         except Failed as error:
             detail, lines = str(error), error.lines
         except Skipped as error:
@@ -141,20 +127,19 @@ class CheckRunner(Generic[T]):
         except Exception as error:
             _log.exception('internal error in the check %s', one.name)
             detail = f'internal error in this check: {error!r}'
-        exchange = (session.record.log.since(mark)[-MAX_LINES:] if lines is None
-                    else lines[:MAX_LINES])
-        return Result(one, verdict, detail, exchange, session.now - begun, reached)
+        exchange = log.since(mark)[-MAX_LINES:] if lines is None else lines[:MAX_LINES]
+        return Result(one, verdict, detail, exchange, self._session.now - begun, reached)
 
-    async def _prepare(self, one: Requirement[T]) -> None:
+    async def _prepare(self, one: Requirement[T], missing: str) -> None:
         """Raise if the check cannot be made, or if the device could not be restored after it."""
         device = self._checks.device
-        if self._missing:
-            raise Failed(self._missing) if one.presence else _Unreached(f'no {device} was found')
+        if missing:
+            raise Failed(missing) if one.presence else _Unreached(f'no {device} was found')
         if self._lost and not one.whole_run:
             raise _Unreached(self._lost)
-        if one.needs_consent and not self._tester.conditions.consent:
+        if one.needs_consent and not self._session.consent:
             raise Skipped(f'the {device} would {self._checks.risk}: {NOT_AGREED}')
-        if one.changes and not await self._tester.save():
+        if one.changes and not await self._session.save():
             raise Skipped(f'the {device} does not report its state, so it could not be restored')
         self.changed |= one.changes
 
@@ -163,14 +148,13 @@ class CheckRunner(Generic[T]):
         device, until = self._checks.device, self._session.now + RESTORE_TIMEOUT
         while True:
             try:
-                differing = await self._tester.restore()
+                differing = await self._session.restore()
             except DeviceLost:
                 differing = ['unknown']
             if not differing or self._session.now >= until:
                 break
-            await self._session.runner.sleep(RESTORE_PAUSE)
+            await self._session.sleep(RESTORE_PAUSE)
         self.left_changed = bool(differing)
-        traces = f', besides {self._checks.traces}' if self._checks.traces else ''
-        self.restored = f'the {device} is as it was{traces}' if not differing else (
+        self.restored = f'the {device} is as it was{self._checks.traces}' if not differing else (
             f'THE {device.upper()} IS NOT AS IT WAS ({", ".join(differing)}): it was '
-            + self._tester.saved)
+            + self._session.saved)

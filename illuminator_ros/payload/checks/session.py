@@ -20,23 +20,27 @@ Its coroutines take no real time in a run against a simulated device.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from abc import abstractmethod
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 import math
-from typing import NamedTuple, TypeVar
+from typing import ClassVar, NamedTuple, TypeVar
 
-from .components import Components, Sender
+from .components import Components
 from .coroutines import CoroutineRunner
 from .outcomes import DeviceLost, Failed, Skipped
 from .record import History, Record
+from ..identity import Identity
 from ...mavlink import messages
 from ...mavlink.component import Endpoint, HeartbeatTimer
-from ...mavlink.dialect import mavlink
+from ...mavlink.dialect import line_of, mavlink
 from ...mavlink.frame import Frame
 from ...mavlink.messages import (
     Address,
     command_name,
     CommandAck,
+    ComponentInformationBasic,
+    Heartbeat,
     Message,
     result_name,
 )
@@ -97,12 +101,6 @@ class Transaction:
     acks: list[Ack] = field(default_factory=list)
     lines: list[str] = field(default_factory=list)
 
-    def acknowledge(self, ack: Ack, line: str) -> None:
-        """Record an acknowledgement, with its line of the log."""
-        if len(self.acks) < MAX_ACKS:
-            self.acks.append(ack)
-            self.lines.append(line)
-
     @property
     def text(self) -> str:
         """Return the command and its parameters."""
@@ -138,36 +136,91 @@ class Transaction:
         return Failed(f'{self.text}: {reason or self.answer}', self.lines)
 
 
+@dataclass(frozen=True)
+class Conditions:
+    """
+    The conditions of a run.
+
+    :param address: ours.
+    :param target: the address of the device; None selects the first that is heard.
+    :param options: the values of the options of the command line that only this payload has.
+    :param checksum_errors: returns how many frames with a wrong checksum the link has dropped.
+    :param utc: returns the time, s since 1970.
+    """
+
+    address: Address
+    target: Address | None = None
+    options: Mapping[str, float] = field(default_factory=dict)
+    checksum_errors: Callable[[], int] = lambda: 0
+    utc: Callable[[], float] = lambda: 0.0
+
+
 class Session(Endpoint):
     """
-    Sends commands to one device and records its messages.
+    Sends commands to one device and records its messages; the argument of each check.
 
-    It is an endpoint, not a payload of a component: it must see the messages from system id 0 and
-    every acknowledgement, which a component handles or drops.
+    A payload derives a session with the operations of its devices. This is an endpoint, not a
+    payload of a component: it must see the messages from system id 0 and every acknowledgement,
+    which a component handles or drops.
 
-    :param address: the address of the session.
-    :param received: the classes of messages that it receives.
-    :param discovery: a message that is requested of all components until the device is found.
+    :cvar messages: the classes of messages that it receives.
+    :cvar component: the component id that alone identifies a device, see :class:`Components`.
+    :cvar discovery: a message that is requested of all components until the device is found.
+    :ivar consent: whether the operator has agreed to the checks that need consent.
     :ivar runner: runs the coroutines.
     :ivar idle_until: end of the time in which the session only listened, s.
     :ivar transactions: all commands.
     """
 
-    def __init__(
-        self, address: Address, received: Sequence[type[Message]], components: Components,
-        record: Record, discovery: type[Message] | None,
-    ) -> None:
+    messages: Sequence[type[Message]] = (Heartbeat, CommandAck)
+    component: ClassVar[int | None] = None
+    discovery: ClassVar[type[Message] | None] = None
+
+    def __init__(self, conditions: Conditions) -> None:
         super().__init__()
-        self.address = address
-        self.messages = received
-        self.components = components
-        self.record = record
+        self.address = conditions.address
+        self.conditions = conditions
+        self.consent = False
+        self.components = Components(self.address, conditions.target, self.component)
+        self.record = Record(self.messages)
         self.runner = CoroutineRunner()
         self.idle_until = -math.inf
         self.transactions: History[Transaction] = History()
-        self._discovery = discovery
         self._latest: dict[int, Transaction] = {}
-        self._heartbeat = HeartbeatTimer(address, mavlink.MAV_TYPE_GCS, self.outgoing)
+        self._heartbeat = HeartbeatTimer(self.address, mavlink.MAV_TYPE_GCS, self.outgoing)
+
+    # What a payload adds
+
+    @abstractmethod
+    def is_device(self, message: Message) -> bool:
+        """Return whether a message identifies its sender as a device of this payload."""
+
+    def is_part(self, source: Address) -> bool:
+        """Return whether a component is a part of the device, which sends messages for it."""
+        return False
+
+    def describe(self, message: Message) -> str:
+        """Return a message as text in one line."""
+        if not isinstance(message, CommandAck):
+            return line_of(message)
+        target = messages.target_of(message)
+        progress = message.result == mavlink.MAV_RESULT_IN_PROGRESS
+        return (f'COMMAND_ACK {command_name(message.command)}: {result_name(message.result)}'
+                + (f', progress {message.progress}' if progress else '')
+                + (f' to {target}' if any(target) else ''))
+
+    @property
+    def saved(self) -> str:
+        """Return the saved state, as text."""
+        return ''
+
+    async def save(self) -> bool:
+        """Save the state of the device; return whether the device reports one."""
+        return True
+
+    async def restore(self) -> list[str]:
+        """Restore the saved state; return the names of the values that still differ from it."""
+        return []
 
     # The endpoint
 
@@ -187,33 +240,29 @@ class Session(Endpoint):
     def receive(self, source: Address, message: Message, now: float) -> None:
         """See :meth:`Endpoint.receive`."""
         self.runner.now = now
-        sender = self.components.hear(source, message, now)
-        is_part = sender is Sender.PART and not isinstance(
-            message, messages.Heartbeat | CommandAck)
-        if sender is Sender.DEVICE or is_part:
-            origin = f'from {source}: ' if is_part else ''
-            self.record.note('<', origin + self.record.text(message), now)
+        is_device = self.components.hear(source, now, identifies=self.is_device(message))
+        if is_device or self.is_part(source) and not isinstance(message, Heartbeat | CommandAck):
+            line = self.record.note('<', ('' if is_device else f'from {source}: ')
+                                    + self.describe(message), now)
             self.record.add(message, now)
-            if isinstance(message, CommandAck) and message.command in self._latest:
-                self._latest[message.command].acknowledge(
-                    Ack(now, message.result, message.progress, messages.target_of(message)),
-                    self.record.log[-1])
+            if isinstance(message, CommandAck):
+                self._acknowledge(message, line)
         self.runner.advance(now)
+
+    def _acknowledge(self, ack: CommandAck, line: str) -> None:
+        one = self._latest.get(ack.command)
+        if one is not None and len(one.acks) < MAX_ACKS:
+            one.acks.append(Ack(self.now, ack.result, ack.progress, messages.target_of(ack)))
+            one.lines.append(line)
 
     def poll(self, now: float) -> None:
         """See :meth:`Endpoint.poll`."""
-        self.runner.now = now
         self._heartbeat.poll(now)
         self.runner.advance(now)
 
     def next_deadline(self) -> float:
         """See :meth:`Endpoint.next_deadline`."""
         return min(self._heartbeat.due, self.runner.next_deadline())
-
-    def interrupt(self, now: float) -> None:
-        """End the run, unless it restores the device."""
-        self.runner.now = now
-        self.runner.interrupt(now)
 
     # The record
 
@@ -227,6 +276,13 @@ class Session(Endpoint):
         """Return the address of the device, which must have been heard."""
         return self.components.device
 
+    @property
+    def identity(self) -> str:
+        """Return the names that the device has sent, '' if there are none."""
+        received = self.received(ComponentInformationBasic)
+        one = Identity.from_message(received[-1][1]) if received else Identity()
+        return ', '.join(filter(None, (one.vendor, one.model, one.serial_number)))
+
     def received(self, cls: type[M]) -> History[tuple[float, M]]:
         """Return the messages of a class that the device has sent, with their times, s."""
         return self.record.received(cls)
@@ -234,14 +290,6 @@ class Session(Endpoint):
     def idle(self, cls: type[M]) -> list[tuple[float, M]]:
         """Return the messages that the device sent before the session sent a command."""
         return [(at, one) for at, one in self.received(cls) if at <= self.idle_until]
-
-    def send(self, message: Message, source: Address | None = None) -> None:
-        """Send a message from an address, by default the session's."""
-        self._give(message, self.record.text(message), source)
-
-    def _give(self, message: Message, text: str, source: Address | None) -> None:
-        self.outgoing.append((source or self.address, message))
-        self.record.note('>', text + (f' from {source}' if source else ''), self.now)
 
     def check_presence(self) -> None:
         """
@@ -252,7 +300,23 @@ class Session(Endpoint):
         if self.now - self.components.last_heard > LOST_TIMEOUT:
             raise DeviceLost
 
+    def send(self, message: Message, source: Address | None = None) -> None:
+        """Send a message from an address, by default the session's."""
+        self._give(message, self.describe(message), source)
+
+    def _give(self, message: Message, text: str, source: Address | None) -> str:
+        self.outgoing.append((source or self.address, message))
+        return self.record.note('>', text + (f' from {source}' if source else ''), self.now)
+
     # For coroutines
+
+    async def until(self, condition: Callable[[], object], timeout: float) -> bool:
+        """See :meth:`CoroutineRunner.until`."""
+        return await self.runner.until(condition, timeout)
+
+    async def sleep(self, seconds: float) -> None:
+        """See :meth:`CoroutineRunner.sleep`."""
+        await self.runner.sleep(seconds)
 
     async def find(self, timeout: float, listen: float) -> None:
         """
@@ -263,13 +327,12 @@ class Session(Endpoint):
         """
         end, components = self.now + timeout, self.components
         while components.found is None and self.now < end:
-            if self._discovery is not None:
+            if self.discovery is not None:
                 self._send(Transaction(
-                    mavlink.MAV_CMD_REQUEST_MESSAGE, (self._discovery.id,), False), Address(0, 0))
-            await self.runner.until(
-                lambda: components.found, min(DISCOVERY_INTERVAL, end - self.now))
+                    mavlink.MAV_CMD_REQUEST_MESSAGE, (self.discovery.id,), False), Address(0, 0))
+            await self.until(lambda: components.found, min(DISCOVERY_INTERVAL, end - self.now))
         if components.found is not None:
-            await self.runner.sleep(listen)
+            await self.sleep(listen)
             self.idle_until = self.now
 
     async def receive_more(
@@ -278,8 +341,34 @@ class Session(Endpoint):
         """Return the messages of a class that come within ``timeout`` s, or until the count-th."""
         received = self.received(cls)
         before = received.total
-        await self.runner.until(lambda: received.total >= before + count, timeout)
+        await self.until(lambda: received.total >= before + count, timeout)
         return received.since(before)
+
+    async def ask(
+        self, cls: type[M], *, as_int: bool = False,
+    ) -> tuple[Transaction, M | None]:
+        """Request a message once; return the command, and the message if it comes."""
+        received = self.received(cls)
+        before = received.total
+        one = await self.command(mavlink.MAV_CMD_REQUEST_MESSAGE, cls.id, as_int=as_int)
+        has_come = (one.accepted or one.result is None) and await self.until(
+            lambda: received.total > before, MESSAGE_TIMEOUT)
+        return one, received[-1][1] if has_come else None
+
+    async def request(self, cls: type[M]) -> M | None:
+        """Request a message until it comes; return it, None if it does not come."""
+        for _ in range(ATTEMPTS):
+            one, message = await self.ask(cls)
+            if message is not None or not (one.accepted or one.result is None):
+                return message
+        return None
+
+    async def required(self, cls: type[M]) -> M:
+        """Request a message and return it; raise Skipped if it does not come."""
+        message = await self.request(cls)
+        if message is None:
+            raise Skipped(f'no {cls.msgname} was received')
+        return message
 
     async def command(
         self, command: int, *params: float, as_int: bool = False, confirmation: int = 0,
@@ -311,34 +400,16 @@ class Session(Endpoint):
             if one.result != mavlink.MAV_RESULT_TEMPORARILY_REJECTED:
                 break
             one.rejections = rejections
-            await self.runner.sleep(REJECTION_PAUSE)
+            await self.sleep(REJECTION_PAUSE)
         return one
 
     async def send_to_other(self, target: Address, command: int, *params: float) -> Transaction:
         """Send a command to another address, and return it with the answers of the device."""
         one = self._begin(command, params, expected=False)
         self._send(one, target)
-        await self.runner.until(lambda: one.acks, NO_ANSWER_TIME)
-        await self.runner.sleep(SETTLE_TIME)
+        await self.until(lambda: one.acks, NO_ANSWER_TIME)
+        await self.sleep(SETTLE_TIME)
         return one
-
-    async def required(self, cls: type[M]) -> M:
-        """Request a message and return it; raise Skipped if it does not come."""
-        message = await self.request(cls)
-        if message is None:
-            raise Skipped(f'no {cls.msgname} was received')
-        return message
-
-    async def request(self, cls: type[M]) -> M | None:
-        """Request a message until it comes; return it, None if it does not come."""
-        for _ in range(ATTEMPTS):
-            before = self.received(cls).total
-            one = await self.command(mavlink.MAV_CMD_REQUEST_MESSAGE, cls.id)
-            if not one.accepted and one.result is not None:
-                return None
-            if self.received(cls).total > before or await self.receive_more(cls, MESSAGE_TIMEOUT):
-                return self.received(cls)[-1][1]
-        return None
 
     def _begin(self, command: int, params: tuple[float, ...], *, expected: bool) -> Transaction:
         one = self._latest[command] = Transaction(command, params, expected)
@@ -349,26 +420,25 @@ class Session(Endpoint):
         self, one: Transaction, target: Address, confirmation: int = 0, *, as_int: bool = False,
         source: Address | None = None,
     ) -> None:
-        values = [*map(float, one.params), *[0.0] * (7 - len(one.params))]
+        p1, p2, p3, p4, p5, p6, p7 = (*map(float, one.params), *[0.0] * (7 - len(one.params)))
         message = messages.CommandInt(
-            *target, 0, one.command, 0, 0, values[0], values[1], values[2], values[3],
-            int(values[4]), int(values[5]), values[6],
+            *target, 0, one.command, 0, 0, p1, p2, p3, p4, int(p5), int(p6), p7,
         ) if as_int else messages.CommandLong(
-            *target, one.command, min(confirmation, 255), *values)
+            *target, one.command, min(confirmation, 255), p1, p2, p3, p4, p5, p6, p7)
         one.sent.append(self.now)
-        self._give(message, f'{message.get_type()} to {target}: {one.text}'
-                   + (f', confirmation {confirmation}' if confirmation else ''), source)
-        one.lines.append(self.record.log[-1])
+        one.lines.append(self._give(
+            message, f'{message.get_type()} to {target}: {one.text}'
+            + (f', confirmation {confirmation}' if confirmation else ''), source))
 
     async def _answered(self, one: Transaction, timeout: float) -> bool:
         """Wait for the result of an attempt; return whether the device has received it."""
         before = len(one.acks)
-        if not await self.runner.until(lambda: len(one.acks) > before, timeout):
+        if not await self.until(lambda: len(one.acks) > before, timeout):
             return False
         # After a report of progress the command must not be sent again.
-        await self.runner.until(lambda: one.finals, PROGRESS_LIMIT)
+        await self.until(lambda: one.finals, PROGRESS_LIMIT)
         # A late acknowledgement must not be assigned to the next command.
         if len(one.sent) > 1:
-            await self.runner.until(lambda: len(one.finals) >= len(one.sent), ACK_TIMEOUT)
-        await self.runner.sleep(SETTLE_TIME)
+            await self.until(lambda: len(one.finals) >= len(one.sent), ACK_TIMEOUT)
+        await self.sleep(SETTLE_TIME)
         return True

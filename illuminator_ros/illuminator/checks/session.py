@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""The tester of a light: it switches and configures the light, and compares the status."""
+"""A session with a light: it switches and configures the light, and compares the status."""
 
 from __future__ import annotations
 
@@ -31,13 +31,11 @@ from ..model import (
     unexpected_differences,
 )
 from ...mavlink.dialect import mavlink
+from ...mavlink.messages import ComponentInformationBasic, Heartbeat, Message
 from ...payload.checks.component_requirements import restore_interval
 from ...payload.checks.outcomes import Failed, Skipped
-from ...payload.checks.requirement import Conditions, NOT_AGREED, Specification
-from ...payload.checks.session import Session, Transaction
-
-ILLUMINATOR = Specification(
-    'illuminator protocol', 'https://mavlink.io/en/services/illuminator.html')
+from ...payload.checks.requirement import NOT_AGREED
+from ...payload.checks.session import Conditions, Session, Transaction
 
 # %; the brightness of checks without consent, and the most at which the light may then be on.
 LOW = 10.0
@@ -109,35 +107,51 @@ class Change:
         return self.contradiction if set(names) & set(self.not_shown) else None
 
 
-class LightTester:
+class LightSession(Session):
     """
-    Operates one light.
+    Operates one light; with consent, it may strobe and shine at 100 %.
 
-    :param conditions: with consent, the light may strobe and shine at 100 %.
     :ivar disagreements: accepted changes that the status did not show.
     :ivar rejected_but_applied: rejected changes after which the status was different.
     """
 
-    def __init__(self, session: Session, conditions: Conditions) -> None:
-        self.session = session
-        self.conditions = conditions
+    messages = (*Session.messages, IlluminatorStatus, ComponentInformationBasic)
+
+    def __init__(self, conditions: Conditions) -> None:
+        super().__init__(conditions)
         self.disagreements: list[Failed] = []
         self.rejected_but_applied: list[Failed] = []
         self._before: Status | None = None
+
+    def is_device(self, message: Message) -> bool:
+        """See :class:`Session`."""
+        return isinstance(message, IlluminatorStatus) or (
+            isinstance(message, Heartbeat) and message.type == mavlink.MAV_TYPE_ILLUMINATOR)
+
+    def describe(self, message: Message) -> str:
+        """See :class:`Session`."""
+        if isinstance(message, IlluminatorStatus):
+            return f'{message.get_type()} {status_text(Status.from_message(message))}'
+        return super().describe(message)
 
     # Commands and statuses
 
     async def status(self) -> Status | None:
         """Return a new status, None if the light does not send one."""
-        message = await self.session.request(IlluminatorStatus)
+        message = await self.request(IlluminatorStatus)
         if message is None:
-            streamed = await self.session.receive_more(IlluminatorStatus, STREAM_TIMEOUT)
+            streamed = await self.receive_more(IlluminatorStatus, STREAM_TIMEOUT)
             message = streamed[-1][1] if streamed else None
         return None if message is None else Status.from_message(message)
 
+    async def enabled(self) -> bool | None:
+        """Return whether a new status shows the light on, None if none does show that."""
+        status = await self.status()
+        return None if status is None else status.enabled
+
     async def switch(self, on: bool, *, as_int: bool = False) -> Change:
         """Switch the light, and compare the status."""
-        one = await self.session.command(ON_OFF, float(on), as_int=as_int)
+        one = await self.command(ON_OFF, float(on), as_int=as_int)
         return await self._compared(one, lambda status: [] if status.enabled == on else ['enable'])
 
     async def configure(
@@ -146,33 +160,33 @@ class LightTester:
     ) -> Change:
         """Configure the light, and compare the status."""
         asked = Configuration(Mode(mode), brightness, period, duty)
-        one = await self.session.command(CONFIGURE, mode, brightness, period, duty)
+        one = await self.command(CONFIGURE, mode, brightness, period, duty)
         return await self._compared(one, lambda status: differences(asked, status))
 
     async def _compared(self, one: Transaction, differ: Callable[[Status], list[str]]) -> Change:
         if not one.accepted:
             return Change(one)
-        mark = self.session.record.log.total
+        mark = self.record.log.total
         status = await self._after_change(differ)
         if status is None or not (not_shown := differ(status)):
             return Change(one)
         self.disagreements.append(Failed(
             f'{one.text}: {one.answer}, but then the status differs in '
             f'{" and ".join(not_shown)}: {status_text(status)}',
-            one.lines + self.session.record.log.since(mark)[-3:]))
+            one.lines + self.record.log.since(mark)[-3:]))
         return Change(one, tuple(not_shown), self.disagreements[-1])
 
     async def _after_change(self, differ: Callable[[Status], list[str]]) -> Status | None:
         """Return the first status that shows a change, or the last before CHANGE_TIMEOUT."""
-        end = self.session.now + CHANGE_TIMEOUT
-        while (status := await self.status()) and differ(status) and self.session.now < end:
-            await self.session.runner.sleep(0.1)
+        end = self.now + CHANGE_TIMEOUT
+        while (status := await self.status()) and differ(status) and self.now < end:
+            await self.sleep(0.1)
         return status
 
     async def rejected(self, command: int, *params: float) -> Failed | None:
         """Send a command that must be rejected; return a failure unless the result is DENIED."""
         before = await self.status()
-        one = await self.session.command(command, *params)
+        one = await self.command(command, *params)
         after = await self.status()
         restarted = before and after and after.uptime_ms < before.uptime_ms
         if before and after and not (one.accepted or restarted or same(before, after)):
@@ -188,13 +202,13 @@ class LightTester:
 
     async def baseline(self) -> None:
         """Bring the light to the state that checks start from: off, dim, no strobe."""
-        status = await self.status()
         low = Configuration(Mode.INTERNAL_CONTROL, LOW, 0.0, 0.0)
+        status = await self.status()
         if status is None or status.enabled is not False:
             await self._switch_off()
             status = await self.status()
         if status is None or differences(low, status):
-            one = await self.session.command(CONFIGURE, *low.params())
+            one = await self.command(CONFIGURE, *low.params())
             status = await (self._after_change(lambda status: differences(low, status))
                             if one.accepted else self.status())
         if status is not None and status.enabled:
@@ -202,7 +216,7 @@ class LightTester:
             await self._switch_off()
 
     async def _switch_off(self) -> None:
-        await self.session.command(ON_OFF, 0.0)
+        await self.command(ON_OFF, 0.0)
 
     async def ensure_dim(self) -> None:
         """
@@ -212,7 +226,7 @@ class LightTester:
             there is no consent.
         """
         await self.baseline()
-        if self.conditions.consent:
+        if self.consent:
             return
         change = await self.configure()
         status = await self.status()
@@ -231,37 +245,36 @@ class LightTester:
         :raises Skipped: if a brightness switches the light on, and there is no consent.
         """
         await self.baseline()
-        if self.conditions.consent:
+        if self.consent:
             return
         await self.configure(brightness=LOW / 2)
-        status = await self.status()
-        if status is None or status.enabled is not False:
+        if await self.enabled() is not False:
             raise Skipped('its brightness switches it on, so that an invalid brightness might '
                           'dazzle: ' + NOT_AGREED)
 
     # Restoring
 
     async def save(self) -> bool:
-        """See :class:`Tester`."""
+        """See :class:`Session`."""
         self._before = self._before or await self.status()
         return self._before is not None
 
     @property
     def saved(self) -> str:
-        """See :class:`Tester`."""
+        """See :class:`Session`."""
         assert self._before is not None
         return f'{"on" if self._before.enabled else "off"}, {_saved(self._before).describe()}'
 
     async def restore(self) -> list[str]:
-        """See :class:`Tester`."""
+        """See :class:`Session`."""
         assert self._before is not None
         wanted, enabled = _saved(self._before), bool(self._before.enabled)
         # Switch off first, so that the changes are not visible.
         await self._switch_off()
-        await self.session.command(CONFIGURE, *wanted.params())
+        await self.command(CONFIGURE, *wanted.params())
         # Then restore the switch, because the brightness switches some lights on.
-        await self.session.command(ON_OFF, float(enabled))
-        await restore_interval(self.session, IlluminatorStatus)
+        await self.command(ON_OFF, float(enabled))
+        await restore_interval(self, IlluminatorStatus)
         status = await self.status()
         if status is None:
             return ['unknown']

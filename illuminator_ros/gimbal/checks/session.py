@@ -12,15 +12,15 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""The base of the testers of gimbals: it moves a gimbal, watches it, and turns it back."""
+"""A session with a gimbal: it moves the gimbal, watches it, and turns it back."""
 
 from __future__ import annotations
 
-from abc import ABC, abstractmethod
+from abc import abstractmethod
 from collections.abc import Callable
 from dataclasses import dataclass
 import math
-from typing import NamedTuple, TypeVar
+from typing import ClassVar, NamedTuple, TypeVar
 
 from .. import messages as gimbal
 from ..axes import LEVEL, Range, read_ranges
@@ -28,11 +28,18 @@ from ...mavlink.dialect import mavlink, short_names
 from ...mavlink.messages import Address, Message
 from ...payload.checks.component_requirements import restore_interval
 from ...payload.checks.outcomes import Failed, Skipped
-from ...payload.checks.requirement import Conditions, Specification
-from ...payload.checks.session import Session
+from ...payload.checks.session import Conditions, Session
+from ...payload.checks.specifications import Specification
 from ...payload.messages import GimbalDeviceAttitudeStatus as AttitudeStatus
-from ...payload.mount_attitude import names_frame, UNSET_VECTOR, yaw_frame, YawFrame
-from ...payload.rotation import Quaternion
+from ...payload.mount_attitude import (
+    Components,
+    names_frame,
+    UNSET_QUATERNION,
+    UNSET_VECTOR,
+    yaw_frame,
+    YawFrame,
+)
+from ...payload.rotation import Quaternion, Vector
 
 GIMBAL = Specification('gimbal protocol v2', 'https://mavlink.io/en/services/gimbal_v2.html')
 PROPOSAL = Specification(
@@ -51,7 +58,9 @@ TOLERANCE = 3.0
 STEP = 15.0
 RATE = 6.0
 NAN = math.nan
-Control = tuple[Address, Address]
+# A setpoint with level roll and pitch, and a yaw relative to the vehicle, or to north.
+FORWARD = int(LEVEL | mavlink.GIMBAL_DEVICE_FLAGS_YAW_IN_VEHICLE_FRAME)
+NORTH = int(LEVEL | mavlink.GIMBAL_DEVICE_FLAGS_YAW_IN_EARTH_FRAME)
 Information = gimbal.GimbalDeviceInformation | gimbal.GimbalManagerInformation
 M = TypeVar('M', bound=Message)
 
@@ -117,41 +126,7 @@ class Limits(NamedTuple):
 UNKNOWN_LIMITS = Limits(*(Range(NAN, NAN),) * 3, -1)
 
 
-def describe(message: Message) -> str:
-    """Return the content of a message of the gimbal protocol, '' if its name is enough."""
-    if isinstance(message, AttitudeStatus):
-        try:
-            text = str(Pose.from_message(message))
-        except ValueError as error:
-            text = str(error)
-        return (f'{message.get_type()} {text}, flags {message.flags}, '
-                f'failures {message.failure_flags}')
-    if isinstance(message, gimbal.GimbalManagerStatus):
-        return f'{message.get_type()} {control_text(control_of(message))}, flags {message.flags}'
-    if isinstance(message, gimbal.GimbalDeviceSetAttitude | gimbal.GimbalManagerSetAttitude):
-        angles = 'no attitude'
-        if all(map(math.isfinite, message.q)):
-            _, pitch, yaw = map(math.degrees, Quaternion(*message.q).euler())
-            angles = f'pitch {pitch:.1f}, yaw {yaw:.1f} deg'
-        rates = ' '.join(f'{math.degrees(rate):g}' for rate in (
-            message.angular_velocity_y, message.angular_velocity_z))
-        return f'{message.get_type()} {angles}, rates {rates} deg/s, flags {message.flags}'
-    return ''
-
-
-def control_text(control: Control) -> str:
-    """Return the components in control, for people."""
-    return ', '.join(f'{name} {one if any(one) else "none"}'
-                     for name, one in zip(('primary', 'secondary'), control, strict=True))
-
-
-def control_of(message: gimbal.GimbalManagerStatus) -> Control:
-    """Return primary and secondary control of a status."""
-    return (Address(message.primary_control_sysid, message.primary_control_compid),
-            Address(message.secondary_control_sysid, message.secondary_control_compid))
-
-
-class GimbalTester(ABC):
+class GimbalSession(Session):
     """
     Moves a gimbal for the checks.
 
@@ -159,14 +134,21 @@ class GimbalTester(ABC):
     :cvar status: the class whose interval is restored.
     """
 
-    information: type[Information]
-    status: type[Message]
+    information: ClassVar[type[Information]]
+    status: ClassVar[type[Message]]
 
-    def __init__(self, session: Session, conditions: Conditions) -> None:
-        self.session = session
-        self.conditions = conditions
+    def __init__(self, conditions: Conditions) -> None:
+        super().__init__(conditions)
         self._before: Pose | None = None
         self._limits: Limits | None = None
+
+    def describe(self, message: Message) -> str:
+        """See :class:`Session`; the angles follow a quaternion."""
+        text, q = super().describe(message), getattr(message, 'q', UNSET_QUATERNION)
+        if not all(map(math.isfinite, q)):
+            return text
+        _, pitch, yaw = map(math.degrees, Quaternion(*q).euler())
+        return f'{text}: {Pose(0.0, pitch, yaw)}'
 
     # Reports
 
@@ -177,8 +159,8 @@ class GimbalTester(ABC):
         :param what: its content, for people.
         :raises Skipped: if the gimbal does not send it.
         """
-        streamed = await self.session.receive_more(cls, 1.0)
-        message = streamed[-1][1] if streamed else await self.session.request(cls)
+        streamed = await self.receive_more(cls, 1.0)
+        message = streamed[-1][1] if streamed else await self.request(cls)
         if message is None:
             raise Skipped(f'it does not report {what}')
         return message
@@ -202,7 +184,7 @@ class GimbalTester(ABC):
         :raises Skipped: if the gimbal does not report them.
         """
         if self._limits is None:
-            self._limits = Limits.from_message(await self.session.required(self.information))
+            self._limits = Limits.from_message(await self.required(self.information))
         return self._limits
 
     async def possible(self) -> Limits:
@@ -224,48 +206,69 @@ class GimbalTester(ABC):
         """Prepare the gimbal for setpoints, for example by taking control."""
 
     @abstractmethod
+    def setpoint(
+        self, target: Address, device_id: int | None, flags: int, q: Components, rates: Vector,
+    ) -> Message:
+        """Return the message of a setpoint, rad/s; a device ignores the ``device_id``."""
+
     async def point(
-        self, pose: Pose | None, *,
-        flags: int = LEVEL | mavlink.GIMBAL_DEVICE_FLAGS_YAW_IN_VEHICLE_FRAME,
-        rates: tuple[float, float, float] = UNSET_VECTOR,
+        self, pose: Pose | None, *, flags: int = FORWARD, rates: Vector = UNSET_VECTOR,
+        source: Address | None = None, target: Address | None = None,
+        device_id: int | None = None,
     ) -> None:
-        """Send a setpoint: an attitude if there is one, and rates, deg/s."""
+        """
+        Send a setpoint.
+
+        :param pose: the attitude, None for none.
+        :param rates: deg/s.
+        :param source: its address, None for the component that operates the gimbal.
+        :param target: None for the gimbal.
+        :param device_id: the gimbal device of a manager, None for the one that it reports.
+        """
+        q = UNSET_QUATERNION if pose is None else Quaternion.from_euler(
+            *map(math.radians, (pose.roll, pose.pitch, pose.yaw)))
+        x, y, z = map(math.radians, rates)
+        self.send(self.setpoint(target or self.device, device_id, flags, q, (x, y, z)),
+                  source or self.operator)
+
+    @property
+    def operator(self) -> Address:
+        """Return the address from which the gimbal is operated."""
+        return self.address
 
     async def pause(self, seconds: float) -> None:
         """Wait, and send the messages that must be sent regularly."""
-        await self.session.runner.sleep(seconds)
+        await self.sleep(seconds)
 
-    async def until(
+    async def pose_when(
         self, condition: Callable[[Pose], bool], timeout: float = MOVE_TIMEOUT,
     ) -> Pose:
         """Return the first pose that meets a condition, or the last one before the timeout."""
-        end = self.session.now + timeout
-        while not condition(pose := await self.pose()) and self.session.now < end:
+        end = self.now + timeout
+        while not condition(pose := await self.pose()) and self.now < end:
             await self.pause(POLL)
         return pose
 
-    async def steady(self) -> Pose:
-        """Return the pose once two successive statuses agree, or after 1 s."""
-        end, pose = self.session.now + 1.0, await self.pose()
-        while not pose.near(now := await self.pose()) and self.session.now < end:
-            pose = now
-        return now
-
     async def settle(self, pose: Pose) -> Pose:
         """Return the pose once the gimbal stays at a wanted one, or after MOVE_TIMEOUT."""
-        end = self.session.now + MOVE_TIMEOUT
+        end = self.now + MOVE_TIMEOUT
         while True:
-            await self.until(pose.near, end - self.session.now)
+            await self.pose_when(pose.near, end - self.now)
             # The gimbal may only have passed the wanted pose.
             await self.pause(SETTLE_TIME)
-            if pose.near(now := await self.pose()) or self.session.now >= end:
+            if pose.near(now := await self.pose()) or self.now >= end:
                 return now
 
-    async def reach(self, pose: Pose) -> None:
-        """Raise Failed if the gimbal does not turn to a pose and stay at it."""
+    async def reach(self, pose: Pose, commanded: str = '') -> None:
+        """
+        Raise Failed if the gimbal does not turn to a pose and stay at it.
+
+        :param commanded: the setpoint as text, by default the pose.
+        """
         reached = await self.settle(pose)
         if not pose.near(reached):
-            raise Failed(f'commanded {pose}, reached {reached} after {MOVE_TIMEOUT:g} s')
+            raise Failed(f'commanded {commanded or pose}, reached {reached} after '
+                         f'{MOVE_TIMEOUT:g} s')
 
     async def target(self, pitch: float, yaw: float) -> Pose:
         """Return a pose within the ranges; an axis that the gimbal lacks keeps its angle."""
@@ -294,7 +297,7 @@ class GimbalTester(ABC):
             raise Skipped('it reports RC_EXCLUSIVE, so it ignores setpoints')
         if not start.near(now):
             await self.point(start)
-        return await self.until(start.near)
+        return await self.pose_when(start.near)
 
     async def free_direction(self, pose: Pose, angle: float) -> int:
         """
@@ -314,10 +317,10 @@ class GimbalTester(ABC):
 
     async def stays(self, before: Pose, cause: str) -> None:
         """Raise Failed if the gimbal moves within :data:`WATCH_TIME`."""
-        end = self.session.now + WATCH_TIME
+        end = self.now + WATCH_TIME
         # A single deviating status does not count: the requirement "continuous" covers it.
         away = 0
-        while away < 2 and self.session.now < end:
+        while away < 2 and self.now < end:
             pose = await self.pose()
             away = 0 if pose.near(before) else away + 1
             await self.pause(POLL)
@@ -327,56 +330,39 @@ class GimbalTester(ABC):
     # Restoring
 
     async def save(self) -> bool:
-        """See :class:`Tester`."""
-        if self._before is None:
-            try:
-                self._before = await self.pose()
-            except Skipped:
-                return False
+        """See :class:`Session`."""
+        try:
+            self._before = self._before or await self.pose()
+        except Skipped:
+            return False
         return True
 
     @property
     def saved(self) -> str:
-        """See :class:`Tester`."""
+        """See :class:`Session`."""
         return str(self._before)
 
     async def restore(self) -> list[str]:
-        """See :class:`Tester`."""
+        """See :class:`Session`."""
         before = self._before
         assert before is not None
-        differing = []
         try:
-            now = await self.pose()
-            same_mode = not (
-                now.flags ^ before.flags) & ~mavlink.GIMBAL_DEVICE_FLAGS_ACCEPTS_YAW_IN_EARTH_FRAME
-            if self.conditions.consent and not (now.near(before, 1.0) and same_mode):
-                await self.prepare()
+            if self.consent:
                 await self._turn_back(before)
-            if not (await self.until(lambda pose: pose.near(before), 1.0)).near(before):
-                differing = ['attitude']
+            is_back = before.near(await self.pose_when(before.near, 1.0))
         except Skipped:
-            differing = ['attitude']
-        await restore_interval(self.session, self.status)
-        return differing
+            is_back = False
+        await restore_interval(self, self.status)
+        return [] if is_back else ['attitude']
 
     async def _turn_back(self, before: Pose) -> None:
-        frames = (mavlink.GIMBAL_DEVICE_FLAGS_YAW_IN_EARTH_FRAME
-                  | mavlink.GIMBAL_DEVICE_FLAGS_ACCEPTS_YAW_IN_EARTH_FRAME)
-        flags = before.flags & ~frames | mavlink.GIMBAL_DEVICE_FLAGS_YAW_IN_VEHICLE_FRAME
-        await self.point(before, flags=flags)
-        await self.until(lambda pose: pose.near(before, 1.0))
+        accepts = mavlink.GIMBAL_DEVICE_FLAGS_ACCEPTS_YAW_IN_EARTH_FRAME
+        now = await self.pose()
+        if now.near(before, 1.0) and not (now.flags ^ before.flags) & ~accepts:
+            return
+        await self.prepare()
+        flags = before.flags & ~(accepts | mavlink.GIMBAL_DEVICE_FLAGS_YAW_IN_EARTH_FRAME)
+        await self.point(before, flags=flags | mavlink.GIMBAL_DEVICE_FLAGS_YAW_IN_VEHICLE_FRAME)
+        await self.pose_when(lambda pose: pose.near(before, 1.0))
         # Wait until the gimbal stands still.
         await self.pause(0.5)
-
-
-def quaternion_of(pose: Pose | None) -> tuple[float, float, float, float]:
-    """Return the quaternion of a pose for a message, NaN without one."""
-    if pose is None:
-        return (NAN,) * 4
-    return Quaternion.from_euler(*map(math.radians, (pose.roll, pose.pitch, pose.yaw)))
-
-
-def radians(rates: tuple[float, float, float]) -> tuple[float, float, float]:
-    """Return rates in rad/s."""
-    one, two, three = map(math.radians, rates)
-    return one, two, three
