@@ -33,23 +33,19 @@ import threading
 import time
 from typing import Any
 
-from rclpy.callback_groups import ReentrantCallbackGroup
 from rclpy.context import Context
 from rclpy.exceptions import InvalidHandle
-from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
+from rclpy.executors import SingleThreadedExecutor
 from rclpy.guard_condition import GuardCondition
 from rclpy.impl.implementation_singleton import rclpy_implementation as _rclpy
 from rclpy.node import Node
 from rclpy.qos import QoSProfile
 from rclpy.service import Service
 from rclpy.subscription import Subscription
-from rclpy.task import Future
 
 from .answer_spacing import AnswerSpacing, MAX_SPREAD
 from .throttled_log import NodeLog
 
-# s between checks for calls while rclpy's own loop runs.
-FALLBACK_PERIOD = 0.1
 # Answers that wait for their time; more would fill the memory and come too late.
 MAX_WAITING = 250
 # The answer to requests that wait at the end.
@@ -63,7 +59,7 @@ Take = Callable[[Any, Respond], None]
 
 class DeferredService:
     """
-    A service that answers later.
+    A service that answers later; a node with one needs a :class:`NodeExecutor`.
 
     :param take: called with the request, and with the function that sends the response.
     :param refuse_waiting: called with the reason when the executor ends; answers what waits.
@@ -72,36 +68,23 @@ class DeferredService:
 
     def __init__(
         self, node: Node, type_: type[Any], name: str, take: Take,
-        refuse_waiting: Callable[[str], None] = lambda reason: None,
-        spread: float = MAX_SPREAD, qos: QoSProfile | None = None,
+        refuse_waiting: Callable[[str], None], qos: QoSProfile, spread: float = MAX_SPREAD,
     ) -> None:
         self.take = take
         self.refuse_waiting = refuse_waiting
         self.spacing = AnswerSpacing(spread)
-        self._node = node
-        # In a group of its own: a coroutine that waits would stop the other callbacks of a group.
-        node.create_service(
-            type_, name, self.serve, callback_group=ReentrantCallbackGroup(),
-            **({'qos_profile': qos} if qos else {}))
+        node.create_service(type_, name, self, qos_profile=qos)
 
-    async def serve(self, request: Any, response: Any) -> Any:
-        """Answer in an executor of rclpy; a :class:`NodeExecutor` does not call this."""
-        future = Future()
-
-        def respond(answer: Any) -> None:
-            future.set_result(answer)
-            if executor := self._node.executor:
-                executor.wake()
-
-        self.take(request, respond)
-        return await future
+    def __call__(self, request: Any, response: Any) -> Any:
+        """Refuse to answer in another executor."""
+        raise NotImplementedError
 
 
 class NodeExecutor(SingleThreadedExecutor):
     """
     Runs the services and subscriptions of nodes, one callback after the other.
 
-    Where a node has timers, clients or waitables, rclpy's own loop runs instead.
+    It does not run timers, clients and waitables.
     """
 
     def __init__(self, context: Context, log: NodeLog) -> None:
@@ -110,7 +93,7 @@ class NodeExecutor(SingleThreadedExecutor):
         self._stale.set()
         super().__init__(context=context)
         self._log = log
-        self._entities: _Entities | None = None
+        self._wait_set: _WaitSet | None = None
         # A heap: the time from which on each is due (s, monotonic), its number, the function.
         self._calls: list[tuple[float, int, Callable[[], None]]] = []
         self._numbers = itertools.count()
@@ -124,17 +107,15 @@ class NodeExecutor(SingleThreadedExecutor):
         Requests that wait are then refused.
         """
         while not self._ended.is_set() and self.context.ok():
-            try:
-                self.spin_once()
-            except ExternalShutdownException:
-                break
-            except Exception as error:
-                self._log.error(f'internal error: {error!r}', 'executor')
+            self._call(self.spin_once)
+        self._call(self._refuse_waiting)
+        self._release()
+
+    def _call(self, function: Callable[[], None]) -> None:
         try:
-            self._refuse_waiting()
+            function()
         except Exception as error:
             self._log.error(f'internal error: {error!r}', 'executor')
-        self._release()
 
     def end(self) -> None:
         """Make :meth:`run` return; callable from any thread."""
@@ -173,26 +154,20 @@ class NodeExecutor(SingleThreadedExecutor):
         if self._stale.is_set():
             self._stale.clear()
             self._release()
+        if self._wait_set is None:
+            # An entity may be destroyed meanwhile; the next call then tries again.
             with contextlib.suppress(InvalidHandle):
-                self._entities = _Entities.of(self.get_nodes(), self._wakeup, self.context)
-        if self._entities is None:
-            super().spin_once(FALLBACK_PERIOD if timeout_sec is None else timeout_sec)
+                self._wait_set = _WaitSet(self.get_nodes(), self._wakeup, self.context)
         else:
-            services, subscriptions = self._entities.wait(self._timeout(timeout_sec))
+            timeout = math.inf if timeout_sec is None else timeout_sec
+            if self._calls:
+                timeout = min(self._calls[0][0] - time.monotonic(), timeout)
+            services, subscriptions = self._wait_set.wait(max(timeout, 0.0))
             for service in services:
                 self._serve(service)
             for subscription in subscriptions:
                 self._deliver(subscription)
         self._run_calls(time.monotonic())
-        if not self.context.ok():
-            raise ExternalShutdownException()
-
-    def _timeout(self, timeout: float | None) -> float | None:
-        """Return how long to wait for entities, s, None for ever."""
-        if self._calls:
-            wait = max(self._calls[0][0] - time.monotonic(), 0.0)
-            timeout = wait if timeout is None else min(wait, timeout)
-        return timeout
 
     def _run_calls(self, now: float) -> None:
         while self._calls and self._calls[0][0] <= now:
@@ -205,15 +180,15 @@ class NodeExecutor(SingleThreadedExecutor):
             return
         for node in self.get_nodes():
             for service in node.services:
-                if deferred := _deferred(service):
-                    deferred.refuse_waiting(ENDED)
+                if isinstance(service.callback, DeferredService):
+                    service.callback.refuse_waiting(ENDED)
         # No more requests are taken, so this ends; and no answer waits for its time any more.
         self._run_calls(math.inf)
 
     def _release(self) -> None:
-        if self._entities is not None:
-            self._entities.close()
-            self._entities = None
+        if self._wait_set is not None:
+            self._wait_set.close()
+            self._wait_set = None
 
     def _serve(self, service: Service) -> None:
         """Take a request; the wait set protects the handle of its service from destruction."""
@@ -223,10 +198,10 @@ class NodeExecutor(SingleThreadedExecutor):
         request, header = service.handle.service_take_request(type_.Request)
         if header is None:
             return
-        if deferred := _deferred(service):
-            deferred.spacing.note_request()
-            take = deferred.take
-            respond = functools.partial(self._respond, service, header, deferred.spacing)
+        if isinstance(callback, DeferredService):
+            callback.spacing.note_request()
+            take = callback.take
+            respond = functools.partial(self._respond, service, header, callback.spacing)
         else:
             def take(request: Any, respond: Respond) -> None:
                 respond(callback(request, type_.Response()))
@@ -266,53 +241,31 @@ class NodeExecutor(SingleThreadedExecutor):
             subscription.callback(taken[0])
 
 
-def _deferred(service: Service) -> DeferredService | None:
-    """Return the deferred service of a service of rclpy, None if it is another one."""
-    owner = getattr(service.callback, '__self__', None)
-    return owner if isinstance(owner, DeferredService) else None
-
-
 def _send(service: Service, header: _rclpy.rmw_service_info_t, response: Any) -> None:
     # The node of a forgotten device may be gone.
     with contextlib.suppress(InvalidHandle):
         service.send_response(response, header)
 
 
-class _Entities:
+class _WaitSet:
     """A wait set and its entities, which it protects from destruction."""
 
-    def __init__(
-        self, services: list[Service], subscriptions: list[Subscription],
-        guards: list[GuardCondition], context: Context,
-    ) -> None:
-        self._stack = contextlib.ExitStack()
-        try:
-            for handle in (*(one.handle for one in services),
-                           *(one.handle for one in subscriptions),
-                           *(one.handle for one in guards), context.handle):
-                self._stack.enter_context(handle)
-        except InvalidHandle:
-            self.close()
-            raise
-        self._services = {service.handle.pointer: service for service in services}
-        self._subscriptions = {one.handle.pointer: one for one in subscriptions}
-        self._guards = guards
-        self._wait_set = _rclpy.WaitSet(
-            len(subscriptions), len(guards), 0, 0, len(services), 0, context.handle)
+    def __init__(self, nodes: list[Node], wakeup: GuardCondition, context: Context) -> None:
+        services = [one for node in nodes for one in node.services]
+        subscriptions = [one for node in nodes for one in node.subscriptions]
+        self._guards = [wakeup, *(one for node in nodes for one in node.guards)]
+        with contextlib.ExitStack() as stack:
+            # Untyped: they have no common class.
+            entities: tuple[Any, ...] = (*services, *subscriptions, *self._guards, context)
+            for one in entities:
+                stack.enter_context(one.handle)
+            self._services = {service.handle.pointer: service for service in services}
+            self._subscriptions = {one.handle.pointer: one for one in subscriptions}
+            self._wait_set = _rclpy.WaitSet(
+                len(subscriptions), len(self._guards), 0, 0, len(services), 0, context.handle)
+            self._stack = stack.pop_all()
 
-    @classmethod
-    def of(
-        cls, nodes: list[Node], wakeup: GuardCondition, context: Context,
-    ) -> _Entities | None:
-        """Return the entities of nodes, None if not all are services and subscriptions."""
-        if any(True for node in nodes
-               for others in (node.timers, node.clients, node.waitables) for _ in others):
-            return None
-        return cls([one for node in nodes for one in node.services],
-                   [one for node in nodes for one in node.subscriptions],
-                   [wakeup, *(one for node in nodes for one in node.guards)], context)
-
-    def wait(self, timeout: float | None) -> tuple[list[Service], list[Subscription]]:
+    def wait(self, timeout: float) -> tuple[list[Service], list[Subscription]]:
         """Wait, and return the services and subscriptions that are ready."""
         wait_set = self._wait_set
         wait_set.clear_entities()
@@ -322,7 +275,7 @@ class _Entities:
             wait_set.add_subscription(subscription.handle)
         for guard in self._guards:
             wait_set.add_guard_condition(guard.handle)
-        wait_set.wait(-1 if timeout is None else int(timeout * 1e9))
+        wait_set.wait(-1 if timeout == math.inf else int(timeout * 1e9))
         return ([self._services[one] for one in wait_set.get_ready_entities('service')],
                 [self._subscriptions[one] for one in wait_set.get_ready_entities('subscription')])
 

@@ -127,7 +127,7 @@ class NodeInterface:
         for service in services:
             calls, endpoint = LinkCalls(link, log, service.limit), service.endpoint
             DeferredService(node, endpoint.type, f'~/{endpoint.name}', _taker(service, calls),
-                            calls.refuse_waiting, qos=SERVICE_QOS)
+                            calls.refuse_waiting, SERVICE_QOS)
         for command in commands:
             endpoint = command.endpoint
             node.create_subscription(

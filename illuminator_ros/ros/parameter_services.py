@@ -84,8 +84,8 @@ class ParameterServices:
                          reliability=qos_profile_services_default.reliability)
 
         def serve(type_: type[Any], name: str, take: Take) -> None:
-            DeferredService(node, type_, f'~/{name}', take, self._calls.refuse_waiting,
-                            ANSWER_SPREAD, qos)
+            DeferredService(node, type_, f'~/{name}', take, self._calls.refuse_waiting, qos,
+                            ANSWER_SPREAD)
 
         each = self._each
         serve(srv.DescribeParameters, 'describe_parameters', lambda request, respond: respond(

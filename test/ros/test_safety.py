@@ -17,6 +17,7 @@
 import threading
 
 from diagnostic_msgs.msg import DiagnosticArray
+from illuminator_ros.ros.executor import NodeExecutor
 import pytest
 from std_msgs.msg import Bool, Float32, String
 from std_srvs.srv import SetBool, Trigger
@@ -114,7 +115,9 @@ def test_silent_source_loses_the_light_while_the_executor_is_blocked(own_ros: Ro
                           on_release='off') as process, ServedLight(port) as light):
         Parameters(own_ros).wait(mode='internal_control')
         assert ask(own_ros, 'safety', True).success
-        process.node.create_timer(0.001, block)
+        executor = process.node.executor
+        assert isinstance(executor, NodeExecutor)
+        executor.call(block)
         assert blocked.wait(PATIENCE)
 
         pass_time_until(lambda: light.fake.fields['enable'] == 0)

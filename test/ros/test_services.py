@@ -207,7 +207,7 @@ def serve_later(node: Node) -> Log[Respond]:
             respond(Trigger.Response(message=reason))
 
     DeferredService(
-        node, Trigger, '~/slow', take, refuse_waiting, spread=math.inf, qos=SERVICE_QOS)
+        node, Trigger, '~/slow', take, refuse_waiting, SERVICE_QOS, spread=math.inf)
     return waiting
 
 
@@ -285,21 +285,6 @@ def test_answer_that_comes_while_the_executor_sends_another_one_does_not_stop_it
     for answered in calls:
         answered.result()
     Call(fast.call_async(Trigger.Request())).result()
-
-
-def test_deferred_service_answers_where_the_loop_of_rclpy_runs_for_the_sake_of_a_timer(
-    node: Node, clients: MakeClient,
-) -> None:
-    ticks: Log[int] = Log()
-    node.create_timer(0.01, lambda: ticks.append(1))
-    waiting = serve_later(node)
-    calls = call(clients('slow'), waiting, 2)
-    Call(clients('fast').call_async(Trigger.Request())).result()
-    ticks.wait_for(lambda one: True, count=2)
-    for respond in list(waiting):
-        respond(Trigger.Response())
-    for answered in calls:
-        answered.result()
 
 
 def test_executor_that_ends_refuses_requests_that_wait_without_a_pause(
