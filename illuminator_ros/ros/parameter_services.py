@@ -23,8 +23,10 @@ device's acknowledgement without blocking, and the values of one call are one co
 from __future__ import annotations
 
 from array import array
-from collections.abc import Callable, Iterable, Sequence
-from typing import Any, TypeVar
+from collections.abc import Callable, Sequence
+import contextlib
+import functools
+from typing import Any
 
 from rcl_interfaces import srv
 from rcl_interfaces.msg import ListParametersResult, ParameterValue, SetParametersResult
@@ -40,7 +42,6 @@ from .parameters import ChangeableParameters, DeviceParameters, Values
 from .throttled_log import NodeLog
 from ..mavlink.link import Link
 
-T = TypeVar('T')
 Messages = Sequence[ParameterMessage]
 
 # Names in one request; longer lists would delay the other services of the node.
@@ -87,15 +88,14 @@ class ParameterServices:
             DeferredService(node, type_, f'~/{name}', take, self._calls.refuse_waiting, qos,
                             ANSWER_SPREAD)
 
-        each = self._each
-        serve(srv.DescribeParameters, 'describe_parameters', lambda request, respond: respond(
-            srv.DescribeParameters.Response(
-                descriptors=each(request.names, node.describe_parameter))))
-        serve(srv.GetParameters, 'get_parameters', lambda request, respond: respond(
-            srv.GetParameters.Response(values=each(request.names, self._value))))
-        serve(srv.GetParameterTypes, 'get_parameter_types', lambda request, respond: respond(
-            srv.GetParameterTypes.Response(
-                types=each(request.names, lambda name: self._value(name).type))))
+        reads: tuple[tuple[type[Any], str, str, Callable[[str], object]], ...] = (
+            (srv.DescribeParameters, 'describe_parameters', 'descriptors',
+             node.describe_parameter),
+            (srv.GetParameters, 'get_parameters', 'values', self._value),
+            (srv.GetParameterTypes, 'get_parameter_types', 'types',
+             lambda name: self._value(name).type))
+        for type_, name, field, look_up in reads:
+            serve(type_, name, functools.partial(self._read, type_.Response, field, look_up))
         serve(srv.ListParameters, 'list_parameters', self._list)
         serve(srv.SetParameters, 'set_parameters', self._set)
         serve(srv.SetParametersAtomically, 'set_parameters_atomically', self._set_atomically)
@@ -110,11 +110,15 @@ class ParameterServices:
     # In the executor's thread. Where a name is unknown or the list too long, the answer is an
     # empty list, as that of rclpy and rclcpp; tools take it for "not set".
 
-    def _each(self, names: list[str], look_up: Callable[[str], T]) -> list[T]:
-        try:
-            return [look_up(name) for name in names] if self._is_short(names) else []
-        except ParameterNotDeclaredException:
-            return []
+    def _read(
+        self, response: type[Any], field: str, look_up: Callable[[str], object], request: Any,
+        respond: Respond,
+    ) -> None:
+        found = []
+        with contextlib.suppress(ParameterNotDeclaredException):
+            if self._is_short(request.names):
+                found = [look_up(name) for name in request.names]
+        respond(response(**{field: found}))
 
     def _value(self, name: str) -> ParameterValue:
         try:
@@ -122,97 +126,75 @@ class ParameterServices:
         except ParameterUninitializedException:
             return ParameterValue()
 
-    def _list(
-        self, request: srv.ListParameters.Request, respond: Respond,
-    ) -> None:
+    def _list(self, request: srv.ListParameters.Request, respond: Respond) -> None:
         """Leave out unset parameters, so that the output of ``ros2 param dump`` can be loaded."""
         result = ListParametersResult()
         if self._is_short(request.prefixes):
-            try:
-                result = self._node.list_parameters(list(request.prefixes), request.depth)
-            except (TypeError, ValueError) as error:
-                self._log.warning(f'list_parameters: {error}', 'list_parameters')
+            result = self._node.list_parameters(list(request.prefixes), request.depth)
             result.names = [name for name in result.names if self._value(name).type]
         respond(srv.ListParameters.Response(result=result))
 
-    def _set(
-        self, request: srv.SetParameters.Request, respond: Respond,
-    ) -> None:
-        messages = list(request.parameters) if self._is_short(request.parameters) else []
-
-        def answer(reasons: list[str]) -> None:
-            respond(srv.SetParameters.Response(results=[_result(reason) for reason in reasons]))
-
-        self._calls.ask(lambda now, done: self._set_each(messages, now, done), answer,
-                        lambda reason: [reason] * len(messages))
+    def _set(self, request: srv.SetParameters.Request, respond: Respond) -> None:
+        self._start(request.parameters, False, lambda reasons: respond(
+            srv.SetParameters.Response(results=[*map(_result, reasons)])))
 
     def _set_atomically(
-        self, request: srv.SetParametersAtomically.Request,
-        respond: Respond,
+        self, request: srv.SetParametersAtomically.Request, respond: Respond,
     ) -> None:
-        def answer(reason: str) -> None:
-            respond(srv.SetParametersAtomically.Response(result=_result(reason)))
+        self._start(request.parameters, True, lambda reasons: respond(
+            srv.SetParametersAtomically.Response(
+                result=_result(next(filter(None, reasons), '')))))
 
-        messages = request.parameters
-        if not self._is_short(messages):
-            answer(f'{len(messages)} parameters are more than {MAX_NAMES}')
-            return
-        self._calls.ask(
-            lambda now, done: self._set_all(messages, now, done), answer, str)
+    def _start(
+        self, messages: Messages, atomically: bool, answer: Callable[[list[str]], None],
+    ) -> None:
+        """Set parameters; answer with the reason why each was not set, '' if it was."""
+        if self._is_short(messages):
+            self._calls.ask(
+                lambda now, done: self._set_all(messages, atomically, now, done), answer,
+                lambda reason: [reason] * len(messages))
+        else:
+            answer([f'{len(messages)} parameters are more than {MAX_NAMES}'])
 
     # In the link thread
 
-    def _set_each(
-        self, messages: Messages, now: float, answer: Callable[[list[str]], None],
+    def _set_all(
+        self, messages: Messages, atomically: bool, now: float,
+        answer: Callable[[list[str]], None],
     ) -> None:
-        """Set each parameter separately, but those of the device with one command."""
+        """
+        Set those of the device with one command, and each other one separately.
+
+        :param atomically: set all or none. Local ones are set first: they can be rolled back.
+        """
         reasons = [self._check(message) for message in messages]
-        changes = self._device_values(
-            message for message, reason in zip(messages, reasons, strict=True) if not reason)
-        for index, message in enumerate(messages):
-            if not reasons[index]:
-                reasons[index] = (_replacement(message, changes) if message.name in changes
-                                  else self._set_local([message]))
+        changes = {message.name: _value(message)
+                   for message, reason in zip(messages, reasons, strict=True)
+                   if not reason and message.name in self._device.specs}
+        reasons = [reason or _replacement(message, changes)
+                   for message, reason in zip(messages, reasons, strict=True)]
+        local = [index for index, message in enumerate(messages)
+                 if not reasons[index] and message.name not in changes]
+        if atomically and any(reasons):
+            answer(reasons)
+            return
+        before = [self._node.get_parameter(messages[index].name) for index in local]
+        for group in filter(None, [local] if atomically else [[index] for index in local]):
+            result = self._node.set_parameters_atomically(
+                [self._parameter(messages[index]) for index in group])
+            if not result.successful:
+                reasons[group[0]] = str(result.reason)
 
         def done(refusal: str) -> None:
+            if refusal and atomically and before:
+                self._node.set_parameters_atomically(before)
             answer([reason or (refusal if message.name in changes else '')
                     for message, reason in zip(messages, reasons, strict=True)])
 
-        if changes:
+        if changes and not (atomically and any(reasons)):
             self._configure(changes, now, done)
         else:
             done('')
-
-    def _set_all(self, messages: Messages, now: float, answer: Callable[[str], None]) -> None:
-        """Set all or none. Local ones are set first: they can be rolled back."""
-        local = [message for message in messages if message.name not in self._device.specs]
-        reason = next(filter(None, map(self._check, messages)), '')
-        changes = {} if reason else self._device_values(messages)
-        reason = reason or next(
-            filter(None, (_replacement(message, changes) for message in messages)), '')
-        before = [] if reason else [self._node.get_parameter(one.name) for one in local]
-        if not reason and local:
-            reason = self._set_local(local)
-
-        def done(refusal: str) -> None:
-            if refusal and before:
-                self._node.set_parameters_atomically(before)
-            answer(refusal)
-
-        if reason or len(local) == len(messages):
-            answer(reason)
-        else:
-            self._configure(changes, now, done)
-
-    def _device_values(self, messages: Iterable[ParameterMessage]) -> Values:
-        """Return the last value of each parameter of the device."""
-        return {message.name: _value(message) for message in messages
-                if message.name in self._device.specs}
-
-    def _set_local(self, messages: Messages) -> str:
-        result = self._node.set_parameters_atomically(
-            [self._parameter(message) for message in messages])
-        return '' if result.successful else str(result.reason)
 
     def _parameter(self, message: ParameterMessage) -> Parameter:
         """Return a parameter to set; an integer is taken for a double."""
