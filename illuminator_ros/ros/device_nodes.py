@@ -71,7 +71,6 @@ class DeviceNodes(Generic[K, N]):
         self.get = self._nodes.get
         # Requests for the nodes of further devices, also before those are made.
         self._requests: dict[K, NodeRequest] = {}
-        self._logs: dict[K, NodeLog] = {}
         self._absence_due = host.link.clock() + ABSENCE_DELAY
         host.diagnostics.add(first.source)
 
@@ -92,12 +91,12 @@ class DeviceNodes(Generic[K, N]):
         if key in self._requests:
             return False
         request = self._requests[key] = NodeRequest(
-            f'{self._kind} {key}', name, lambda node: self._serve(key, request, node))
+            f'{self._kind} {key}', name,
+            lambda node, log: self._serve(key, request, node, log))
         self._host.nodes.make(request)
         return True
 
-    def _serve(self, key: K, request: NodeRequest, node: Node) -> None:
-        log = NodeLog(node.get_logger())
+    def _serve(self, key: K, request: NodeRequest, node: Node, log: NodeLog) -> None:
         served = self._make(node, log)
         if shared := _shared_names(node, self._host.node):
             log.warning(f'{", ".join(shared)}: {self._host.node.get_fully_qualified_name()} has '
@@ -108,7 +107,6 @@ class DeviceNodes(Generic[K, N]):
         def bind(now: float) -> None:
             # The device may have been forgotten meanwhile, and found again.
             if self._requests.get(key) is request:
-                self._logs[key] = log
                 self.bind(served, key, now)
 
         self._host.link.call(bind)
@@ -128,14 +126,11 @@ class DeviceNodes(Generic[K, N]):
                 self._host.diagnostics.remove(node.source)
                 self._host.log.info(f'{self._kind} {key} was silent for long: '
                                     f'{node.source.node} is removed', 'forgotten')
-        self._logs.pop(key, None)
         if request := self._requests.pop(key, None):
             self._host.nodes.remove(request)
 
     def poll(self, now: float) -> None:
-        """Log once why there is no device, and the lines that the logs of further nodes hold."""
-        for log in self._logs.values():
-            log.flush()
+        """Log once why there is no device."""
         if now >= self._absence_due:
             self._absence_due = math.inf
             if self.first_is_free:

@@ -20,6 +20,7 @@ from collections.abc import Callable, Sequence
 import contextlib
 from dataclasses import dataclass
 import functools
+import math
 import threading
 import time
 
@@ -30,8 +31,8 @@ from .parameters import ParameterError
 from .payload_node import PayloadNode
 from .throttled_log import NodeLog
 
-# s to the next attempt to make a node, from the first to the longest.
-RETRY_DELAYS = (0.5, 30.0)
+# s from a failed attempt to make a node to the next one.
+RETRY_DELAY = 2.0
 
 
 @dataclass(eq=False)
@@ -40,16 +41,20 @@ class NodeRequest:
     A request for a node; requests with equal values are still different requests.
 
     :param device: the device of the node, for people.
-    :param serve: gives the node its interface; called by :meth:`NodeManager.work`.
+    :param serve: gives the node its interface, with the log of the node; called by
+        :meth:`NodeManager.work`.
+    :ivar node: the node once it was made, and ``log``, its log.
+    :ivar wanted: whether the node is still wanted.
     :ivar due: s, monotonic, for the next attempt to make the node.
-    :ivar delay: s from a failed attempt to the next one.
     """
 
     device: str
     name: str
-    serve: Callable[[Node], None]
+    serve: Callable[[Node, NodeLog], None]
+    node: Node | None = None
+    log: NodeLog | None = None
+    wanted: bool = True
     due: float = 0.0
-    delay: float = RETRY_DELAYS[0]
 
 
 class NodeManager:
@@ -72,9 +77,7 @@ class NodeManager:
         self._log = log
         self._wake = wake
         self._lock = threading.Lock()
-        self._wanted: list[NodeRequest] = []
-        self._unwanted: list[NodeRequest] = []
-        self._nodes: dict[NodeRequest, Node] = {}
+        self._requests: list[NodeRequest] = []
         self._executor = NodeExecutor(first.context, log)
         self._thread = threading.Thread(target=self._executor.run, name='nodes', daemon=True)
 
@@ -85,41 +88,42 @@ class NodeManager:
         A failed attempt is repeated, unless a parameter is wrong.
         """
         with self._lock:
-            self._wanted.append(request)
+            self._requests.append(request)
         self._wake()
 
     def remove(self, request: NodeRequest) -> None:
         """Remove a node soon, or do not make it; callable from any thread."""
-        with self._lock:
-            self._unwanted.append(request)
+        request.wanted = False
         self._wake()
 
     def work(self) -> bool:
-        """Remove unwanted nodes and make one wanted node; return whether more must be made."""
+        """
+        Remove unwanted nodes, make one wanted node, and write the lines that their logs hold.
+
+        :return: whether more nodes must be made.
+        """
         now = time.monotonic()
         with self._lock:
-            unwanted, self._unwanted = self._unwanted, []
-            self._wanted = [one for one in self._wanted if one not in unwanted]
-            due = [one for one in self._wanted if one.due <= now]
+            unwanted = [one for one in self._requests if not one.wanted]
+            self._requests = [one for one in self._requests if one.wanted]
+            due = [one for one in self._requests if one.node is None and one.due <= now]
         for request in unwanted:
-            if node := self._nodes.pop(request, None):
-                self._executor.call(functools.partial(self._discard, node))
-        if not due:
-            return False
-        request = due[0]
-        try:
-            self._nodes[request] = self._make(request)
-        except ParameterError as error:
-            self._log.error(f'{request.device} gets no node: {error}')
-        except Exception as error:
-            # Threads, descriptors or memory may be short temporarily.
-            self._log.error(f'{request.device} gets no node yet: {error}; trying again in '
-                            f'{request.delay:g} s', f'node of {request.device}')
-            request.due = time.monotonic() + request.delay
-            request.delay = min(2 * request.delay, RETRY_DELAYS[1])
-            return len(due) > 1
-        with self._lock:
-            self._wanted.remove(request)
+            if request.node is not None:
+                self._executor.call(functools.partial(self._discard, request.node))
+        for request in due[:1]:
+            try:
+                self._make(request)
+            except ParameterError as error:
+                self._log.error(f'{request.device} gets no node: {error}')
+                request.due = math.inf
+            except Exception as error:
+                # Threads, descriptors or memory may be short temporarily.
+                self._log.error(f'{request.device} gets no node yet: {error}; trying again in '
+                                f'{RETRY_DELAY:g} s', f'node of {request.device}')
+                request.due = time.monotonic() + RETRY_DELAY
+        for request in self._requests:
+            if request.log is not None:
+                request.log.flush()
         return len(due) > 1
 
     def end(self) -> None:
@@ -134,21 +138,21 @@ class NodeManager:
     @property
     def nodes(self) -> list[Node]:
         """Return the nodes that were made."""
-        return list(self._nodes.values())
+        return [one.node for one in self._requests if one.node is not None]
 
-    def _make(self, request: NodeRequest) -> Node:
+    def _make(self, request: NodeRequest) -> None:
         if self._thread.ident is None:
             self._thread.start()
-        node = PayloadNode(
-            request.name, first=self._first, namespace=self._first.get_namespace(),
-            cli_args=self._arguments)
-        try:
-            request.serve(node)
-        except BaseException:
-            node.destroy_node()
-            raise
+        with contextlib.ExitStack() as stack:
+            node = PayloadNode(
+                request.name, first=self._first, namespace=self._first.get_namespace(),
+                cli_args=self._arguments)
+            stack.callback(node.destroy_node)
+            log = NodeLog(node.get_logger())
+            request.serve(node, log)
+            stack.pop_all()
         self._executor.add_node(node)
-        return node
+        request.node, request.log = node, log
 
     def _discard(self, node: Node) -> None:
         self._executor.remove_node(node)

@@ -18,10 +18,11 @@ from collections.abc import Callable, Iterator
 from types import SimpleNamespace
 from typing import cast
 
-from illuminator_ros.ros import throttled_log
+from illuminator_ros.ros import node_manager, throttled_log
 from illuminator_ros.ros.device_nodes import DeviceNodes
 from illuminator_ros.ros.diagnostics_publisher import DiagnosticsSource
 from illuminator_ros.ros.node_manager import NodeManager, NodeRequest
+from illuminator_ros.ros.parameters import ParameterError
 from illuminator_ros.ros.payload import Host
 from illuminator_ros.ros.payload_node import PayloadNode
 from illuminator_ros.ros.throttled_log import NodeLog
@@ -47,7 +48,7 @@ def pool(first: PayloadNode) -> Iterator[NodeManager]:
         node.destroy_node()
 
 
-def request(serve: Callable[[Node], None] = lambda node: None) -> NodeRequest:
+def request(serve: Callable[[Node, NodeLog], None] = lambda node, log: None) -> NodeRequest:
     return NodeRequest('light 1/244', 'further', serve)
 
 
@@ -55,44 +56,68 @@ def names(ros: Ros) -> list[str]:
     return ros.node.get_node_names()
 
 
-def test_node_that_cannot_be_made_is_tried_again_and_logged(
+def test_node_that_cannot_be_made_is_tried_again_and_logged_and_removed_with_its_device(
     own_ros: Ros, pool: NodeManager, capfd: pytest.CaptureFixture[str],
 ) -> None:
     failures = [OSError('too many threads')]
 
-    def serve(node: Node) -> None:
+    def serve(node: Node, log: NodeLog) -> None:
         if failures:
             raise failures.pop()
 
-    pool.make(request(serve))
+    wanted = request(serve)
+    pool.make(wanted)
 
     pool.work()
     assert 'light 1/244 gets no node yet: too many threads' in ''.join(capfd.readouterr())
     eventually(lambda: pool.work() or 'further' in names(own_ros))
 
-
-def test_node_is_removed_with_its_device(own_ros: Ros, pool: NodeManager) -> None:
-    wanted = request()
-    pool.make(wanted)
-    pool.work()
-    eventually(lambda: 'further' in names(own_ros))
-
     pool.remove(wanted)
     pool.work()
-
     eventually(lambda: 'further' not in names(own_ros))
     assert pool.nodes == []
 
 
-def test_device_that_goes_before_its_node_is_made_gets_none(
-    own_ros: Ros, pool: NodeManager,
-) -> None:
+def test_device_that_goes_before_its_node_is_made_gets_none(pool: NodeManager) -> None:
     wanted = request()
     pool.make(wanted)
     pool.remove(wanted)
 
     assert not pool.work()
     assert pool.nodes == []
+
+
+def test_device_whose_node_has_a_wrong_parameter_gets_none_and_one_line(
+    pool: NodeManager, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str],
+) -> None:
+    monkeypatch.setattr(node_manager, 'RETRY_DELAY', 0.0)
+
+    def serve(node: Node, log: NodeLog) -> None:
+        raise ParameterError('brightness: wrong')
+
+    pool.make(request(serve))
+    for _ in range(2):
+        pool.work()
+
+    assert ''.join(capfd.readouterr()).count('light 1/244 gets no node: brightness: wrong') == 1
+    assert pool.nodes == []
+
+
+def test_last_line_that_the_log_of_a_further_node_left_out_is_written_after_its_period(
+    pool: NodeManager, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str],
+) -> None:
+    def serve(node: Node, log: NodeLog) -> None:
+        for number in range(throttled_log.BURST + 2):
+            log.warning(f'line {number}', 'kind')
+
+    pool.make(request(serve))
+    pool.work()
+    assert 'left out' not in ''.join(capfd.readouterr())
+
+    monkeypatch.setattr(throttled_log, 'PERIOD', 0.0)
+    pool.work()
+
+    assert '[further]: line 11 (1 similar lines left out)' in ''.join(capfd.readouterr())
 
 
 class Served:
@@ -110,42 +135,6 @@ class Served:
         return ''
 
 
-def device_nodes(
-    first: PayloadNode, pool: NodeManager, make: Callable[[Node, NodeLog], Served],
-    turns: list[Callable[[float], None]], sources: set[DiagnosticsSource],
-) -> DeviceNodes[int, Served]:
-    return DeviceNodes[int, Served](
-        cast(Host, SimpleNamespace(
-            node=first, nodes=pool, log=NodeLog(first.get_logger()),
-            link=SimpleNamespace(clock=lambda: 0.0, call=turns.append),
-            diagnostics=SimpleNamespace(add=sources.add, remove=sources.discard))),
-        'light', Served(first), make, lambda node, key, now: None)
-
-
-def test_last_line_that_the_log_of_a_further_node_left_out_is_written_after_its_period(
-    first: PayloadNode, pool: NodeManager, monkeypatch: pytest.MonkeyPatch,
-    capfd: pytest.CaptureFixture[str],
-) -> None:
-    turns: list[Callable[[float], None]] = []
-
-    def make(node: Node, log: NodeLog) -> Served:
-        for number in range(throttled_log.BURST + 2):
-            log.warning(f'line {number}', 'kind')
-        return Served(node)
-
-    nodes = device_nodes(first, pool, make, turns, set())
-    nodes.serve(7, 'further')
-    pool.work()
-    turns.pop()(0.0)
-    nodes.poll(0.0)
-    assert 'left out' not in ''.join(capfd.readouterr())
-
-    monkeypatch.setattr(throttled_log, 'PERIOD', 0.0)
-    nodes.poll(0.0)
-
-    assert '[further]: line 11 (1 similar lines left out)' in ''.join(capfd.readouterr())
-
-
 def test_device_found_again_while_its_node_is_made_has_one_node_and_one_diagnostics_source(
     first: PayloadNode, pool: NodeManager,
 ) -> None:
@@ -160,7 +149,12 @@ def test_device_found_again_while_its_node_is_made_has_one_node_and_one_diagnost
             nodes.serve(7, 'further')
         return made[-1]
 
-    nodes = device_nodes(first, pool, make, turns, sources)
+    nodes = DeviceNodes[int, Served](
+        cast(Host, SimpleNamespace(
+            node=first, nodes=pool, log=NodeLog(first.get_logger()),
+            link=SimpleNamespace(clock=lambda: 0.0, call=turns.append),
+            diagnostics=SimpleNamespace(add=sources.add, remove=sources.discard))),
+        'light', Served(first), make, lambda node, key, now: None)
     nodes.serve(7, 'further')
     while pool.work():
         pass
