@@ -31,7 +31,7 @@ from rclpy.node import Node
 from .diagnostics import SIGNING_NEEDED
 from .diagnostics_publisher import DiagnosticsPublisher
 from .executor import NodeExecutor
-from .graph import unheard_publishers
+from .graph import shared_names, unheard_publishers
 from .ignored_parameters import ignored_parameters
 from .node_manager import NodeManager, without_node_name
 from .parameters import (
@@ -112,9 +112,6 @@ class Bridge:
                 mavlink_version=parameters.mavlink_version)
         except ValueError as error:
             raise ParameterError(f'mavlink_version: {error}') from None
-        self._signing_reported = False
-        # The pairs of lines between which copies of frames come.
-        self._loops: Set[tuple[int, int]] = set()
         # Set if there is work before the next tick.
         self._wake = threading.Event()
         self._ended = threading.Event()
@@ -258,7 +255,7 @@ class Bridge:
             log.error(text)
 
     def _keep_house(self) -> None:
-        graph_due, shared, unheard = 0.0, frozenset[str](), frozenset[str]()
+        graph_due = 0.0
         while not self._ended.is_set():
             try:
                 more = self._nodes.work()
@@ -270,8 +267,10 @@ class Bridge:
                 self._frame_log.adjust()
                 if self.link.clock() >= graph_due:
                     graph_due = self.link.clock() + GRAPH_INTERVAL
-                    shared = self._check_names(shared)
-                    unheard = self._check_publishers(unheard)
+                    nodes = self.nodes
+                    self.log.write_conditions(shared_names(nodes), 'name')
+                    self.log.write_conditions(itertools.chain.from_iterable(
+                        map(unheard_publishers, nodes)), 'publisher')
             except Exception as error:
                 self.log.error(f'internal error: {error!r}', 'housekeeping')
                 more = False
@@ -281,37 +280,14 @@ class Bridge:
             self._wake.clear()
 
     def _poll(self, now: float) -> None:
-        if (not self._signing_reported and self._component.commands.unanswering
-                and self.link.snapshot(now).signing.unchecked):
-            self._signing_reported = True
-            self.log.warning(f'{SIGNING_NEEDED}: set signing_mode and signing_key_file')
-        loops = self._diagnostics.loops(now)
-        for lines in loops.keys() - self._loops:
-            self.log.warning(loops[lines], 'loop')
-        self._loops = loops.keys()
+        needs_signing = (self._component.commands.unanswering
+                         and self.link.snapshot(now).signing.unchecked)
+        self.log.write_conditions(
+            [f'{SIGNING_NEEDED}: set signing_mode and signing_key_file'] if needs_signing else [],
+            'signing')
+        self.log.write_conditions(self._diagnostics.loops(now), 'loop')
         for payload in self._payloads:
             payload.poll(now)
-
-    def _check_names(self, known: frozenset[str]) -> frozenset[str]:
-        """Log the names of our nodes that other nodes have, unless known; and return them."""
-        names = [f'{namespace.rstrip("/")}/{name}'
-                 for name, namespace in self.node.get_node_names_and_namespaces()]
-        shared = frozenset(name for name in (
-            node.get_fully_qualified_name() for node in self.nodes) if names.count(name) > 1)
-        for name in sorted(shared - known):
-            self.log.warning(
-                f'another node is called {name}: services and parameters of either may answer; '
-                'give one another name with -r __node:=NAME', 'name')
-        for name in sorted(known - shared):
-            self.log.info(f'no other node is called {name} any more', 'name')
-        return shared
-
-    def _check_publishers(self, known: frozenset[str]) -> frozenset[str]:
-        """Log the publishers that our nodes cannot hear, unless known; and return the texts."""
-        texts = frozenset(itertools.chain.from_iterable(map(unheard_publishers, self.nodes)))
-        for text in sorted(texts - known):
-            self.log.warning(text, 'publisher')
-        return texts
 
     def _link_event(self, event: LinkEvent) -> None:
         self.log.write(logging.INFO if event.is_open else logging.WARNING, str(event),

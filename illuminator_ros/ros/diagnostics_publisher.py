@@ -16,7 +16,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 import queue
 import threading
@@ -85,9 +85,9 @@ class DiagnosticsPublisher:
         """Return a snapshot of the link; call it in the link's thread."""
         return link_diagnostics(self._link, self._component, self._urls, now)
 
-    def loops(self, now: float) -> Mapping[tuple[int, int], str]:
+    def loops(self, now: float) -> Iterable[str]:
         """Return the loops between lines, for people; call it in the link's thread."""
-        return loops(self._link.copies(now), self._urls)
+        return loops(self._link.copies(now), self._urls).values()
 
     def poll(self, tolerance: float) -> None:
         """

@@ -12,11 +12,11 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Types and publishers in the ROS graph."""
+"""Types, names and publishers in the ROS graph."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from typing import Any
 
 from rclpy.node import Node
@@ -29,6 +29,16 @@ UNKNOWN_NAME = '_NODE_NAME_UNKNOWN_'
 def type_name(type_: Any) -> str:
     """Return the name of a message type in the graph."""
     return f'{type_.__module__.partition(".")[0]}/msg/{type_.__name__}'
+
+
+def shared_names(nodes: Sequence[Node]) -> Iterator[str]:
+    """Return for each of our nodes whose name another node has the remedy, for people."""
+    names = [f'{namespace.rstrip("/")}/{name}'
+             for name, namespace in nodes[0].get_node_names_and_namespaces()]
+    for name in (node.get_fully_qualified_name() for node in nodes):
+        if names.count(name) > 1:
+            yield (f'another node is called {name}: services and parameters of either may answer; '
+                   'give one another name with -r __node:=NAME')
 
 
 def unheard_publishers(node: Node) -> Iterator[str]:

@@ -16,7 +16,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 import logging
 import threading
@@ -58,6 +58,7 @@ class NodeLog:
         self._logger = logger
         self._clock = clock
         self._kinds: dict[str, _Kind] = {}
+        self._conditions: dict[str, frozenset[str]] = {}
         self._lock = threading.Lock()
 
     def info(self, text: str, kind: str = '') -> None:
@@ -89,6 +90,15 @@ class NodeLog:
                 return
             text += note
         self._emit(severity, text)
+
+    def write_conditions(self, texts: Iterable[str], kind: str) -> None:
+        """Warn of each condition of a kind that begins, and note each that ends."""
+        before, now = self._conditions.get(kind, frozenset()), frozenset(texts)
+        self._conditions[kind] = now
+        for text in sorted(now - before):
+            self.warning(text, kind)
+        for text in sorted(before - now):
+            self.info(f'no longer: {text}', kind)
 
     def flush(self) -> None:
         """Write the last line of each kind that was limited, once its period has ended."""

@@ -91,8 +91,8 @@ def test_long_list_of_names_gets_an_empty_answer(
 def test_second_bridge_of_the_same_name_is_logged_once_when_it_comes_and_when_it_goes(
     own_ros: ros.Ros, port: int,
 ) -> None:
-    came, went = (f'{text} /illuminator' for text in (
-        'another node is called', 'no other node is called'))
+    came, went = (f'{text}another node is called /illuminator' for text in (
+        '[illuminator]: ', 'no longer: '))
     with ros.running_bridge(own_ros.domain, port) as bridge:
         with ended(ros.start_bridge(own_ros.domain, free_port())):
             pass_time_until(lambda: bridge.count(came), step=5.0)
