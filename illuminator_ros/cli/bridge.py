@@ -184,14 +184,14 @@ def _serve(
     import rclpy
     from rclpy.signals import SignalHandlerOptions
 
-    from ..ros.payload_node import MAX_NODE_NAME, PayloadNode
+    from ..ros.payload_node import PayloadNode
 
     # Not before: the import exits at once if the selected middleware is not installed, and a
     # queue would lose the reason.
     termination.queue_output(2)
     # From here on the process must leave the ROS graph in order, so a signal acts later.
     termination.calls(lambda: None)
-    if refusal := _long_name_refusal(arguments, MAX_NODE_NAME) or log_directory_refusal():
+    if refusal := log_directory_refusal():
         return executable.refuse(refusal)
     _use_profile()
     # rcutils colours its lines on a terminal only, and stderr is the pipe of a queue here.
@@ -232,12 +232,3 @@ def _use_profile() -> None:
     if not (any(map(os.environ.get, names)) or any(map(os.path.exists, files))):
         profile = os.path.join(os.path.dirname(__file__), os.pardir, 'ros', 'fastdds.xml')
         os.environ.update(dict.fromkeys(names, os.path.abspath(profile)))
-
-
-def _long_name_refusal(arguments: list[str], limit: int) -> str:
-    """Return that a node's name and namespace are too long, '' if they are not."""
-    given = {key: value for argument in arguments for key, rule, value in [
-        argument.partition(':=')] if rule and key in ('__ns', '__node', '__name')}
-    length = sum(len(value) + 1 for value in given.values())
-    return (f'node name and namespace have {length} characters together: the limit is {limit}'
-            if length > limit else '')

@@ -18,7 +18,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping
 import math
-import threading
 import time
 from typing import Any, NamedTuple
 
@@ -273,15 +272,8 @@ def given_parameters(node: Node) -> Mapping[str, Parameter]:
 
     rclpy has no public access to values of the wrong type, such as an integer for a double, and to
     parameters that are not declared.
-
-    :raises RuntimeError: if rclpy has renamed the private attribute.
     """
-    try:
-        return node._parameter_overrides
-    except AttributeError:
-        raise RuntimeError(
-            'this version of rclpy is not supported: it has no Node._parameter_overrides, which '
-            'holds the parameters given on the command line') from None
+    return node._parameter_overrides
 
 
 class ChangeableParameters:
@@ -337,7 +329,8 @@ class DeviceParameters:
     """
     Parameters of a node that show a device; for the link's thread.
 
-    They have no value until the device reports one, and only :meth:`show` sets them.
+    They have no value until the device reports one. Only :meth:`show` may set them: a set of the
+    parameter services goes to the device.
 
     :ivar specs: by name.
     """
@@ -345,12 +338,9 @@ class DeviceParameters:
     def __init__(self, node: Node, specs: Iterable[ParameterSpec]) -> None:
         self.specs = {spec.name: spec for spec in specs}
         self._node = node
-        # The thread that shows values; another one may set a parameter meanwhile.
-        self._showing: int | None = None
         for spec in self.specs.values():
             node.declare_parameter(
                 spec.name, spec.type, spec.descriptor(read_only=False), ignore_override=True)
-        node.add_on_set_parameters_callback(self._may_set)
 
     def overrides(self) -> Values:
         """Return the values that the command line or a parameter file gives, unchecked."""
@@ -363,12 +353,8 @@ class DeviceParameters:
 
     def show(self, values: Values) -> str:
         """Set parameters to the reported values; return why that failed, '' if it did not."""
-        self._showing = threading.get_ident()
-        try:
-            result = self._node.set_parameters_atomically([
-                Parameter(name, value=value) for name, value in values.items()])
-        finally:
-            self._showing = None
+        result = self._node.set_parameters_atomically([
+            Parameter(name, value=value) for name, value in values.items()])
         return '' if result.successful else str(result.reason)
 
     def set_high(self, name: str, high: float) -> None:
@@ -377,18 +363,5 @@ class DeviceParameters:
         # rclpy cannot change the descriptor of a parameter without a value; the call after its
         # first value can.
         if isinstance(value, float) and math.isfinite(high):
-            self._showing = threading.get_ident()
-            try:
-                self._node.set_descriptor(name, self.specs[name].descriptor(
-                    read_only=False, high=max(high, value)))
-            finally:
-                self._showing = None
-
-    def _may_set(self, parameters: list[Parameter]) -> msg.SetParametersResult:
-        """Refuse a value that the device has not accepted."""
-        names = [parameter.name for parameter in parameters if parameter.name in self.specs
-                 and parameter.type_ != Parameter.Type.NOT_SET]
-        if names and self._showing != threading.get_ident():
-            return msg.SetParametersResult(successful=False, reason=(
-                f'{", ".join(names)}: only the parameter services reach the device'))
-        return msg.SetParametersResult(successful=True)
+            self._node.set_descriptor(name, self.specs[name].descriptor(
+                read_only=False, high=max(high, value)))

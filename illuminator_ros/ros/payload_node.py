@@ -26,10 +26,6 @@ from rclpy.publisher import Publisher
 
 PARAMETER_EVENTS = '/parameter_events'
 
-# Characters of a node's full name: services below it, with the prefixes and suffixes of the
-# middleware, may have 247.
-MAX_NODE_NAME = 247 - len('rq/_255_255/set_parameters_atomicallyRequest')
-
 
 class PayloadNode(Node):
     """

@@ -28,7 +28,6 @@ from illuminator_ros.ros.parameter_services import ParameterServices
 from illuminator_ros.ros.payload_node import PayloadNode
 import pytest
 from rcl_interfaces.srv import ListParameters
-from rclpy.parameter import Parameter
 from std_msgs.msg import Bool, Float32
 from std_srvs.srv import SetBool, Trigger
 from support.embedded import embedded_bridge
@@ -52,15 +51,6 @@ def served(domain: int, ros: Ros) -> Iterator[tuple[Bridge, ServedLight]]:
 @pytest.fixture
 def light(served: tuple[Bridge, ServedLight]) -> ServedLight:
     return served[1]
-
-
-def test_parameter_of_the_light_that_is_set_past_the_services_is_refused(
-    served: tuple[Bridge, ServedLight],
-) -> None:
-    [result] = served[0].node.set_parameters([Parameter('brightness', value=9.0)])
-
-    assert not result.successful
-    assert result.reason == 'brightness: only the parameter services reach the device'
 
 
 class Fault:

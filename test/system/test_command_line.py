@@ -96,7 +96,7 @@ def test_help_names_every_parameter_option_and_form_of_url() -> None:
         ("-r __node:=spot -p 'names:=[\"1/244=spot\"]'",
          "parameter names: '1/244=spot' is the name of the first node"),
         ('-r __node:=1st', "Couldn't parse remap rule: '-r __node:=1st'"),
-        (f'-r __node:={"a" * 230}', 'node name and namespace have 231 characters together'),
+        (f'-r __node:={"a" * 230}', 'cannot create the node: Invalid service name: topic length'),
         ('-r ~/enable:=/x -r ~/refresh:=/x', 'cannot create the node: '),
         ('-r ~/enabled:=/x -r ~/mode:=/x', 'cannot create the node: '),
         ('--banana', "wrong ROS arguments, see bridge --help: ['--banana']"),
