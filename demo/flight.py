@@ -64,7 +64,7 @@ from illuminator_ros.mavlink.messages import Address  # noqa: E402
 from illuminator_ros.mavlink.url import parse_url  # noqa: E402
 from illuminator_ros.payload.messages import GeoPoint  # noqa: E402
 from illuminator_ros.payload.rotation import enu_flu, flip, Quaternion  # noqa: E402
-from illuminator_ros.payload.simulated import Description, SimulatedComponents  # noqa: E402
+from illuminator_ros.payload.simulated import SimulatedComponents  # noqa: E402
 from illuminator_ros.rededge.simulated import (  # noqa: E402
     COLUMNS,
     DEFAULT_SYSTEM_ID,
@@ -156,7 +156,7 @@ class SimulatedCamera:
         self._device.records.subscribe(CsvFile(str(images), tuple(COLUMNS)).append)
         self._device.set_clock(time.time(), time.monotonic())
         self._endpoint = SimulatedComponents(
-            [Description(address, self._device)], time.monotonic())
+            [self._device], time.monotonic())
         self.heard = threading.Event()
         self._endpoint.new_peers.subscribe(lambda peer: self.heard.set())
 

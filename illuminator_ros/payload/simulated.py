@@ -102,10 +102,14 @@ class Properties:
     The properties of a simulated component, by default those of a kind of it.
 
     :param behaviour: how it behaves at first, and without faults.
+    :param name: its name for people, '' for none.
+    :param seed: of its random faults.
     """
 
     address: Address
     behaviour: Behaviour = Behaviour()
+    name: str = ''
+    seed: int = 0
 
 
 class SimulatedDevice(ABC):
@@ -260,32 +264,21 @@ class SimulatedType(Generic[D]):
         """Return the address by default."""
         return self._normal(settings).address
 
-    def make(self, settings: Values, address: Address) -> D:
+    def make(self, settings: Values, address: Address, name: str = '') -> D:
         """
         Return the device that settings describe.
 
         :raises ValueError: if the settings contradict each other.
         """
         normal = self._normal(settings)
-        own = {name: settings[name] for name in settings_of(type(normal)) if name in settings}
-        return self.device(replace(normal, address=address, **{
-            name: replace(getattr(normal, name), **value) if isinstance(value, Mapping) else value
-            for name, value in own.items()}))
-
-
-@dataclass(frozen=True)
-class Description(Generic[D]):
-    """
-    A component to simulate.
-
-    :param name: its name for people, '' for none.
-    :param seed: of its random numbers.
-    """
-
-    address: Address
-    device: D
-    name: str = ''
-    seed: int = 0
+        own = {one: settings[one] for one in (*settings_of(type(normal)), 'seed')
+               if one in settings}
+        device = self.device(replace(normal, address=address, name=name, **{
+            one: replace(getattr(normal, one), **value) if isinstance(value, Mapping) else value
+            for one, value in own.items()}))
+        for fault in settings.get('fault', ()):
+            device.behave(device.faults.add(device.behaviour, fault), 0.0)
+        return device
 
 
 class _Stream:
@@ -315,16 +308,16 @@ class SimulatedComponent(Generic[D]):
     """
 
     def __init__(
-        self, described: Description[D], now: float,
+        self, device: D, now: float,
         outgoing: deque[tuple[Address, Message]] | None = None,
         changed: Callable[[], None] = lambda: None,
     ) -> None:
-        self.address = self._first_address = described.address
-        self.name = described.name
-        self.device = described.device
+        self.device = device
+        self.address = device.properties.address
+        self.name = device.properties.name
         self.outgoing = deque() if outgoing is None else outgoing
         self._changed = changed
-        self._injector = FaultInjector(f'{described.seed} {self.address}')
+        self._injector = FaultInjector(f'{device.properties.seed} {self.address}')
         self.power_on(now)
 
     @property
@@ -340,7 +333,7 @@ class SimulatedComponent(Generic[D]):
 
     def restart(self, now: float) -> None:
         """Restart, as after a power cycle."""
-        self.address = self._first_address
+        self.address = self.device.properties.address
         self.device.restart(now)
         self._streams = {message_id: _Stream(interval, now)
                          for message_id, interval in self.device.streams().items()}
@@ -558,11 +551,11 @@ class SimulatedComponents(Endpoint, Generic[D]):
     """
     One or more simulated components on one link, of one payload or of several.
 
-    :ivar components: in the order of their descriptions.
+    :ivar components: in the order of their devices.
     :ivar new_peers: the address of each other component, with the first message from it.
     """
 
-    def __init__(self, described: Iterable[Description[D]], now: float) -> None:
+    def __init__(self, devices: Iterable[D], now: float) -> None:
         super().__init__()
         self.new_peers: Listeners[Address] = Listeners()
         self._peers: set[Address] = set()
@@ -572,7 +565,7 @@ class SimulatedComponents(Endpoint, Generic[D]):
         self.components = [
             SimulatedComponent(one, now, self.outgoing,
                                functools.partial(self._deadlines.changed, index))
-            for index, one in enumerate(described)]
+            for index, one in enumerate(devices)]
         self.sends = tuple(dict.fromkeys(
             cls for one in self.components for cls in one.device.sends))
         self.messages = tuple(dict.fromkeys((

@@ -114,7 +114,7 @@ def test_the_sample_file_of_the_simulator_is_valid() -> None:
     yaml = pytest.importorskip('yaml')
     text = SIMULATOR.partition('```yaml\n')[2].partition('```')[0]
 
-    lights = scenario(yaml.safe_load(text), 'the sample', [SIMULATED]).listed['light']
+    lights = scenario(yaml.safe_load(text), 'the sample', [SIMULATED]).listed
 
     assert [one.name for one in lights] == ['bow', 'stern']
 

@@ -36,7 +36,6 @@ from illuminator_ros.payload.checks.session import Conditions
 from illuminator_ros.payload.messages import GimbalDeviceAttitudeStatus as AttitudeStatus
 from illuminator_ros.payload.simulated import (
     CommandReply,
-    Description,
     SimulatedComponents,
     SimulatedType,
 )
@@ -130,7 +129,7 @@ def run(
     device = simulated.make(settings, address)
     for fault in faults:
         device.behave(device.faults.add(device.behaviour, fault), START - 100.0)
-    devices = SimulatedComponents([Description(address, device)], START - 100.0)
+    devices = SimulatedComponents([device], START - 100.0)
     return ChecksRun(checks, devices, consent=consent, only=only)
 
 

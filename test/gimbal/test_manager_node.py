@@ -24,7 +24,7 @@ from typing import Any
 
 from illuminator_ros.gimbal.simulated_device import GimbalProperties, SimulatedGimbal
 from illuminator_ros.mavlink.messages import Address, Message
-from illuminator_ros.payload.simulated import Description, SimulatedComponents
+from illuminator_ros.payload.simulated import SimulatedComponents
 import pytest
 
 pytest.importorskip('rclpy')
@@ -65,7 +65,7 @@ def device(port: int) -> Iterator[SimulatedGimbal]:
     """Serve a simulated gimbal over UDP, by the slow clock."""
     gimbal = SimulatedGimbal(GimbalProperties(DEVICE))
     with EndpointLink(f'udpout://127.0.0.1:{port}', SimulatedComponents([
-            Description(DEVICE, gimbal)], CLOCK()), kind=SlowLink):
+            gimbal], CLOCK()), kind=SlowLink):
         yield gimbal
 
 

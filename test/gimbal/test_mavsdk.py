@@ -35,7 +35,7 @@ from illuminator_ros.mavlink.messages import Address
 from illuminator_ros.payload.attempt import Result
 from illuminator_ros.payload.mount_attitude import to_mavlink, YawFrame
 from illuminator_ros.payload.rotation import Quaternion, Vector
-from illuminator_ros.payload.simulated import Description, SimulatedComponents
+from illuminator_ros.payload.simulated import SimulatedComponents
 import pytest
 from support.gimbal_vehicle import Autopilot, HERE, managed_vehicle, Vehicle
 from support.live_link import EndpointLink
@@ -186,7 +186,7 @@ class Client(EndpointLink[Component]):
 def both() -> Iterator[tuple[Client, Any]]:
     """Return our client and MAVSDK's plugin, which have both found the gimbal."""
     device = SimulatedManager(ManagerProperties())
-    vehicle = Vehicle(SimulatedComponents([Description(DEVICE, device)], 0.0), Autopilot())
+    vehicle = Vehicle(SimulatedComponents([device], 0.0), Autopilot())
     with (served(vehicle) as port, Client(port) as ours, player(FIRST, port) as theirs):
         yield ours, theirs
 

@@ -27,7 +27,7 @@ from illuminator_ros.mavlink.messages import Address, CommandAck, CommandLong, M
 from illuminator_ros.payload.messages import GimbalDeviceAttitudeStatus
 from illuminator_ros.payload.mount_attitude import YawFrame
 from illuminator_ros.payload.rotation import Quaternion
-from illuminator_ros.payload.simulated import Description, SimulatedComponents
+from illuminator_ros.payload.simulated import SimulatedComponents
 import pytest
 
 NAN = math.nan
@@ -43,7 +43,7 @@ class Bench:
     def __init__(self, *, announced: bool = True, **settings: object) -> None:
         device: SimulatedGimbal = SIMULATED.make(settings, DEVICE)
         self.now = 1000.0
-        self.endpoint = SimulatedComponents([Description(DEVICE, device)], self.now)
+        self.endpoint = SimulatedComponents([device], self.now)
         self.device = device
         self._announced = announced
 

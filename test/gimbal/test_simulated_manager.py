@@ -30,7 +30,7 @@ from illuminator_ros.payload.messages import (
 )
 from illuminator_ros.payload.mount_attitude import YawFrame
 from illuminator_ros.payload.rotation import Quaternion
-from illuminator_ros.payload.simulated import Description, SimulatedComponents
+from illuminator_ros.payload.simulated import SimulatedComponents
 import pytest
 
 NAN = math.nan
@@ -54,7 +54,7 @@ class Bench:
         self.address = SIMULATED.address(settings)
         device: SimulatedManager = SIMULATED.make(settings, self.address)
         self.now = 1000.0
-        self.endpoint = SimulatedComponents([Description(self.address, device)], self.now)
+        self.endpoint = SimulatedComponents([device], self.now)
         self.device = device
         self.take()
 

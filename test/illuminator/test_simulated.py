@@ -18,13 +18,14 @@ from collections.abc import Iterable
 from typing import Any
 
 from illuminator_ros.illuminator.messages import IlluminatorStatus, STATUS_ID
+from illuminator_ros.illuminator.simulated import SimulatedIlluminator
 from illuminator_ros.illuminator.simulated_properties import IlluminatorProperties
 from illuminator_ros.illuminator.thermal import ThermalProperties
 from illuminator_ros.mavlink import messages as mav
 from illuminator_ros.mavlink.dialect import encode, mavlink
+from illuminator_ros.payload.simulated import SimulatedComponents
 import pytest
 from support.light_bench import GROUND, LightBench
-from support.simulated_lights import simulated_lights
 
 NAN, INF = float('nan'), float('inf')
 ON_OFF, CONFIGURE = mavlink.MAV_CMD_ILLUMINATOR_ON_OFF, mavlink.MAV_CMD_DO_ILLUMINATOR_CONFIGURE
@@ -73,8 +74,9 @@ def test_strings_that_are_too_long_are_cut_and_terminated() -> None:
 def test_lights_on_one_link_obey_only_their_own_commands(
     target: tuple[int, int], enabled: list[bool],
 ) -> None:
-    lights = simulated_lights(
-        [IlluminatorProperties(address=mav.Address(1, one)) for one in (243, 244)], 0.0)
+    lights = SimulatedComponents([
+        SimulatedIlluminator(IlluminatorProperties(mav.Address(1, one))) for one in (243, 244)],
+        0.0)
     lights.receive(GROUND, mav.CommandLong(*target, ON_OFF, 0, 1, 0, 0, 0, 0, 0, 0), 0.0)
     assert [light.device.enabled for light in lights.components] == enabled
     assert len({source for source, _ in lights.outgoing}) == sum(enabled)

@@ -18,16 +18,16 @@ import signal
 from typing import Any
 
 from illuminator_ros.cli import conformance
+from illuminator_ros.illuminator.simulated import SimulatedIlluminator
 from illuminator_ros.illuminator.simulated_properties import IlluminatorProperties
 from illuminator_ros.mavlink.messages import Address
 from illuminator_ros.payload.checks.requirement import Verdict
 from illuminator_ros.payload.checks.runner import CheckRunner
 from illuminator_ros.payload.checks.session import Conditions
-from illuminator_ros.payload.simulated import Description, SimulatedComponents
+from illuminator_ros.payload.simulated import SimulatedComponents
 from payloads.winch import SIMULATED, SimulatedWinch, WINCH
 from payloads.winch_checks import REQUIREMENTS
 import pytest
-from support.simulated_lights import describe
 from support.virtual_link import START, VirtualLink
 
 DECK = Address(1, 169)
@@ -37,9 +37,8 @@ DECK = Address(1, 169)
 def test_a_winch_is_checked_and_restored_by_its_own_requirements_and_those_of_every_component(
         fault: str, failed: set[str]) -> None:
     winch, checks = SimulatedWinch(SIMULATED.properties), WINCH.load('checks')
-    described: list[Description[Any]] = [
-        describe(IlluminatorProperties()), Description(DECK, winch)]
-    devices = SimulatedComponents(described, START)
+    devices: SimulatedComponents[Any] = SimulatedComponents(
+        [SimulatedIlluminator(IlluminatorProperties()), winch], START)
     component = devices.components[1]
     if fault:
         component.behave(winch.faults.add(component.behaviour, fault), START)

@@ -22,7 +22,7 @@ from typing import Any
 from illuminator_ros.mavlink.messages import Address
 from illuminator_ros.payload.checks.requirement import Verdict
 from illuminator_ros.payload.messages import GeoPoint
-from illuminator_ros.payload.simulated import Description, SimulatedComponents
+from illuminator_ros.payload.simulated import SimulatedComponents
 from illuminator_ros.rededge.checks import CHECKS, REQUIREMENTS
 from illuminator_ros.rededge.messages import CAPTURES as CAPTURES_FIRMWARE
 from illuminator_ros.rededge.messages import Firmware, PARAMETERS
@@ -90,13 +90,13 @@ def start(
     :param others: component ids of further cameras.
     """
     camera = SimulatedRedEdge(RedEdgeProperties(
-        address, firmware=firmware, own_gps=GeoPoint(47.0, 8.0, 400.0)))
+        address, seed=seed, firmware=firmware, own_gps=GeoPoint(47.0, 8.0, 400.0)))
     if fault:
         camera.behave(FAULTS.add(camera.behaviour, fault), START)
     camera.set_clock(UTC + START, START)
     cameras = SimulatedComponents([
-        Description(address, camera, seed=seed),
-        *(Description(one, SimulatedRedEdge(RedEdgeProperties(one)))
+        camera,
+        *(SimulatedRedEdge(RedEdgeProperties(one))
           for one in (Address(255, other) for other in others))], START)
     return ChecksRun(CHECKS, cameras, version=version, utc=UTC, **options)
 

@@ -27,7 +27,7 @@ from illuminator_ros.mavlink.component import Component
 from illuminator_ros.mavlink.messages import Address
 from illuminator_ros.payload.messages import GeoPoint
 from illuminator_ros.payload.rotation import enu_flu, flip, Quaternion
-from illuminator_ros.payload.simulated import Description, SimulatedComponents
+from illuminator_ros.payload.simulated import SimulatedComponents
 from illuminator_ros.rededge.client import RedEdgeClient, Settings
 from illuminator_ros.rededge.conversions import Position
 from illuminator_ros.rededge.input_states import (
@@ -81,7 +81,7 @@ class Rig:
         self.client = RedEdgeClient(commands, Settings(settings))
         self.camera = SimulatedRedEdge(RedEdgeProperties(
             interval=IMAGE_INTERVAL, own_gps=GeoPoint(0.0, 0.0, 0.0)))
-        cameras = SimulatedComponents([Description(Address(255, 100), self.camera)], START)
+        cameras = SimulatedComponents([self.camera], START)
         self.camera.set_clock(UTC, START)
         self.link = PullableLink(Component(commands, [self.client]), cameras, version=1)
         self.rows: list[dict[str, str]] = []

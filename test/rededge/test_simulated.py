@@ -24,7 +24,7 @@ from illuminator_ros.mavlink.dialect import mavlink
 from illuminator_ros.mavlink.messages import Address, CommandLong, Heartbeat, heartbeat, Message
 from illuminator_ros.payload.messages import Attitude, GeoPoint, GlobalPositionInt, SystemTime
 from illuminator_ros.payload.rotation import Vector
-from illuminator_ros.payload.simulated import Description, SimulatedComponents
+from illuminator_ros.payload.simulated import SimulatedComponents
 from illuminator_ros.rededge.messages import (
     CameraFeedback,
     CameraStatus,
@@ -75,7 +75,7 @@ class Camera:
         self.device = SimulatedRedEdge(RedEdgeProperties(**{'own_gps': OWN_PLACE, **settings}))
         if fault:
             self.device.behave(FAULTS.add(self.device.behaviour, fault), START)
-        self.endpoint = SimulatedComponents([Description(Address(255, 100), self.device)], START)
+        self.endpoint = SimulatedComponents([self.device], START)
         self.device.set_clock(OWN_UTC, START)
         self.now = START
 

@@ -26,7 +26,7 @@ from illuminator_ros.illuminator.simulated import SIMULATED, SimulatedIlluminato
 from illuminator_ros.illuminator.simulated_properties import IlluminatorProperties
 from illuminator_ros.illuminator.thermal import ThermalProperties
 from illuminator_ros.mavlink.messages import Address
-from illuminator_ros.payload.simulated import Description, SimulatedType
+from illuminator_ros.payload.simulated import SimulatedDevice, SimulatedType
 import pytest
 
 TYPES = [SIMULATED]
@@ -39,19 +39,18 @@ FILE = {
          'faults': {'drop': 0.2, 'thermistor': True}}]}
 
 
-def described(*arguments: str, file: object = None) -> list[Description[SimulatedIlluminator]]:
-    return cast('list[Description[SimulatedIlluminator]]', components.components(
+def described(*arguments: str, file: object = None) -> list[SimulatedIlluminator]:
+    return cast('list[SimulatedIlluminator]', components.components(
         parser().parse_args(list(arguments)),
         components.scenario(file, 'f.yaml', TYPES) if file else components.Scenario(), TYPES))
 
 
 def properties(*arguments: str, file: object = None) -> list[IlluminatorProperties]:
-    return [one.device.properties for one in described(*arguments, file=file)]
+    return [one.properties for one in described(*arguments, file=file)]
 
 
-def faults(one: Description[Any]) -> list[str]:
-    device = one.device
-    return list(device.faults.active(device.behaviour, device.normal))
+def faults(device: SimulatedDevice) -> list[str]:
+    return device.faults.active(device.behaviour, device.normal)
 
 
 @pytest.mark.parametrize(('arguments', 'addresses'), [
@@ -63,7 +62,8 @@ def faults(one: Description[Any]) -> list[str]:
     (['--profile', 'reference', '--system-id', '9'], ['9/0'])])
 def test_lights_are_counted_or_listed_or_have_the_address_of_their_profile(
         arguments: list[str], addresses: list[str]) -> None:
-    assert [f'{one.address} {one.name}'.rstrip() for one in described(*arguments)] == addresses
+    assert [f'{one.address} {one.name}'.rstrip()
+            for one in properties(*arguments)] == addresses
 
 
 def test_without_arguments_a_light_follows_the_protocol() -> None:
@@ -84,7 +84,7 @@ def test_each_option_sets_its_property() -> None:
         modes=(Mode.INTERNAL_CONTROL,), status_interval=0.5, ambient=40.0,
         thermal=ThermalProperties(rise=80.0, time_constant=30.0), time_scale=10.0)
     assert [one.mode_bitmask for one in properties('--mode-bitmask', '0x6')] == [6]
-    assert [one.seed for one in described('--seed', '3')] == [3]
+    assert [one.seed for one in properties('--seed', '3')] == [3]
 
 
 def test_several_lights_have_different_serial_numbers() -> None:
@@ -97,7 +97,7 @@ def test_a_fault_is_for_all_lights_or_for_the_one_that_it_names() -> None:
         '--light', '1/243', '--light', '1/244=stern', '--fault', 'lie', '--fault',
         '1/243:drop=0.1,nan', '--fault', 'stern:slow')
     assert (faults(first), faults(second)) == (['drop', 'lie', 'nan'], ['slow', 'lie'])
-    assert first.device.behaviour.drop == 0.1
+    assert first.behaviour.drop == 0.1
 
 
 def test_a_setting_is_for_every_kind_that_accepts_it() -> None:
@@ -105,10 +105,10 @@ def test_a_setting_is_for_every_kind_that_accepts_it() -> None:
     file = components.scenario({'managers': [{'id': '1/9', 'heading': 40}]}, 'f.yaml', types)
     light, manager = cast('list[Any]', components.components(parser(types).parse_args([
         '--profile', 'px4', '--fault', 'lie,frozen-axis', '--vendor', 'ACME']), file, types))
-    assert light.device.properties.vendor == 'ACME'
-    assert manager.device.properties.vendor == 'ACME'
+    assert light.properties.vendor == 'ACME'
+    assert manager.properties.vendor == 'ACME'
     assert [faults(one) for one in (light, manager)] == [['lie'], ['lie', 'frozen-axis']]
-    assert not manager.device.behaviour.takes_pitchyaw
+    assert not manager.behaviour.takes_pitchyaw
     with pytest.raises(components.SettingError, match="'ardusup' is not one of default"):
         components.components(
             parser(types).parse_args(['--profile', 'ardusup']), components.Scenario(), types)
@@ -117,8 +117,8 @@ def test_a_setting_is_for_every_kind_that_accepts_it() -> None:
 def test_a_file_has_settings_for_all_lights_and_for_each() -> None:
     bow, other = described(file=FILE)
     first, second = properties(file=FILE)
-    assert (str(bow.address), bow.name, first.serial_number) == ('1/243', 'bow', '815')
-    assert bow.device.properties.extension
+    assert (str(first.address), first.name, first.serial_number) == ('1/243', 'bow', '815')
+    assert first.extension
     assert (first.ambient, first.thermal.rise, first.thermal.time_constant) == (60, 70, 60)
     assert (second.modes, second.status_interval) == ((Mode.INTERNAL_CONTROL,), 0.2)
     assert (faults(bow), faults(other)) == (['lie'], ['drop', 'lie', 'thermistor'])
@@ -126,7 +126,7 @@ def test_a_file_has_settings_for_all_lights_and_for_each() -> None:
 
 def test_the_command_line_takes_precedence_over_the_file() -> None:
     lights = described('--ambient', '10', '--fault', 'bow:nan', file=FILE)
-    assert [one.device.properties.ambient for one in lights] == [10, 10]
+    assert [one.properties.ambient for one in lights] == [10, 10]
     assert faults(lights[0]) == ['lie', 'nan']
 
 
@@ -194,8 +194,8 @@ def test_a_yaml_file_is_read_or_refused_with_the_reason(
     path = tmp_path / 'lights.yaml'
     path.write_text('url: udpin://127.0.0.1:1\nlights:\n  - {id: 1/9, ambient: 3}\n')
     found = components.load(str(path), TYPES)
-    assert (found.url, found.listed['light']) == (
-        'udpin://127.0.0.1:1', [components.Listed(Address(1, 9), '', {'ambient': 3.0})])
+    assert (found.url, found.listed) == ('udpin://127.0.0.1:1', [
+        components.Listed(SIMULATED, Address(1, 9), '', {'ambient': 3.0})])
     with pytest.raises(components.SettingError, match='No such file'):
         components.load(str(tmp_path / 'nowhere'), TYPES)
     monkeypatch.setitem(sys.modules, 'yaml', None)

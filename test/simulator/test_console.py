@@ -17,13 +17,13 @@
 from illuminator_ros.cli.simulator.console import COMMANDS, execute
 from illuminator_ros.illuminator.messages import IlluminatorStatus
 from illuminator_ros.illuminator.simulated import COMMANDS as LIGHT_COMMANDS
+from illuminator_ros.illuminator.simulated import SimulatedIlluminator
 from illuminator_ros.illuminator.simulated_properties import FAULTS, IlluminatorProperties
 from illuminator_ros.mavlink.dialect import mavlink
 from illuminator_ros.mavlink.messages import Address
 from illuminator_ros.payload.faults import Behaviour
 from illuminator_ros.payload.simulated import SimulatedComponents
 import pytest
-from support.simulated_lights import describe
 
 
 class Console:
@@ -31,7 +31,7 @@ class Console:
 
     def __init__(self) -> None:
         self.lights = SimulatedComponents((
-            describe(IlluminatorProperties(address=Address(1, number)), name)
+            SimulatedIlluminator(IlluminatorProperties(Address(1, number), name=name))
             for number, name in ((243, 'bow'), (244, ''))), 0.0)
         self.bow, self.other = (one.device for one in self.lights.components)
         self.lights.poll(0.0)

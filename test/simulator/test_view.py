@@ -30,13 +30,12 @@ from illuminator_ros.illuminator.simulated_properties import (
 from illuminator_ros.mavlink.messages import Address
 from illuminator_ros.payload.simulated import SimulatedComponent
 import pytest
-from support.simulated_lights import describe
 
 Light = SimulatedComponent[SimulatedIlluminator]
 
 
-def simulated(name: str = '', **properties: Any) -> Light:
-    return SimulatedComponent(describe(IlluminatorProperties(**properties), name), 0.0)
+def simulated(**properties: Any) -> Light:
+    return SimulatedComponent(SimulatedIlluminator(IlluminatorProperties(**properties)), 0.0)
 
 
 @pytest.fixture

@@ -22,6 +22,7 @@ import random
 from typing import Any, cast
 
 from illuminator_ros.illuminator.light import Settings
+from illuminator_ros.illuminator.simulated import SimulatedIlluminator
 from illuminator_ros.illuminator.simulated_properties import FAULTS, IlluminatorProperties
 from illuminator_ros.mavlink.dialect import mavlink
 from illuminator_ros.mavlink.messages import Address, CommandLong
@@ -32,7 +33,6 @@ from support.attacker import Attacker
 from support.client import Client
 from support.entries import entries
 from support.frames import Codec
-from support.simulated_lights import describe, simulated_lights
 from support.simulated_link import SimulatedLink
 
 BRIDGE = Address(1, 194)
@@ -128,7 +128,7 @@ class AttackedBridge(AttackedLink):
 
     def get_ready(self) -> None:
         self._light = SimulatedComponent(
-            describe(IlluminatorProperties(address=GENUINE)), self.link.now)
+            SimulatedIlluminator(IlluminatorProperties(address=GENUINE)), self.link.now)
         self._party = Codec(self._signing(7))
         self.genuine(3.0)
         self._check_command()
@@ -209,8 +209,9 @@ class AttackedLights(AttackedLink):
     """Simulated lights, with a genuine client that they must obey at any time."""
 
     def make_endpoint(self) -> Any:
-        return simulated_lights(
-            [IlluminatorProperties(address=Address(1, 243 + i)) for i in range(3)], 1000.0)
+        return SimulatedComponents([
+            SimulatedIlluminator(IlluminatorProperties(address=Address(1, 243 + i)))
+            for i in range(3)], 1000.0)
 
     def get_ready(self) -> None:
         self.lights = cast(SimulatedComponents[Any], self.link.endpoint).components

@@ -35,7 +35,6 @@ from support.client import Client
 from support.faulty_wire import Faults, FaultyWire
 from support.frames import Codec
 from support.records import Answer, Recorder
-from support.simulated_lights import simulated_lights
 
 BRIDGE = mav.Address(1, 194)
 ONE_LIGHT = (IlluminatorProperties(),)
@@ -103,7 +102,7 @@ class Pair:
             command_retries=command_retries)
         self.controller.events.subscribe(self._take)
         self.other = (lights if isinstance(lights, Endpoint)
-                      else simulated_lights(list(lights), START - uptime))
+                      else SimulatedComponents(map(SimulatedIlluminator, lights), START - uptime))
         there = there or Faults()
         self.near = _End(self.controller, FaultyWire(there, f'{seed} there'))
         self.far = _End(self.other, FaultyWire(back or there, f'{seed} back'))

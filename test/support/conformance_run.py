@@ -28,7 +28,6 @@ from illuminator_ros.mavlink.dialect import mavlink
 from illuminator_ros.mavlink.messages import Address, CommandLong
 from illuminator_ros.payload.simulated import Effect, SimulatedComponents
 from support.checks_run import ChecksRun
-from support.simulated_lights import describe
 from support.virtual_link import START
 
 # s for which the lights have been on when a run begins.
@@ -53,7 +52,8 @@ class Run(ChecksRun):
         for fault in faults:
             first = replace(first, behaviour=FAULTS.add(first.behaviour, fault))
         self.lights = SimulatedComponents(
-            (describe(one, seed=seed) for one in (first, *others)), START - UPTIME)
+            (SimulatedIlluminator(replace(one, seed=seed)) for one in (first, *others)),
+            START - UPTIME)
         self.light = self.lights.components[0]
         super().__init__(CHECKS, self.lights, **options)
 

@@ -26,7 +26,6 @@ from illuminator_ros.illuminator.simulated_properties import (
 )
 from illuminator_ros.mavlink.messages import Address, CommandInt, CommandLong
 from illuminator_ros.payload.simulated import SimulatedComponent
-from support.simulated_lights import describe
 
 GROUND = Address(255, 190)
 
@@ -47,8 +46,8 @@ class LightBench:
         for fault in faults:
             behaviour = FAULTS.add(behaviour, fault)
         self.component: SimulatedComponent[SimulatedIlluminator] = SimulatedComponent(
-            describe(properties or IlluminatorProperties(behaviour=behaviour, **fields),
-                     seed=seed), 0.0)
+            SimulatedIlluminator(properties or IlluminatorProperties(
+                behaviour=behaviour, seed=seed, **fields)), 0.0)
         self.lamp = self.component.device
         self.now = 0.0
         self.sent: list[tuple[float, Any]] = []

@@ -24,6 +24,7 @@ from typing import Any, Generic, TypeVar
 
 from illuminator_ros.illuminator.events import LightConnected, LightEvent, LightLost
 from illuminator_ros.illuminator.light import Light, Settings
+from illuminator_ros.illuminator.simulated import SimulatedIlluminator
 from illuminator_ros.illuminator.simulated_properties import IlluminatorProperties
 from illuminator_ros.mavlink.component import Endpoint, HeartbeatTimer
 from illuminator_ros.mavlink.link import Link
@@ -31,9 +32,9 @@ from illuminator_ros.mavlink.link_state import LinkEvent, LinkSnapshot
 from illuminator_ros.mavlink.messages import Address, Message
 from illuminator_ros.mavlink.url import parse_url, Url
 from illuminator_ros.payload.attempt import Result
+from illuminator_ros.payload.simulated import SimulatedComponents
 from support.client import Client
 from support.messages import HANDLED
-from support.simulated_lights import simulated_lights
 from support.waiting import eventually, Log, PATIENCE
 
 BRIDGE = Address(1, 194)
@@ -156,7 +157,8 @@ class Lights(EndpointLink[Any]):
     """A simulated light on a link, which has just been switched on."""
 
     def __init__(self, url: str, *, clock: Callable[[], float] = time.monotonic) -> None:
-        super().__init__(url, simulated_lights([IlluminatorProperties()], clock()), clock=clock)
+        super().__init__(url, SimulatedComponents(
+            [SimulatedIlluminator(IlluminatorProperties())], clock()), clock=clock)
 
 
 class Bridge(EndpointLink[Client]):

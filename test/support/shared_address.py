@@ -19,6 +19,7 @@ from __future__ import annotations
 from typing import Any
 
 from illuminator_ros.illuminator.light import Light, Settings
+from illuminator_ros.illuminator.simulated import SimulatedIlluminator
 from illuminator_ros.illuminator.simulated_properties import IlluminatorProperties
 from illuminator_ros.mavlink.component import Endpoint
 from illuminator_ros.mavlink.dialect import mavlink
@@ -28,7 +29,6 @@ from illuminator_ros.payload.simulated import SimulatedComponent
 from support.client import Client
 from support.fake_light import FakeLight
 from support.frames import Codec, LIGHT
-from support.simulated_lights import describe
 from support.simulated_link import SimulatedLink
 
 BRIDGE = Address(1, 194)
@@ -45,7 +45,8 @@ class TwoDevices:
     def __init__(self, numbers: tuple[int, int], later: float) -> None:
         self.link = SimulatedLink(Client(BRIDGE, Settings()), self._take)
         self.lights = [
-            SimulatedComponent(describe(IlluminatorProperties()), self.link.now - 100.0 + one)
+            SimulatedComponent(
+                SimulatedIlluminator(IlluminatorProperties()), self.link.now - 100.0 + one)
             for one in (0.0, later)]
         self._codecs = [Codec(), Codec()]
         for codec, number in zip(self._codecs, numbers, strict=True):

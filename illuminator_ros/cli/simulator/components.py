@@ -17,15 +17,15 @@
 from __future__ import annotations
 
 import argparse
+from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 import contextlib
 from dataclasses import dataclass, field
-import errno
 from typing import Any
 
 from ..options import address
 from ...mavlink.messages import Address
-from ...payload.simulated import Description, SimulatedDevice, SimulatedType
+from ...payload.simulated import SimulatedDevice, SimulatedType
 from ...payload.simulated_settings import Setting, Values
 
 MAX_COMPONENTS = 200
@@ -53,6 +53,7 @@ def _place(place: str) -> Iterator[None]:
 class Listed:
     """One component that the command line or a file lists."""
 
+    kind: Type
     address: Address
     name: str = ''
     settings: Values = field(default_factory=dict)
@@ -64,12 +65,12 @@ class Scenario:
     The content of a file.
 
     :param common: the settings of all components, by the noun of their type.
-    :param listed: the components; if there are none, the command line selects them.
+    :param listed: the components; of a type that has none, the command line selects them.
     """
 
     url: str = ''
     common: Mapping[str, Values] = field(default_factory=dict)
-    listed: Mapping[str, list[Listed]] = field(default_factory=dict)
+    listed: Sequence[Listed] = ()
 
 
 def load(path: str, types: Types) -> Scenario:
@@ -78,14 +79,6 @@ def load(path: str, types: Types) -> Scenario:
 
     :raises SettingError: if it cannot be read, or a setting in it is wrong.
     """
-    try:
-        return scenario(_content(path), path, types)
-    except RecursionError:
-        # A YAML list can contain itself.
-        raise SettingError(f'{path}: it is nested too deeply') from None
-
-
-def _content(path: str) -> object:
     try:
         import yaml
     except ModuleNotFoundError as error:
@@ -96,14 +89,18 @@ def _content(path: str) -> object:
         with open(path, encoding='utf-8') as file:
             text = file.read(MAX_FILE_CHARACTERS + 1)
         if len(text) > MAX_FILE_CHARACTERS:
-            raise OSError(errno.EFBIG, f'it has more than {MAX_FILE_CHARACTERS} characters')
-        content: object = yaml.safe_load(text)
+            raise SettingError(f'{path}: it has more than {MAX_FILE_CHARACTERS} characters')
+        return scenario(yaml.safe_load(text), path, types)
+    except SettingError:
+        raise
+    except RecursionError:
+        # A YAML list can contain itself.
+        raise SettingError(f'{path}: it is nested too deeply') from None
     except OSError as error:
         raise SettingError(f'{path}: {error.strerror}') from error
     except (yaml.YAMLError, ValueError) as error:
         # For example, PyYAML raises a plain ValueError for 2026-02-30.
         raise SettingError(f'{path}: not YAML: {" ".join(str(error).split())}') from error
-    return content
 
 
 def scenario(content: object, path: str, types: Types) -> Scenario:
@@ -111,9 +108,8 @@ def scenario(content: object, path: str, types: Types) -> Scenario:
     if not isinstance(content, Mapping):
         raise SettingError(f'{path}: it has no keys such as {types[0].plural}')
     common = _read(_settings(content, ('url', *(one.plural for one in types)), path, types), types)
-    listed = {one.noun: list(_listed(content.get(one.plural) or [], path, one))
-              for one in types}
-    return Scenario(str(content.get('url') or ''), common, listed)
+    return Scenario(str(content.get('url') or ''), common, [
+        one for kind in types for one in _listed(content.get(kind.plural) or [], path, kind)])
 
 
 def _listed(entries: object, path: str, kind: Type) -> Iterator[Listed]:
@@ -124,7 +120,7 @@ def _listed(entries: object, path: str, kind: Type) -> Iterator[Listed]:
         with _place(f'{place}: id'):
             where = address(str(one.get('id', '')))
         settings = _read(_settings(one, ('id', 'name'), place, [kind]), [kind])
-        yield Listed(where, str(one.get('name', '')), settings[kind.noun])
+        yield Listed(kind, where, str(one.get('name', '')), settings[kind.noun])
 
 
 def _settings(
@@ -173,49 +169,50 @@ def _as_text(value: object) -> str:
 
 def components(
     options: argparse.Namespace, file: Scenario, types: Types,
-) -> list[Description[SimulatedDevice]]:
+) -> list[SimulatedDevice]:
     """
-    Return the components that command line and file describe.
+    Return the devices of the components that command line and file describe.
 
     :raises SettingError: if they contradict each other, or an option is wrong.
     """
     given = _read((
-        (f'argument --{name.replace("_", "-")}', name, text) for name in dict.fromkeys(
+        (f'argument {_option(name)}', name, text) for name in dict.fromkeys(
             name for one in types for name in one.all_settings)
         if name != 'fault' and (text := getattr(options, name)) is not None), types)
-    listed = {one.noun: _of_type(options, file, one, given[one.noun]) for one in types}
-    everyone = [one for some in listed.values() for one in some]
-    if len(everyone) > MAX_COMPONENTS:
-        raise SettingError(f'{len(everyone)} {types[0].plural} are more than {MAX_COMPONENTS}')
-    addresses = [one.address for one in everyone]
-    if twice := {str(one) for one in addresses if addresses.count(one) > 1}:
-        raise SettingError(
-            f'two {types[0].plural} have the address {", ".join(sorted(twice))}')
-    faults = _faults(options.fault or (), listed, types)
+    listed = [one for kind in types for one in _of_type(options, file, kind, given[kind.noun])]
+    if len(listed) > MAX_COMPONENTS:
+        raise SettingError(f'{len(listed)} {types[0].plural} are more than {MAX_COMPONENTS}')
+    addresses = Counter(str(one.address) for one in listed)
+    if twice := [where for where, count in sorted(addresses.items()) if count > 1]:
+        raise SettingError(f'two {types[0].plural} have the address {", ".join(twice)}')
+    faults = _faults(options.fault or (), listed, types[0].noun)
+    kinds = Counter(one.kind.noun for one in listed)
     result = []
-    for kind in types:
-        for one in listed[kind.noun]:
-            settings = _merged(
-                kind.all_settings, file.common.get(kind.noun, {}), one.settings,
-                given[kind.noun], {'fault': faults[one.address]})
-            if len(listed[kind.noun]) > 1:
-                settings = _distinct(kind, settings, one)
-            with _place(f'{kind.noun} {one.address}'):
-                device = kind.make(settings, one.address)
-            for fault in settings.get('fault', ()):
-                device.behave(device.faults.add(device.behaviour, fault), 0.0)
-            result.append(Description(one.address, device, one.name, settings.get('seed', 0)))
+    for one in listed:
+        noun, known = one.kind.noun, one.kind.all_settings
+        settings = _merged(known, file.common.get(noun, {}), one.settings, given[noun],
+                           {'fault': faults[one.address]})
+        if kinds[noun] > 1:
+            # The texts that a component shares with others become distinct.
+            settings = {name: f'{value}-{one.address.component}'
+                        if known[name].distinct and name not in one.settings else value
+                        for name, value in settings.items()}
+        with _place(f'{noun} {one.address}'):
+            result.append(one.kind.make(settings, one.address, one.name))
     return result
 
 
+def _option(name: str) -> str:
+    return f'--{name.replace("_", "-")}'
+
+
 def _of_type(
-    options: argparse.Namespace, file: Scenario, kind: Type,
-    given: Mapping[str, object],
-) -> list[Listed]:
-    listed = file.listed.get(kind.noun, [])
-    if named := getattr(options, kind.noun):
-        listed = [_named(kind, text) for text in named]
-    counted = [f'--{name.replace("_", "-")}' for name in ('count', 'system_id', 'component_id')
+    options: argparse.Namespace, file: Scenario, kind: Type, given: Values,
+) -> Sequence[Listed]:
+    named = getattr(options, kind.noun)
+    listed = ([_named(kind, text) for text in named] if named else
+              [one for one in file.listed if one.kind is kind])
+    counted = [_option(name) for name in ('count', 'system_id', 'component_id')
                if getattr(options, name) is not None]
     if listed and counted:
         raise SettingError(f'{counted[0]} is for {kind.plural} that neither --{kind.noun} nor a '
@@ -225,45 +222,36 @@ def _of_type(
     default = kind.address({**file.common.get(kind.noun, {}), **given})
     system = options.system_id or default.system
     first = default.component if options.component_id is None else options.component_id
-    count = options.count or 1
-    last = first + count - 1
+    last = first + (options.count or 1) - 1
     if last > 255:
-        raise SettingError(f'--count {count} from component id {first} reaches {last}; '
+        raise SettingError(f'--count {options.count} from component id {first} reaches {last}; '
                            'component ids end at 255')
-    return [Listed(Address(system, component)) for component in range(first, last + 1)]
+    return [Listed(kind, Address(system, component)) for component in range(first, last + 1)]
 
 
 def _named(kind: Type, text: str) -> Listed:
     where, _, name = text.partition('=')
     with _place(f'--{kind.noun} {text}'):
-        return Listed(address(where), name)
+        return Listed(kind, address(where), name)
 
 
 def _faults(
-    texts: Sequence[str], listed: Mapping[str, Sequence[Listed]], types: Types,
+    texts: Sequence[str], listed: Sequence[Listed], noun: str,
 ) -> dict[Address, tuple[str, ...]]:
     """Return the faults of each component; ``NAME:`` in front of a fault selects one."""
-    result: dict[Address, tuple[str, ...]] = {
-        one.address: () for some in listed.values() for one in some}
+    result: dict[Address, tuple[str, ...]] = {one.address: () for one in listed}
     for text in texts:
         selected, colon, names = text.rpartition(':')
-        found = [(kind, one.address) for kind in types for one in listed[kind.noun]
+        found = [one for one in listed
                  if not colon or selected in (str(one.address), one.name)]
         if not found:
-            raise SettingError(f'--fault {text}: there is no {types[0].noun} {selected!r}')
-        kinds = {kind.noun: kind for kind, _ in found}
+            raise SettingError(f'--fault {text}: there is no {noun} {selected!r}')
+        kinds = list({one.kind.noun: one.kind for one in found}.values())
         for name in names.split(','):
-            read = _read([('--fault', 'fault', name)], list(kinds.values()))
-            for kind, where in found:
-                result[where] += read[kind.noun].get('fault', ())
+            read = _read([('--fault', 'fault', name)], kinds)
+            for one in found:
+                result[one.address] += read[one.kind.noun].get('fault', ())
     return result
-
-
-def _distinct(kind: Type, settings: Values, one: Listed) -> Values:
-    """Return settings in which the texts that a component shares with others are distinct."""
-    return {name: f'{value}-{one.address.component}'
-            if kind.all_settings[name].distinct and name not in one.settings else value
-            for name, value in settings.items()}
 
 
 def _merged(settings: Mapping[str, Setting], *layers: Values) -> Values:

@@ -22,7 +22,7 @@ import csv
 import logging
 
 from .components import SettingError, Types
-from ...payload.simulated import Description, SimulatedDevice
+from ...payload.simulated import SimulatedDevice
 
 _log = logging.getLogger(__name__)
 
@@ -58,7 +58,7 @@ class CsvFile:
 
 
 def write_records(
-    options: argparse.Namespace, types: Types, described: Iterable[Description[SimulatedDevice]],
+    options: argparse.Namespace, types: Types, devices: Iterable[SimulatedDevice],
 ) -> None:
     """
     Write the records of devices to the files that the options name.
@@ -68,6 +68,6 @@ def write_records(
     for one in types:
         if one.records and (path := getattr(options, one.records.option)):
             file = CsvFile(path, one.records.columns)
-            for description in described:
-                if isinstance(description.device, one.device):
-                    description.device.records.subscribe(file.append)
+            for device in devices:
+                if isinstance(device, one.device):
+                    device.records.subscribe(file.append)

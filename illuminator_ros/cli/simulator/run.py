@@ -41,7 +41,7 @@ from ...mavlink.link_thread import LinkThreadError
 from ...mavlink.messages import Address
 from ...mavlink.url import parse_url, Url
 from ...payload.payload_type import PayloadType
-from ...payload.simulated import Description, SimulatedComponents, SimulatedDevice
+from ...payload.simulated import SimulatedComponents, SimulatedDevice
 
 # s between updates of the view.
 VIEW_INTERVAL = 0.2
@@ -56,14 +56,14 @@ class _Simulation:
 
     def __init__(
         self, options: argparse.Namespace, url: Url, label: str,
-        described: list[Description[SimulatedDevice]], types: Types,
+        devices: list[SimulatedDevice], types: Types,
     ) -> None:
-        names = [str(one.address) for one in described]
-        counts = Counter(type(one.device) for one in described)
+        names = [str(one.properties.address) for one in devices]
+        counts = Counter(map(type, devices))
         kinds = ', '.join(f'{count} {one.noun if count == 1 else one.plural}' for one in types
                           if (count := counts[one.device]))
         self._headline = f'{kinds}: {", ".join(names[:8])}{" ..." if len(names) > 8 else ""}'
-        signs, store = signing(options, f'simulator {described[0].address}')
+        signs, store = signing(options, f'simulator {names[0]}')
         # Text to write, with the line that it answers; None ends the process.
         self._texts: queue.Queue[tuple[str, str | None] | None] = queue.Queue(MAX_TEXTS)
         self._ended = threading.Event()
@@ -71,7 +71,7 @@ class _Simulation:
         live = (sys.stdout is not None and sys.stdout.isatty() and not options.plain
                 and os.environ.get('TERM') not in DUMB_TERMINALS)
         self._view: PlainView | LiveView = (LiveView if live else PlainView)(sys.stdout)
-        self._endpoint: SimulatedComponents[SimulatedDevice] = SimulatedComponents(described, 0.0)
+        self._endpoint: SimulatedComponents[SimulatedDevice] = SimulatedComponents(devices, 0.0)
         self._endpoint.new_peers.subscribe(self._found)
         self._link = Link(url, self._endpoint, label=label, on_event=self._say,
                           signing=signs, store=store,
@@ -155,9 +155,9 @@ def run(
         options = parser(types, payloads).parse_args(None if args is None else list(args))
         file = load(options.file, types) if options.file else Scenario()
         label = options.url or file.url or types[0].url
-        described = components(options, file, types)
-        simulation = _Simulation(options, parse_url(label), label, described, types)
-        write_records(options, types, described)
+        devices = components(options, file, types)
+        simulation = _Simulation(options, parse_url(label), label, devices, types)
+        write_records(options, types, devices)
     except ValueError as error:
         print(f'simulator: {error}', file=sys.stderr)
         return 2
