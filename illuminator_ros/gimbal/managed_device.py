@@ -21,13 +21,13 @@ import math
 from .axes import Ranges, TURNING
 from .manager_setpoint import GimbalModel, POSES, Setpoint
 from .manager_state import ManagerState, StateTracker
-from .messages import GimbalDeviceInformation
+from .messages import GimbalDeviceInformation, rates_of
 from .vehicle_state import VehicleState
 from ..mavlink.command_sender import Command, CommandResult, CommandSender
 from ..mavlink.dialect import mavlink
 from ..payload.messages import GimbalDeviceAttitudeStatus
-from ..payload.mount_attitude import MountAttitude, STILL, to_mavlink, YawFrame
-from ..payload.rotation import Quaternion
+from ..payload.mount_attitude import names_frame, STILL, yaw_frame, YawFrame
+from ..payload.rotation import Quaternion, Vector
 
 # Requests for GIMBAL_DEVICE_INFORMATION without the message after which the manager announces the
 # gimbal without it; s between these requests, and between later ones; and the longest time of one,
@@ -37,7 +37,6 @@ INFORMATION_DELAY, INFORMATION_INTERVAL = 0.5, 5.0
 INFORMATION_TIMEOUT = 2.0
 # s after which the attitude of a device is out of date.
 ATTITUDE_AGE = 1.0
-HEADING_UNKNOWN = 'the heading of the vehicle is unknown'
 
 
 class ManagedDevice:
@@ -48,8 +47,6 @@ class ManagedDevice:
     :param ranges: of the axes of a device without MAVLink.
     :ivar model: its abilities.
     :ivar information: None until it has come.
-    :ivar attitude: of the last status, None if it has none.
-    :ivar has_reported: whether it has ever sent a status.
     :ivar request_due: when the information is requested.
     """
 
@@ -59,7 +56,6 @@ class ManagedDevice:
     ) -> None:
         self.model = GimbalModel() if tracker.has_mavlink else GimbalModel.from_ranges(ranges)
         self.information: GimbalDeviceInformation | None = None
-        self.attitude: MountAttitude | None = None
         self.request_due = math.inf
         self._tracker = tracker
         self._commands = commands
@@ -113,10 +109,6 @@ class ManagedDevice:
     def take_status(self, status: GimbalDeviceAttitudeStatus, now: float) -> None:
         """Take GIMBAL_DEVICE_ATTITUDE_STATUS."""
         self._status, self._status_at = status, now
-        try:
-            self.attitude = MountAttitude.from_status(status)
-        except ValueError:
-            self.attitude = None
 
     def status(self, now: float) -> GimbalDeviceAttitudeStatus | None:
         """Return the newest status, None if it is out of date."""
@@ -127,30 +119,35 @@ class ManagedDevice:
         status = self.status(now)
         return self.model.accepts_earth_frame(status.flags if status else None)
 
+    @property
+    def has_reported(self) -> bool:
+        """Whether it has ever sent a status."""
+        return self._status is not None
+
     def heading(self, now: float) -> float | None:
         """Return the vehicle's heading as the device reports it, else as the vehicle does."""
+        status = self.status(now)
         # The heading in the status of a device without MAVLink is an older one of the vehicle.
-        if (self._tracker.has_mavlink and self.attitude is not None
-                and self.attitude.heading is not None and self.status(now) is not None):
-            return self.attitude.heading
+        # Implementations that name no frame are older than delta_yaw.
+        if (self._tracker.has_mavlink and status is not None and names_frame(status.flags)
+                and math.isfinite(status.delta_yaw)):
+            return status.delta_yaw
         return self._vehicle.heading(now)
 
-    def reported(self, frame: YawFrame, now: float) -> Quaternion | str | None:
-        """
-        Return the attitude in MAVLink with a yaw in a frame.
-
-        :return: what is unknown of it, for people; None if no status has ever come.
-        """
-        if self.attitude is not None and self.status(now) is not None:
-            seen = self.attitude.seen_from(frame, self.heading(now))
-            return HEADING_UNKNOWN if seen is None else Quaternion(*to_mavlink(seen, frame))
-        return None if self._status is None else 'the attitude of the gimbal is unknown'
+    def pointing(self, now: float) -> tuple[Vector, YawFrame] | None:
+        """Return its roll, pitch and yaw, rad, and the frame of the yaw; None if unknown."""
+        status = self.status(now)
+        if status is None:
+            return None
+        try:
+            return Quaternion(*status.q).normalized().euler(), yaw_frame(status.flags)
+        except ValueError:
+            return None
 
     def end_of_motion(self, now: float) -> Setpoint | None:
         """Return a rate of zero if it turns, as a manager has left it that was killed."""
-        status = self.status(now)
-        if status is None or self.attitude is None or status.flags & POSES:
+        status, pointing = self.status(now), self.pointing(now)
+        if status is None or pointing is None or status.flags & POSES:
             return None
-        rates = status.angular_velocity_x, status.angular_velocity_y, status.angular_velocity_z
-        turns = any(abs(rate) > TURNING for rate in rates)
-        return Setpoint(status.flags, self.attitude.frame, None, STILL) if turns else None
+        turns = any(abs(rate) > TURNING for rate in rates_of(status))
+        return Setpoint(status.flags, pointing[1], rates=STILL) if turns else None

@@ -30,8 +30,8 @@ from . import messages as gimbal
 from .axes import AT_LIMIT, range_fields, Ranges, UNLIMITED
 from .managed_device import ManagedDevice
 from .manager_control import ControlArbiter, ControlSettings, Role, RoleHolderChanged
-from .manager_events import AddressShared, DemandRefused, ManagerEvent
-from .manager_setpoint import AnySetpoint, Demand, read_demand, read_roi
+from .manager_events import AddressShared, ManagerEvent, RequestRefused
+from .manager_setpoint import AnySetpoint, read_roi, read_setpoint, Refused, Setpoint
 from .manager_state import ManagerState, StateChanged, StateTracker
 from .setpoint_mixer import SetpointMixer
 from .vehicle_state import VehicleState
@@ -39,7 +39,7 @@ from ..mavlink import messages as mav
 from ..mavlink.command_sender import Command, CommandSender
 from ..mavlink.component import Payload
 from ..mavlink.dialect import mavlink, replaced
-from ..mavlink.messages import Address, AnyCommand, command_name, params_of
+from ..mavlink.messages import Address, AnyCommand, Params, params_of
 from ..payload.listeners import Listeners
 from ..payload.messages import Attitude, GimbalDeviceAttitudeStatus, GlobalPositionInt
 from ..payload.mount_attitude import AXES
@@ -77,6 +77,7 @@ class GimbalManager(Payload):
 
     :param commands: sends everything, from the manager's address.
     :param draw: returns a random number, 0..1.
+    :param reported: called with each report to all players that is sent.
     :ivar events: each a :data:`ManagerEvent`.
     :ivar tracker: its state, its device and other managers.
     :ivar control: the players in primary and in secondary control.
@@ -95,7 +96,8 @@ class GimbalManager(Payload):
 
     def __init__(
         self, commands: CommandSender, settings: ManagerSettings,
-        draw: Callable[[], float] = random.random,
+        draw: Callable[[], float] = random.random, *,
+        reported: Callable[[mav.Message], None] = lambda message: None,
     ) -> None:
         self.events: Listeners[ManagerEvent] = Listeners()
         self.settings = settings
@@ -105,6 +107,7 @@ class GimbalManager(Payload):
         self.tracker = StateTracker(
             commands.address, settings.device_id, self._state_changed, draw)
         self._commands = commands
+        self._reported = reported
         self._device = ManagedDevice(self.tracker, commands, self.vehicle, settings.ranges)
         self._setpoints = SetpointMixer(
             self._device, self.vehicle, self.tracker, commands, self.events.emit)
@@ -114,8 +117,7 @@ class GimbalManager(Payload):
         self._status_due = math.inf
         # The last heartbeat of each player in control, and its time.
         self._identities: dict[Address, tuple[tuple[int, int], float]] = {}
-        self._handlers: dict[int, Callable[[Address, AnyCommand, float], int]] = {
-            mavlink.MAV_CMD_DO_GIMBAL_MANAGER_CONFIGURE: self._configure,
+        self._handlers: dict[int, Callable[[Address, AnyCommand, float], None]] = {
             mavlink.MAV_CMD_DO_GIMBAL_MANAGER_PITCHYAW: self._pitch_yaw,
             mavlink.MAV_CMD_DO_SET_ROI_LOCATION: self._set_roi,
             mavlink.MAV_CMD_DO_SET_ROI_NONE: self._clear_roi}
@@ -174,11 +176,11 @@ class GimbalManager(Payload):
         self._device.poll(now)
         if now >= self._status_due:
             self._status_due = max(self._status_due + STATUS_INTERVAL, now)
-            self._commands.send(self.status(now))
+            self._report(self.status(now))
             if self._is_awaited and (information := self._own_information(now)):
                 # Clients may give up, so they need not request it again.
                 self._is_awaited = False
-                self._commands.send(information)
+                self._report(information)
             if not self.tracker.has_mavlink and now >= self._measured_at + MEASURED_AGE:
                 self._report_commanded(now)
         if now >= self._setpoints.due:
@@ -211,8 +213,7 @@ class GimbalManager(Payload):
     def may_send_at_end(self, sent: Command | mav.Message) -> bool:
         """See :meth:`Payload.may_send_at_end`: reports, and setpoints without rates."""
         if isinstance(sent, gimbal.GimbalDeviceSetAttitude):
-            rates = (sent.angular_velocity_x, sent.angular_velocity_y, sent.angular_velocity_z)
-            return not any(rate for rate in rates if not math.isnan(rate))
+            return not any(rate for rate in gimbal.rates_of(sent) if not math.isnan(rate))
         return isinstance(sent, self.sends)
 
     def close(self, now: float) -> None:
@@ -224,22 +225,22 @@ class GimbalManager(Payload):
     def take_attitude(self, status: GimbalDeviceAttitudeStatus, now: float) -> None:
         """Take the attitude of the device, from the link or, without MAVLink, from ROS."""
         self._measured_at = now
-        self._report(status, now)
+        self._take_attitude(status, now)
 
-    def _report(self, status: GimbalDeviceAttitudeStatus, now: float) -> None:
+    def _take_attitude(self, status: GimbalDeviceAttitudeStatus, now: float) -> None:
         self._device.take_status(status, now)
         if not self.tracker.has_mavlink and self.tracker.state is ManagerState.ACTIVE:
             setpoints = self._setpoints
             flags = 0 if setpoints.current is None else setpoints.current.operation
             limits = sum(AT_LIMIT[AXES.index(one.axis)] for one in setpoints.clipped)
-            self._commands.send(replaced(
+            self._report(replaced(
                 status, flags=status.flags | flags, gimbal_device_id=self.tracker.device_id,
                 failure_flags=status.failure_flags | limits))
 
     def _report_commanded(self, now: float) -> None:
         """Report the setpoint as the attitude of a device that reports no attitude."""
         sent, heading = self._setpoints.sent, self.vehicle.heading(now)
-        self._report(GimbalDeviceAttitudeStatus(
+        self._take_attitude(GimbalDeviceAttitudeStatus(
             0, 0, mav.time_boot_ms(now), mavlink.GIMBAL_DEVICE_FLAGS_YAW_IN_VEHICLE_FRAME,
             sent and sent.attitude or Quaternion(), math.nan, math.nan, math.nan, 0,
             math.nan if heading is None else heading, math.nan), now)
@@ -259,13 +260,9 @@ class GimbalManager(Payload):
                 or message.gimbal_device_id not in (0, self.tracker.device_id)):
             return
         try:
-            demand = read_demand(message, self._device.model.ranges)
+            self._follow(source, read_setpoint(message, self._device.model.ranges), now)
         except ValueError as error:
-            refusal = f'{message.msgname}: {error}'
-        else:
-            refusal = self._follow(source, demand, now)
-        if refusal:
-            self.events.emit(DemandRefused(source, refusal))
+            self.events.emit(RequestRefused(source, str(error)))
 
     def execute(self, source: Address, command: AnyCommand, now: float) -> int | None:
         """See :meth:`Payload.execute`."""
@@ -276,45 +273,41 @@ class GimbalManager(Payload):
             # Each player needs the status, so none may stop it.
             is_status = params[0] == gimbal.GimbalManagerStatus.id
             return mavlink.MAV_RESULT_DENIED if is_status else None
-        handler = self._handlers.get(command.command)
-        if handler is None:
+        if command.command not in gimbal.DEVICE_ID_PARAM:
             return None
         if params[gimbal.DEVICE_ID_PARAM[command.command]] not in (0, self.tracker.device_id):
             return mavlink.MAV_RESULT_DENIED
-        is_configure = command.command == mavlink.MAV_CMD_DO_GIMBAL_MANAGER_CONFIGURE
-        # Control may be released at the end.
-        if (inactive := self._inactivity()) and not (is_configure and self._commands.refusal):
-            result = (mavlink.MAV_RESULT_DENIED if self.tracker.state is ManagerState.INACTIVE
-                      else mavlink.MAV_RESULT_TEMPORARILY_REJECTED)
-            return result if is_configure else self._answer(source, inactive, result)
-        return handler(source, command, now)
-
-    def _inactivity(self) -> str:
-        """Return that the manager gives no setpoints now, '' if it does."""
-        state = self.tracker.state
-        return self._commands.refusal or (
-            '' if state is ManagerState.ACTIVE else f'the manager is not active: {state.value}')
-
-    def _answer(
-        self, player: Address, refusal: str, result: int = mavlink.MAV_RESULT_DENIED,
-    ) -> int:
-        """
-        Return the result of a command; report a refusal, since a result has no reason.
-
-        :param refusal: '' if the command is accepted.
-        :param result: of a refused command.
-        """
-        if not refusal:
-            return mavlink.MAV_RESULT_ACCEPTED
-        self.events.emit(DemandRefused(player, refusal))
-        return result
-
-    def _configure(self, source: Address, command: AnyCommand, now: float) -> int:
+        if command.command == mavlink.MAV_CMD_DO_GIMBAL_MANAGER_CONFIGURE:
+            return self._configure(source, params, now)
         try:
-            changes = self.control.configure(source, params_of(command), now)
+            self._check_active()
+            self._handlers[command.command](source, command, now)
+        except Refused as refused:
+            # The result of a command has no reason.
+            self.events.emit(RequestRefused(source, str(refused)))
+            return refused.result
+        return mavlink.MAV_RESULT_ACCEPTED
+
+    def _check_active(self) -> None:
+        """Raise :class:`Refused` if the manager gives no setpoints now."""
+        if reason := self._commands.refusal or (
+                '' if self.tracker.state is ManagerState.ACTIVE else
+                f'the manager is not active: {self.tracker.state.value}'):
+            raise Refused(reason, self._inactive_result)
+
+    @property
+    def _inactive_result(self) -> int:
+        """Return the result of commands while the manager is not active."""
+        return (mavlink.MAV_RESULT_DENIED if self.tracker.state is ManagerState.INACTIVE
+                else mavlink.MAV_RESULT_TEMPORARILY_REJECTED)
+
+    def _configure(self, source: Address, params: Params, now: float) -> int:
+        # Control may be released at the end.
+        if self.tracker.state is not ManagerState.ACTIVE and not self._commands.refusal:
+            return self._inactive_result
+        try:
+            changes = self.control.configure(source, params, now)
         except ValueError:
-            changes = None
-        if changes is None:
             return mavlink.MAV_RESULT_DENIED
         self._control_changed(changes, now)
         return mavlink.MAV_RESULT_ACCEPTED
@@ -333,50 +326,41 @@ class GimbalManager(Payload):
         if changes and self._status_due < math.inf and now >= self._changed_at + CHANGE_INTERVAL:
             # An additional status, so that players need not wait for the next regular one.
             self._changed_at = now
-            self._commands.send(self.status(now))
+            self._report(self.status(now))
 
-    def _pitch_yaw(self, source: Address, command: AnyCommand, now: float) -> int:
+    def _pitch_yaw(self, source: Address, command: AnyCommand, now: float) -> None:
         *angles_and_rates, flags, _, _ = params_of(command)
         try:
-            pitch, yaw, pitch_rate, yaw_rate = map(math.radians, angles_and_rates)
-            demand = Demand.from_pitch_yaw(
-                0 if math.isnan(flags) else int(flags), pitch, yaw, pitch_rate, yaw_rate)
+            request = Setpoint.from_pitch_yaw(
+                0 if math.isnan(flags) else int(flags), *map(math.radians, angles_and_rates))
         except (ValueError, OverflowError) as error:
-            return self._answer(source, f'{command_name(command.command)}: {error}')
-        return self._answer(source, self._follow(source, demand, now))
+            raise Refused(str(error)) from error
+        self._follow(source, request, now)
 
-    def _follow(self, player: Address, demand: Demand, now: float) -> str:
-        """Follow a player's demand; return why it is refused, or ''."""
-        if inactive := self._inactivity():
-            return inactive
+    def _follow(self, player: Address, request: Setpoint, now: float) -> None:
+        """Follow the request of a player, unless it is refused."""
+        self._check_active()
         if self.control.secondary.holder == player != self.control.primary.holder:
-            return self._setpoints.add(demand, self.settings.nudge_limit, now)
-        return self._lacks_control(player) or self._setpoints.set(demand, now)
+            self._setpoints.add(request, self.settings.nudge_limit, now)
+        else:
+            self._check_control(player)
+            self._setpoints.set(request, now)
 
-    def _lacks_control(self, player: Address) -> str:
-        """Return why a player may not set the gimbal, '' if it has primary control."""
+    def _check_control(self, player: Address) -> None:
+        """Raise :class:`Refused` unless a player has primary control."""
         holder = self.control.primary.holder
-        if holder == player:
-            return ''
-        return f'{holder} has control' if holder else 'the player must take control first'
+        if holder != player:
+            raise Refused(
+                f'{holder} has control' if holder else 'the player must take control first')
 
-    def _set_roi(self, source: Address, command: AnyCommand, now: float) -> int:
-        if refusal := self._lacks_control(source):
-            return self._answer(source, refusal)
-        read = read_roi(command)
-        if isinstance(read, int):
-            return self._answer(
-                source, f'{command_name(command.command)}: no place, or an unknown frame', read)
-        place, is_relative = read
-        is_known = self._setpoints.point(place, now, is_relative=is_relative)
-        return self._answer(
-            source, '' if is_known else 'the position or the heading of the vehicle is unknown',
-            mavlink.MAV_RESULT_TEMPORARILY_REJECTED)
+    def _set_roi(self, source: Address, command: AnyCommand, now: float) -> None:
+        self._check_control(source)
+        place, is_relative = read_roi(command)
+        self._setpoints.point(place, now, is_relative=is_relative)
 
-    def _clear_roi(self, source: Address, command: AnyCommand, now: float) -> int:
-        if not (refusal := self._lacks_control(source)):
-            self._setpoints.end_place(now)
-        return self._answer(source, refusal)
+    def _clear_roi(self, source: Address, command: AnyCommand, now: float) -> None:
+        self._check_control(source)
+        self._setpoints.end_place(now)
 
     def _compare_identity(self, source: Address, message: mav.Heartbeat, now: float) -> None:
         """Report that two senders use the address of a player in control."""
@@ -392,6 +376,11 @@ class GimbalManager(Payload):
             self.events.emit(AddressShared(source))
 
     # Reports
+
+    def _report(self, message: mav.Message) -> None:
+        """Send a message to all players."""
+        self._commands.send(message)
+        self._reported(message)
 
     def status(self, now: float) -> gimbal.GimbalManagerStatus:
         """Return GIMBAL_MANAGER_STATUS, which contains the players in control."""
@@ -414,9 +403,8 @@ class GimbalManager(Payload):
         message = make[int(message_id)](now)
         if self.tracker.state is not ManagerState.ACTIVE or message is None:
             self._is_awaited |= message_id == gimbal.GimbalManagerInformation.id
-            return (mavlink.MAV_RESULT_DENIED if self.tracker.state is ManagerState.INACTIVE
-                    else mavlink.MAV_RESULT_TEMPORARILY_REJECTED)
-        self._commands.send(message)
+            return self._inactive_result
+        self._report(message)
         return mavlink.MAV_RESULT_ACCEPTED
 
     def _own_information(self, now: float) -> gimbal.GimbalManagerInformation | None:

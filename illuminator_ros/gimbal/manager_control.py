@@ -96,7 +96,7 @@ class ControlArbiter:
 
     def configure(
         self, source: Address, params: Sequence[float], now: float,
-    ) -> list[RoleHolderChanged] | None:
+    ) -> list[RoleHolderChanged]:
         """
         Execute MAV_CMD_DO_GIMBAL_MANAGER_CONFIGURE for both roles or for neither.
 
@@ -104,8 +104,7 @@ class ControlArbiter:
         player that has the secondary role then keeps it.
 
         :param params: param1 to param4.
-        :return: None if it is denied.
-        :raises ValueError: if the params do not name players.
+        :raises ValueError: if it is denied, or the params do not name players.
         """
         primary = self._wanted(Role.PRIMARY, source, *params[0:2])
         secondary = self._wanted(Role.SECONDARY, source, *params[2:4])
@@ -113,7 +112,7 @@ class ControlArbiter:
             secondary = self.holder(Role.SECONDARY)
         wanted = {Role.PRIMARY: primary, Role.SECONDARY: secondary}
         if not all(self._may_give(role, source, player) for role, player in wanted.items()):
-            return None
+            raise ValueError(f'{source} may not change who is in control')
         return [change for role, player in wanted.items()
                 if (change := self._give(role, source, player, now))]
 

@@ -26,8 +26,8 @@ from ..mavlink.messages import Address
 
 
 @dataclass(frozen=True)
-class DemandRefused:
-    """A player's setpoint was refused."""
+class RequestRefused:
+    """A setpoint or a place of a player was refused."""
 
     player: Address
     reason: str
@@ -66,5 +66,5 @@ class ReferenceLost:
 
 
 ManagerEvent: TypeAlias = (
-    StateChanged | RoleHolderChanged | DemandRefused | SetpointClipped | SetpointSent
+    StateChanged | RoleHolderChanged | RequestRefused | SetpointClipped | SetpointSent
     | AddressShared | ReferenceLost)

@@ -15,19 +15,21 @@
 """
 Setpoints of a gimbal: reading, mixing and limiting them. Pure functions; MAVLink's conventions.
 
-Rotations are of FRD axes. Roll and pitch are relative to the horizon. Yaw is relative to north or
-to the vehicle's heading: see :class:`~..payload.mount_attitude.YawFrame`.
+A setpoint has angles, which the ranges of the axes limit. They are read from a quaternion once,
+and become one once, in the message to the device. Roll and pitch are relative to the horizon. Yaw
+is relative to north or to the vehicle's heading: see :class:`~..payload.mount_attitude.YawFrame`.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 import math
 from typing import NamedTuple
 
 from . import messages as gimbal
 from .axes import HAS_AXIS, HAS_LOCK, LEVEL, Range, Ranges, read_ranges, UNLIMITED
+from .messages import rates_of
 from ..mavlink.command_sender import DEGREE_SCALE
 from ..mavlink.dialect import MAV_RESULT_COMMAND_UNSUPPORTED_MAV_FRAME, mavlink
 from ..mavlink.messages import AnyCommand, CommandInt, params_of
@@ -114,22 +116,37 @@ class GimbalModel:
             self.capabilities & mavlink.GIMBAL_DEVICE_CAP_FLAGS_SUPPORTS_YAW_IN_EARTH_FRAME)
 
 
-class Demand(NamedTuple):
+class Refused(ValueError):
     """
-    The content of one setpoint message or command of a player.
+    A request of a player is refused, and the reason.
+
+    :param result: MAV_RESULT of a command.
+    """
+
+    def __init__(self, reason: str, result: int = mavlink.MAV_RESULT_DENIED) -> None:
+        super().__init__(reason)
+        self.result = result
+
+
+class Setpoint(NamedTuple):
+    """
+    A setpoint of a gimbal: the request of a player, and then what the device gets.
 
     :param flags: GIMBAL_DEVICE_FLAGS.
     :param frame: of its yaw.
-    :param angles: roll, pitch, yaw, rad; NaN leaves an axis as it is.
+    :param angles: roll, pitch, yaw, rad. In a request NaN leaves an axis as it is; after
+        :func:`resolve` all are NaN for a pose, or where only the rates count.
     :param rates: of the axes, rad/s; NaN where none is given.
-    :param attitude: as given, or computed from the angles if none of them is NaN, else None.
+    :param turning: the rates at which the manager turns the angles, rad/s.
+    :param since: when the angles apply, s.
     """
 
     flags: int = 0
     frame: YawFrame = YawFrame.VEHICLE
     angles: Vector = UNSET_VECTOR
     rates: Vector = UNSET_VECTOR
-    attitude: Quaternion | None = None
+    turning: Vector = STILL
+    since: float = 0.0
 
     @property
     def is_pose(self) -> bool:
@@ -137,24 +154,39 @@ class Demand(NamedTuple):
         return bool(self.flags & POSES)
 
     @property
-    def has_rates_only(self) -> bool:
-        """Whether the demand has a rate, and neither an attitude nor an angle."""
-        return (self.attitude is None and any(map(math.isfinite, self.rates))
-                and not any(map(math.isfinite, self.angles)))
+    def has_angles(self) -> bool:
+        """Whether it has an angle."""
+        return any(map(math.isfinite, self.angles))
 
     @property
-    def target(self) -> Vector:
-        """Return roll, pitch and yaw of the angles or the attitude, rad; NaN where none is."""
-        if self.attitude is None or not math.isnan(self.angles[0]):
-            return self.angles
-        return self.attitude.euler()
+    def has_all_angles(self) -> bool:
+        """Whether it has an angle for each axis."""
+        return all(map(math.isfinite, self.angles))
+
+    @property
+    def has_rates_only(self) -> bool:
+        """Whether it has a rate, and no angle."""
+        return any(map(math.isfinite, self.rates)) and not self.has_angles
+
+    @property
+    def attitude(self) -> Quaternion | None:
+        """Return the attitude, None unless it has all angles."""
+        return Quaternion.from_euler(*self.angles) if self.has_all_angles else None
+
+    @property
+    def operation(self) -> int:
+        """Return the flags without the flags of the yaw frame."""
+        return self.flags & _PASSED_BITS
+
+    @property
+    def device_flags(self) -> int:
+        """Return the flags for the device."""
+        return self.operation | self.frame.flag
 
     @classmethod
-    def _checked(
-        cls, flags: int, angles: Vector, rates: Vector, attitude: Quaternion | None = None,
-    ) -> Demand:
+    def _checked(cls, flags: int, angles: Vector, rates: Vector) -> Setpoint:
         """
-        Return a demand with the yaw frame that its flags name.
+        Return a request with the yaw frame that its flags name.
 
         :raises ValueError: if the flags name both frames, an angle is beyond half a turn, or a
             rate is infinite.
@@ -165,31 +197,27 @@ class Demand(NamedTuple):
             raise ValueError('an angle is beyond 180 degrees')
         if any(map(math.isinf, rates)):
             raise ValueError('a rate is infinite')
-        if attitude is None and not math.isnan(sum(angles)):
-            attitude = _from_angles(angles)
-        return cls(flags, yaw_frame(flags), angles, rates, attitude)
+        return cls(flags, yaw_frame(flags), angles, rates)
 
     @classmethod
     def from_attitude(
         cls, message: gimbal.GimbalManagerSetAttitude | gimbal.GimbalDeviceSetAttitude,
         ranges: Ranges = UNLIMITED,
-    ) -> Demand:
+    ) -> Setpoint:
         """
         Read GIMBAL_MANAGER_SET_ATTITUDE or GIMBAL_DEVICE_SET_ATTITUDE.
 
         :raises ValueError: if the quaternion is not a rotation; also see :meth:`_checked`.
         """
-        attitude, angles = _attitude(message.q), UNSET_VECTOR
-        if attitude is not None and (beyond := _beyond_vertical(attitude.euler(), ranges)):
-            attitude, angles = None, beyond
-        return cls._checked(message.flags, angles, (
-            message.angular_velocity_x, message.angular_velocity_y, message.angular_velocity_z),
-            attitude)
+        angles = UNSET_VECTOR
+        if not all(map(math.isnan, message.q)):
+            angles = _nearest_reading(Quaternion(*message.q).normalized().euler(), ranges)
+        return cls._checked(message.flags, angles, rates_of(message))
 
     @classmethod
     def from_pitch_yaw(
         cls, flags: int, pitch: float, yaw: float, pitch_rate: float, yaw_rate: float,
-    ) -> Demand:
+    ) -> Setpoint:
         """
         Read the values of GIMBAL_MANAGER_SET_PITCHYAW, rad and rad/s; with an angle, roll is 0.
 
@@ -201,7 +229,7 @@ class Demand(NamedTuple):
     @classmethod
     def from_manual_control(
         cls, message: gimbal.GimbalManagerSetManualControl, ranges: Ranges,
-    ) -> Demand:
+    ) -> Setpoint:
         """
         Read GIMBAL_MANAGER_SET_MANUAL_CONTROL: shares of the ranges, and of :data:`MANUAL_RATE`.
 
@@ -225,130 +253,75 @@ AnySetpoint = (gimbal.GimbalManagerSetAttitude | gimbal.GimbalManagerSetPitchyaw
                | gimbal.GimbalManagerSetManualControl)
 
 
-def read_demand(message: AnySetpoint, ranges: Ranges) -> Demand:
+def read_setpoint(message: AnySetpoint, ranges: Ranges) -> Setpoint:
     """
     Read a message of a player.
 
     :raises ValueError: if it is not valid.
     """
     if isinstance(message, gimbal.GimbalManagerSetAttitude):
-        return Demand.from_attitude(message, ranges)
+        return Setpoint.from_attitude(message, ranges)
     if isinstance(message, gimbal.GimbalManagerSetManualControl):
-        return Demand.from_manual_control(message, ranges)
-    return Demand.from_pitch_yaw(
+        return Setpoint.from_manual_control(message, ranges)
+    return Setpoint.from_pitch_yaw(
         message.flags, message.pitch, message.yaw, message.pitch_rate, message.yaw_rate)
 
 
-def _attitude(q: Sequence[float]) -> Quaternion | None:
-    return None if all(map(math.isnan, q)) else Quaternion(*q).normalized()
+def _are_within(angles: Sequence[float], ranges: Sequence[Range]) -> bool:
+    return all(range_.low <= angle <= range_.high
+               for angle, range_ in zip(angles, ranges, strict=True))
 
 
-def _beyond_vertical(angles: Vector, ranges: Ranges) -> Vector | None:
+def _nearest_reading(angles: Vector, ranges: Ranges) -> Vector:
     """
-    Return the angles of an attitude with a pitch beyond a right angle.
+    Return the angles of an attitude whose roll and pitch are nearer to the ranges.
 
-    The same attitude has a pitch within a right angle, with roll and yaw turned by half a turn. To
-    clip these would turn the gimbal to another pose.
-
-    :return: None unless roll and pitch are nearer to their ranges than with the other pitch.
+    The same attitude has a pitch beyond a right angle, with roll and yaw turned by half a turn. To
+    clip the other angles would turn the gimbal to another pose.
     """
     roll, pitch, yaw = angles
-    beyond = math.remainder(roll + math.pi, math.tau), math.copysign(math.pi, pitch) - pitch
-    within, distance = (
-        sum(abs(range_.clip(angle) - angle) for angle, range_ in zip(pair, ranges, strict=False))
-        for pair in ((roll, pitch), beyond))
-    return None if within <= distance else (*beyond, math.remainder(yaw + math.pi, math.tau))
+    if _are_within((roll, pitch), ranges[:2]):
+        return angles
+    half_turned = (math.remainder(roll + math.pi, math.tau),
+                   math.copysign(math.pi, pitch) - pitch,
+                   math.remainder(yaw + math.pi, math.tau))
+    return min(angles, half_turned, key=lambda one: sum(
+        abs(range_.clip(angle) - angle) for angle, range_ in zip(one[:2], ranges, strict=False)))
 
 
-class Setpoint(NamedTuple):
+def resolve(request: Setpoint, current: Vector, now: float, *, turns: bool) -> Setpoint:
     """
-    The setpoint of a gimbal.
+    Return the setpoint that a request makes.
 
-    :param attitude: None for a pose, or where only the rates count.
-    :param rates: the rates that the device follows, rad/s; NaN where the device chooses.
-    :param turning: the rates at which the manager turns the attitude, rad/s.
-    :param since: when the attitude applies, s.
-    :param angles: roll, pitch and yaw of the attitude as requested, rad; NaN if not known.
-    """
-
-    flags: int
-    frame: YawFrame
-    attitude: Quaternion | None
-    rates: Vector = UNSET_VECTOR
-    turning: Vector = STILL
-    since: float = 0.0
-    angles: Vector = UNSET_VECTOR
-
-    @property
-    def is_pose(self) -> bool:
-        """Whether a flag alone sets the attitude."""
-        return bool(self.flags & POSES)
-
-    @property
-    def has_rates_only(self) -> bool:
-        """Whether the device turns at the rates, without an attitude."""
-        return self.attitude is None and not self.is_pose
-
-    @property
-    def target(self) -> Vector:
-        """Return roll, pitch and yaw, rad; NaN where there is no attitude."""
-        # The computation of angles from a quaternion takes as long as the rest.
-        if self.attitude is None or not math.isnan(self.angles[0]):
-            return self.angles
-        return self.attitude.euler()
-
-    @property
-    def operation(self) -> int:
-        """Return the flags without the flags of the yaw frame."""
-        return self.flags & _PASSED_BITS
-
-    @property
-    def device_flags(self) -> int:
-        """Return the flags for the device."""
-        return self.operation | self.frame.flag
-
-
-def resolve(demand: Demand, current: Quaternion, now: float, *, turns: bool) -> Setpoint:
-    """
-    Return the setpoint that a demand makes.
-
-    :param current: the attitude, in the frame of the demand, from which axes without an angle
-        start; not used for an attitude, for a pose or, unless ``turns``, for rates only.
+    :param current: the angles, in the frame of the request, of axes without an angle; not used for
+        a pose or, unless ``turns``, for rates only.
     :param turns: whether the manager must turn the gimbal where only rates are given.
     """
-    flags, frame = demand.flags, demand.frame
-    if flags & POSES:
-        return Setpoint(flags, frame, None, since=now)
-    if demand.attitude is not None:
-        return Setpoint(flags, frame, demand.attitude, demand.rates, STILL, now, demand.angles)
-    rates = demand.rates
-    if demand.has_rates_only and not turns:
-        return Setpoint(flags, frame, None, _each(
-            lambda rate: rate if math.isfinite(rate) else 0.0, rates), since=now)
-    given = [math.isfinite(angle) for angle in demand.angles]
-    only_rate = [not has_angle and math.isfinite(rate)
-                 for has_angle, rate in zip(given, rates, strict=True)]
-    angles = _each(lambda asked, has_angle, angle: asked if has_angle else angle,
-                   demand.angles, given, current.euler())
-    return Setpoint(
-        flags, frame, _from_angles(angles) if any(given) else current,
-        _each(lambda rate, has_angle: rate if has_angle else math.nan, rates, given),
-        _each(lambda rate, alone: rate if alone else 0.0, rates, only_rate), now, angles)
+    if request.is_pose:
+        return request._replace(angles=UNSET_VECTOR, rates=UNSET_VECTOR, since=now)
+    if request.has_all_angles:
+        return request._replace(since=now)
+    known = [rate if math.isfinite(rate) else 0.0 for rate in request.rates]
+    if request.has_rates_only and not turns:
+        return request._replace(rates=_vector(known), since=now)
+    angles, rates, turning = zip(*(
+        (angle, rate, 0.0) if math.isfinite(angle) else (old, math.nan, known_rate)
+        for angle, rate, old, known_rate in zip(
+            request.angles, request.rates, current, known, strict=True)), strict=True)
+    return request._replace(
+        angles=_vector(angles), rates=_vector(rates), turning=_vector(turning), since=now)
 
 
 def stopped(setpoint: Setpoint) -> Setpoint:
     """Return the setpoint that ends the motion of another one."""
-    if setpoint.is_pose:
-        return setpoint
-    return setpoint._replace(
-        turning=STILL, rates=STILL if setpoint.attitude is None else UNSET_VECTOR)
+    rates = STILL if setpoint.has_rates_only else UNSET_VECTOR
+    return setpoint._replace(turning=STILL, rates=rates)
 
 
-def nudge(demand: Demand, limit: float) -> Vector:
+def nudge(request: Setpoint, limit: float) -> Vector:
     """Return the offsets that a player in secondary control adds, rad, each within the limit."""
-    angles = demand.target
-    return _each(lambda angle: max(-limit, min(limit, angle)) if math.isfinite(angle) else 0.0,
-                 angles)
+    return _vector([Range(-limit, limit).clip(angle) if math.isfinite(angle) else 0.0
+                    for angle in request.angles])
 
 
 class Clipped(NamedTuple):
@@ -368,65 +341,56 @@ def turned(
 
     The other parameters are those of :func:`clip`.
     """
-    if setpoint.attitude is None or offsets == STILL == setpoint.turning:
+    if offsets == STILL == setpoint.turning or not setpoint.has_all_angles:
         return setpoint
     elapsed = now - setpoint.since
     roll, pitch, yaw = (
         range_.clip(angle + rate * elapsed + offset) if rate or offset else angle
         for angle, range_, rate, offset in zip(
-            *_on_axes(setpoint.target, setpoint.frame, ranges, ahead, before), setpoint.turning,
-            offsets, strict=True))
-    angles = roll, pitch, yaw + (ahead or 0.0)
-    return setpoint._replace(attitude=_from_angles(angles), since=now, angles=angles)
+            *_on_axes(setpoint, ranges, ahead, before), setpoint.turning, offsets, strict=True))
+    return setpoint._replace(since=now, angles=(roll, pitch, yaw + (ahead or 0.0)))
 
 
 def clip(
     setpoint: Setpoint, ranges: Ranges, ahead: float | None, offsets: Vector = STILL,
     before: Sequence[Clipped] = (),
-) -> tuple[Quaternion | None, tuple[Clipped, ...]]:
+) -> tuple[Vector, tuple[Clipped, ...]]:
     """
-    Return the attitude of a setpoint within the ranges, and the angles that were clipped.
+    Return the angles of a setpoint within the ranges, and those that were clipped.
 
     :param ahead: the direction from which the range of the yaw counts, rad in the frame of the
         setpoint; None where it is not known, which leaves the yaw as it is.
     :param offsets: added to the angles before, rad.
     :param before: the angles that were clipped the last time.
     """
-    attitude, turning = setpoint.attitude, setpoint.turning
-    if attitude is None:
-        return None, ()
-    target = roll, pitch, yaw = setpoint.target
-    if ahead is not None and offsets == STILL == turning and not before:
+    _, pitch, _ = setpoint.angles
+    if (ahead is not None and offsets == STILL == setpoint.turning and not before
+            and abs(pitch) <= _RIGHT_ANGLE
+            and _are_within(turned_by(setpoint.angles, -ahead), ranges)):
         # Most setpoints are within the ranges, and the rest takes longer.
-        (roll_low, roll_high), (pitch_low, pitch_high), (yaw_low, yaw_high) = ranges
-        if (roll_low <= roll <= roll_high and pitch_low <= pitch <= pitch_high
-                and abs(pitch) <= _RIGHT_ANGLE and yaw_low <= yaw - ahead <= yaw_high):
-            return attitude, ()
-    clipped = []
-    angles = []
+        return setpoint.angles, ()
+    if not setpoint.has_all_angles:
+        return setpoint.angles, ()
+    clipped, angles = [], []
     for axis, angle, range_, offset, rate in zip(
-            AXES, *_on_axes(target, setpoint.frame, ranges, ahead, before), offsets, turning,
+            AXES, *_on_axes(setpoint, ranges, ahead, before), offsets, setpoint.turning,
             strict=True):
+        angles.append(range_.clip(angle + offset))
         # A rate against a stop is beyond it, a difference by float32 rounding is not.
-        asked = angle + offset + (math.copysign(2 * _TOLERANCE, rate) if rate else 0.0)
-        limit = range_.clip(asked)
-        is_beyond = abs(limit - asked) > _TOLERANCE
-        angles.append(limit if is_beyond else angle + offset)
-        if is_beyond:
-            clipped.append(Clipped(axis, asked, limit))
-    if not clipped and offsets == STILL:
-        return attitude, ()
+        requested = angle + offset + (math.copysign(2 * _TOLERANCE, rate) if rate else 0.0)
+        limit = range_.clip(requested)
+        if abs(limit - requested) > _TOLERANCE:
+            clipped.append(Clipped(axis, requested, limit))
     roll, pitch, yaw = angles
-    return _from_angles((roll, pitch, yaw + (ahead or 0.0))), tuple(clipped)
+    return (roll, pitch, yaw + (ahead or 0.0)), tuple(clipped)
 
 
 def _on_axes(
-    angles: Vector, frame: YawFrame, ranges: Ranges, ahead: float | None,
-    before: Sequence[Clipped],
+    setpoint: Setpoint, ranges: Ranges, ahead: float | None, before: Sequence[Clipped],
 ) -> tuple[Vector, Ranges]:
     """Return the angles as the axes count them, and the ranges, infinite without stops."""
     stops = {one.axis: one.limit for one in before}
-    roll, pitch, yaw = angles
+    roll, pitch, yaw = setpoint.angles
     roll_range, pitch_range, yaw_range = (
         Range() if range_.is_endless else range_ for range_ in ranges)
     # Beyond a right angle another roll and yaw would have the same attitude.
@@ -435,7 +399,7 @@ def _on_axes(
         yaw_range = Range()
     return ((_nearest(roll, roll_range, stops.get('roll')), pitch,
              _nearest(yaw - (ahead or 0.0), yaw_range, stops.get('yaw'),
-                      is_noisy=frame is YawFrame.EARTH)),
+                      is_noisy=setpoint.frame is YawFrame.EARTH)),
             (roll_range, pitch_range, yaw_range))
 
 
@@ -463,33 +427,25 @@ def in_vehicle_frame(setpoint: Setpoint, heading: float) -> Setpoint:
     """Return a setpoint with its yaw relative to the vehicle instead of north."""
     return setpoint._replace(
         frame=YawFrame.VEHICLE, flags=setpoint.flags & ~mavlink.GIMBAL_DEVICE_FLAGS_YAW_LOCK,
-        attitude=setpoint.attitude and turned_by(setpoint.attitude, -heading))
+        angles=turned_by(setpoint.angles, -heading))
 
 
-def turned_by(attitude: Quaternion, yaw: float) -> Quaternion:
-    """Return an attitude whose yaw is greater by an angle, rad."""
-    return Quaternion.from_euler(0.0, 0.0, yaw) * attitude
+def turned_by(angles: Vector, yaw: float) -> Vector:
+    """Return angles whose yaw is greater by an angle, rad."""
+    return angles[0], angles[1], angles[2] + yaw
 
 
-def _each(function: Callable[..., float], *values: Sequence[float]) -> Vector:
-    """Return the results of a function for each axis."""
-    roll, pitch, yaw = map(function, *values)
+def _vector(values: Sequence[float]) -> Vector:
+    roll, pitch, yaw = values
     return roll, pitch, yaw
 
 
-def _from_angles(angles: Sequence[float]) -> Quaternion:
-    roll, pitch, yaw = angles
-    if abs(pitch) > _RIGHT_ANGLE:
-        pitch = math.copysign(_RIGHT_ANGLE, pitch)
-    return Quaternion.from_euler(roll, pitch, yaw)
-
-
-def read_roi(command: AnyCommand) -> tuple[GeoPoint, bool] | int:
+def read_roi(command: AnyCommand) -> tuple[GeoPoint, bool]:
     """
     Return the place of MAV_CMD_DO_SET_ROI_LOCATION.
 
-    :return: the place, and whether its altitude is relative to the home position; the result of
-        the command if it has no valid place.
+    :return: the place, and whether its altitude is relative to the home position.
+    :raises Refused: if it has no valid place.
     """
     *_, latitude, longitude, altitude = params_of(command)
     is_relative = False
@@ -497,11 +453,12 @@ def read_roi(command: AnyCommand) -> tuple[GeoPoint, bool] | int:
     if isinstance(command, CommandInt):
         is_relative = command.frame in gimbal.RELATIVE_FRAMES
         if not is_relative and command.frame not in gimbal.ABSOLUTE_FRAMES:
-            return MAV_RESULT_COMMAND_UNSUPPORTED_MAV_FRAME
+            raise Refused(f'the frame {command.frame} of the place is not supported',
+                          MAV_RESULT_COMMAND_UNSUPPORTED_MAV_FRAME)
         latitude, longitude = latitude / DEGREE_SCALE, longitude / DEGREE_SCALE
     if abs(latitude) <= 90 and abs(longitude) <= 180 and math.isfinite(altitude):
         return GeoPoint(latitude, longitude, altitude), is_relative
-    return mavlink.MAV_RESULT_DENIED
+    raise Refused(f'{latitude:g}, {longitude:g}, {altitude:g} is not a place')
 
 
 def direction(origin: GeoPoint, target: GeoPoint) -> tuple[float, float] | None:

@@ -22,10 +22,9 @@ to ROS as to all other players.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection
-from itertools import islice
+from collections import deque
+from collections.abc import Collection
 import math
-from typing import TypeVar
 
 from .client import GimbalClient
 from .gimbal import GimbalSettings
@@ -38,8 +37,6 @@ from ..mavlink.component import HEARTBEAT_INTERVAL, Payload
 from ..mavlink.dialect import mavlink
 from ..mavlink.messages import AnyCommand
 from ..payload.messages import GimbalDeviceAttitudeStatus
-
-T = TypeVar('T')
 
 _FOR_CLIENT = frozenset(GimbalClient.messages)
 
@@ -57,7 +54,9 @@ class ManagerWithClient(Payload):
     def __init__(
         self, commands: CommandSender, settings: ManagerSettings, client: GimbalSettings,
     ) -> None:
-        self.manager = GimbalManager(commands, settings)
+        # The reports of the manager, which the client has not received yet.
+        self._reports: deque[mav.Message] = deque()
+        self.manager = GimbalManager(commands, settings, reported=self._reports.append)
         self._commands = commands
         self._own = CommandSender(commands.address, commands.timeout, commands.retries)
         self.client = GimbalClient(self._own, client)
@@ -67,7 +66,7 @@ class ManagerWithClient(Payload):
     def link_opened(self, now: float) -> None:
         """See :meth:`Payload.link_opened`."""
         self._heartbeat_due = min(self._heartbeat_due, now)
-        self._manage(lambda: self.manager.link_opened(now), now)
+        self.manager.link_opened(now)
 
     def link_closed(self, now: float, reason: str) -> None:
         """See :meth:`Payload.link_closed`."""
@@ -89,23 +88,21 @@ class ManagerWithClient(Payload):
 
     def close(self, now: float) -> None:
         """See :meth:`Payload.close`."""
-        self._manage(lambda: self.manager.close(now), now)
+        self.manager.close(now)
         self._own.close(now, self.client.may_send_at_end)
         self.client.close(now)
 
     def receive(self, source: mav.Address, message: mav.Message, now: float) -> None:
         """See :meth:`Payload.receive`."""
-        if isinstance(message, AnySetpoint):
-            # A setpoint causes none of the messages that the client receives.
-            self.manager.take_setpoint(source, message, now)
-            return
         if isinstance(message, mav.CommandAck):
             self._own.acknowledge(source, message, now)
         else:
-            self._receive(source, message, now)
+            self.manager.receive(source, message, now)
             if source == self.manager.tracker.device and type(message) in _FOR_CLIENT:
                 self.client.receive(source, message, now)
-        self._serve_client(now)
+        # A setpoint causes no message for the client.
+        if not isinstance(message, AnySetpoint):
+            self._exchange(now)
 
     def receive_conflicting(self, message: mav.Message, now: float) -> None:
         """See :meth:`Payload.receive_conflicting`."""
@@ -115,11 +112,14 @@ class ManagerWithClient(Payload):
         self, source: mav.Address, command: AnyCommand, now: float,
     ) -> int | None:
         """See :meth:`Payload.execute`."""
-        return self._manage(lambda: self.manager.execute(source, command, now), now)
+        result = self.manager.execute(source, command, now)
+        self._exchange(now)
+        return result
 
     def take_attitude(self, status: GimbalDeviceAttitudeStatus, now: float) -> None:
         """See :meth:`GimbalManager.take_attitude`."""
-        self._manage(lambda: self.manager.take_attitude(status, now), now)
+        self.manager.take_attitude(status, now)
+        self._exchange(now)
 
     def poll(self, now: float) -> None:
         """See :meth:`Payload.poll`."""
@@ -128,11 +128,12 @@ class ManagerWithClient(Payload):
             alive = mav.heartbeat(mavlink.MAV_TYPE_ONBOARD_CONTROLLER)
             self.client.receive(self._commands.address, alive, now)
             self.manager.receive(self._commands.address, alive, now)
-        self._manage(lambda: self.manager.poll(now), now)
+        self.manager.poll(now)
+        self._exchange(now)
         self._own.poll(now)
         self.client.poll(now)
         # ROS may have used the client since the last call.
-        self._serve_client(now)
+        self._exchange(now)
 
     def next_deadline(self) -> float:
         """See :meth:`Payload.next_deadline`."""
@@ -141,28 +142,21 @@ class ManagerWithClient(Payload):
         return min(self._heartbeat_due, self.manager.next_deadline(), self.client.next_deadline(),
                    self._own.next_deadline())
 
-    def _manage(self, call: Callable[[], T], now: float) -> T:
-        """Make a call of the manager, and pass the messages that it broadcasts to the client."""
-        outgoing = self._commands.outgoing
-        before = len(outgoing)
-        result = call()
-        for _, message in list(islice(outgoing, before, None)):
-            if type(message) in _FOR_CLIENT:
-                self.client.receive(self._commands.address, message, now)
-        return result
-
-    def _serve_client(self, now: float) -> None:
-        """Pass the client's messages to the manager; send those for other components."""
-        while self._own.outgoing:
-            source, message = self._own.outgoing.popleft()
-            if mav.target_of(message) != self._commands.address:
-                self._commands.send(message)
-            elif isinstance(message, AnyCommand):
-                ack = self._received.take(source, message, now, self.execute)
-                if ack is not None:
-                    self._own.acknowledge(source, ack, now)
+    def _exchange(self, now: float) -> None:
+        """Pass the messages of manager and client to each other until neither has one."""
+        while self._reports or self._own.outgoing:
+            if self._reports:
+                self.client.receive(self._commands.address, self._reports.popleft(), now)
             else:
-                self._receive(source, message, now)
+                self._deliver(*self._own.outgoing.popleft(), now)
 
-    def _receive(self, source: mav.Address, message: mav.Message, now: float) -> None:
-        self._manage(lambda: self.manager.receive(source, message, now), now)
+    def _deliver(self, source: mav.Address, message: mav.Message, now: float) -> None:
+        """Give a message of the client to the manager, or send it to another component."""
+        if mav.target_of(message) != self._commands.address:
+            self._commands.send(message)
+        elif isinstance(message, AnyCommand):
+            ack = self._received.take(source, message, now, self.manager.execute)
+            if ack is not None:
+                self._own.acknowledge(source, ack, now)
+        else:
+            self.manager.receive(source, message, now)

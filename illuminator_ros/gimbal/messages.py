@@ -26,6 +26,8 @@ from __future__ import annotations
 
 from ..mavlink.dialect import mavlink
 from ..mavlink.messages import Address
+from ..payload.messages import GimbalDeviceAttitudeStatus
+from ..payload.rotation import Vector
 
 GimbalManagerInformation = mavlink.MAVLink_gimbal_manager_information_message
 GimbalManagerStatus = mavlink.MAVLink_gimbal_manager_status_message
@@ -45,3 +47,10 @@ ABSOLUTE_FRAMES, RELATIVE_FRAMES = (0, 5), (3, 6)
 DEVICE_ID_PARAM = {
     mavlink.MAV_CMD_DO_SET_ROI_LOCATION: 0, mavlink.MAV_CMD_DO_SET_ROI_NONE: 0,
     mavlink.MAV_CMD_DO_GIMBAL_MANAGER_PITCHYAW: 6, mavlink.MAV_CMD_DO_GIMBAL_MANAGER_CONFIGURE: 6}
+
+
+def rates_of(
+    message: GimbalManagerSetAttitude | GimbalDeviceSetAttitude | GimbalDeviceAttitudeStatus,
+) -> Vector:
+    """Return the rates of roll, pitch and yaw in a message, rad/s."""
+    return message.angular_velocity_x, message.angular_velocity_y, message.angular_velocity_z

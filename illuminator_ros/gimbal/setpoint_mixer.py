@@ -21,15 +21,14 @@ import math
 
 from . import manager_events as events
 from .axes import LEVEL
-from .managed_device import HEADING_UNKNOWN, ManagedDevice
+from .managed_device import ManagedDevice
 from .manager_setpoint import (
     clip,
     Clipped,
-    Demand,
     direction,
     in_vehicle_frame,
     nudge,
-    POSES,
+    Refused,
     resolve,
     Setpoint,
     stopped,
@@ -43,12 +42,13 @@ from ..mavlink.command_sender import CommandSender
 from ..mavlink.dialect import mavlink, short_names
 from ..payload.messages import GeoPoint
 from ..payload.mount_attitude import AXES, STILL, UNSET_QUATERNION, YawFrame
-from ..payload.rotation import Quaternion, Vector
+from ..payload.rotation import Vector
 
 # s between repetitions of a constant setpoint, at most 1 s by the specification; and between
 # setpoints that follow a place, the vehicle or a rate.
 HOLD_INTERVAL = 0.9
 FOLLOW_INTERVAL = 0.05
+HEADING_UNKNOWN = 'the heading of the vehicle is unknown'
 
 
 class SetpointMixer:
@@ -105,33 +105,28 @@ class SetpointMixer:
 
     # Players
 
-    def set(self, demand: Demand, now: float) -> str:  # noqa: A003
-        """Follow a demand of the player in primary control; return why it is refused, or ''."""
-        if lacking := self._device.model.lacks(demand.flags):
+    def set(self, request: Setpoint, now: float) -> None:  # noqa: A003
+        """Follow a request of the player in primary control; :raises Refused: if it cannot."""
+        if lacking := self._device.model.lacks(request.flags):
             names = (name for flag, name in short_names('GIMBAL_DEVICE_FLAGS').items()
                      if flag & lacking)
-            return f'the gimbal does not have {", ".join(names)}'
-        self._turn(now)
-        start = self._start(demand, now)
-        if isinstance(start, str):
-            return start
+            raise Refused(f'the gimbal does not have {", ".join(names)}')
+        self.current = resolve(
+            request, self._start(request, now), now, turns=not self._tracker.has_mavlink)
         self._roi = None
-        self.current = resolve(demand, start, now, turns=not self._tracker.has_mavlink)
         self._send(now)
-        return ''
 
-    def add(self, demand: Demand, limit: float, now: float) -> str:
+    def add(self, request: Setpoint, limit: float, now: float) -> None:
         """
-        Add the angles of the player in secondary control; return why that is refused, or ''.
+        Add the angles of the player in secondary control.
 
         :param limit: of each angle, rad.
+        :raises Refused: if it requests something else.
         """
-        if demand.flags & POSES or not (
-                demand.attitude or any(map(math.isfinite, demand.angles))):
-            return 'secondary control adds angles only'
-        self._offsets = nudge(demand, limit)
+        if request.is_pose or not request.has_angles:
+            raise Refused('secondary control adds angles only')
+        self._offsets = nudge(request, limit)
         self._send(now)
-        return ''
 
     def end_offsets(self, now: float, *, keep: bool) -> None:
         """
@@ -155,20 +150,21 @@ class SetpointMixer:
         self.stop(now)
         self.current, self.due = None, math.inf
 
-    def point(self, place: GeoPoint, now: float, *, is_relative: bool) -> bool:
+    def point(self, place: GeoPoint, now: float, *, is_relative: bool) -> None:
         """
-        Follow a place; return whether position and heading of the vehicle are known.
+        Follow a place.
 
         :param is_relative: whether its altitude is relative to the home position.
+        :raises Refused: if position or heading of the vehicle are unknown.
         """
         above = self._vehicle.home_altitude if is_relative else 0.0
         if above is None or self._vehicle.position(now) is None or (
                 self._device.heading(now) is None
                 and not self._device.accepts_earth_frame(now)):
-            return False
+            raise Refused('the position or the heading of the vehicle is unknown',
+                          mavlink.MAV_RESULT_TEMPORARILY_REJECTED)
         self._roi = place._replace(altitude=place.altitude + above)
         self.poll(now)
-        return True
 
     def end_place(self, now: float) -> None:
         """Follow no place any more."""
@@ -184,42 +180,43 @@ class SetpointMixer:
                 lock = mavlink.GIMBAL_DEVICE_FLAGS_YAW_LOCK
                 self.current = Setpoint(
                     LEVEL | (lock & ~self._device.model.lacks(lock)), YawFrame.EARTH,
-                    Quaternion.from_euler(0.0, *angles), since=now)
+                    (0.0, *angles), since=now)
         self._send(now)
 
     # The path to the device
 
-    def _start(self, demand: Demand, now: float) -> Quaternion | str:
-        """Return the attitude that a demand changes, or what is unknown of it."""
-        if demand.is_pose or (demand.has_rates_only and self._tracker.has_mavlink):
+    def _start(self, request: Setpoint, now: float) -> Vector:
+        """Return the angles that a request changes; :raises Refused: if they are unknown."""
+        if request.is_pose or (request.has_rates_only and self._tracker.has_mavlink):
             # Such a setpoint does not depend on the attitude.
-            return Quaternion()
-        if (demand.frame is YawFrame.EARTH and not self._device.accepts_earth_frame(now)
+            return STILL
+        if (request.frame is YawFrame.EARTH and not self._device.accepts_earth_frame(now)
                 and self._device.heading(now) is None):
-            return HEADING_UNKNOWN
-        return demand.attitude or self._pointing(demand.frame, now)
+            raise Refused(HEADING_UNKNOWN)
+        return request.angles if request.has_all_angles else self._pointing(request.frame, now)
 
-    def _pointing(self, frame: YawFrame, now: float) -> Quaternion | str:
-        """Return the attitude of the setpoint, or else of the device, with a yaw in a frame."""
-        heading = self._device.heading(now)
-        if self.current is not None and self.current.attitude is not None:
-            attitude, known = self.current.attitude, self.current.frame
-        elif (reported := self._device.reported(frame, now)) is not None:
-            return reported
-        elif self.sent is not None:
-            return 'the attitude of the gimbal is unknown'
-        else:
-            # A device that has neither reported an attitude nor got a setpoint starts at 0.
-            attitude, known = Quaternion(), YawFrame.VEHICLE
+    def _pointing(self, frame: YawFrame, now: float) -> Vector:
+        """Return the angles of the setpoint, or else of the device, with a yaw in a frame."""
+        # A device that has neither reported an attitude nor got a setpoint starts at 0.
+        angles, known = STILL, YawFrame.VEHICLE
+        self._turn(now)
+        if self.current is not None and self.current.has_all_angles:
+            angles, known = self.current.angles, self.current.frame
+        elif reported := self._device.pointing(now):
+            angles, known = reported
+        elif self.sent is not None or self._device.has_reported:
+            raise Refused('the attitude of the gimbal is unknown')
         if known is frame:
-            return attitude
-        return HEADING_UNKNOWN if heading is None else turned_by(
-            attitude, heading if frame is YawFrame.EARTH else -heading)
+            return angles
+        heading = self._device.heading(now)
+        if heading is None:
+            raise Refused(HEADING_UNKNOWN)
+        return turned_by(angles, heading if frame is YawFrame.EARTH else -heading)
 
     def _ahead(self, setpoint: Setpoint, now: float) -> float | None:
         """Return the direction from which the range of the yaw counts, None if unknown."""
         # A pose and rates have no attitude that is converted.
-        is_relative = setpoint.frame is YawFrame.VEHICLE or setpoint.attitude is None
+        is_relative = setpoint.frame is YawFrame.VEHICLE or not setpoint.has_angles
         return 0.0 if is_relative else self._device.heading(now)
 
     def _turn(self, now: float, offsets: Vector = STILL) -> None:
@@ -241,13 +238,11 @@ class SetpointMixer:
         self.due = now + (
             FOLLOW_INTERVAL if setpoint.turning != STILL or converts or self._roi is not None
             else HOLD_INTERVAL)
-        attitude, self.clipped = clip(
+        angles, self.clipped = clip(
             setpoint, self._device.model.ranges, ahead, self._offsets, self.clipped)
         if self.clipped or self._reported:
             self._report_clipped(setpoint)
-        sent = setpoint
-        if attitude is not setpoint.attitude:
-            sent = setpoint._replace(attitude=attitude)
+        sent = setpoint if angles is setpoint.angles else setpoint._replace(angles=angles)
         self._note_lost('heading', is_lost=converts and ahead is None)
         if converts:
             if ahead is None:
@@ -267,7 +262,7 @@ class SetpointMixer:
             axis: (setpoint.frame, self._roi or (
                 math.copysign(1.0, rate) if rate else round(angle + offset, 6)))
             for axis, angle, offset, rate in zip(
-                AXES, setpoint.target, self._offsets, setpoint.turning, strict=True)}
+                AXES, setpoint.angles, self._offsets, setpoint.turning, strict=True)}
         self._reported = {axis: demand for axis, demand in self._reported.items()
                           if demand == demands[axis]}
         if new := tuple(one for one in self.clipped if one.axis not in self._reported):

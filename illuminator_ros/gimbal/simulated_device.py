@@ -31,7 +31,7 @@ from typing import Any
 
 from . import messages as gimbal
 from .axes import range_fields
-from .manager_setpoint import Demand
+from .manager_setpoint import Setpoint
 from .simulated_motion import GimbalMechanics, GimbalMotion
 from .. import __version__
 from ..mavlink.dialect import flag_names, mavlink
@@ -176,7 +176,7 @@ class SimulatedMount:
         self.motion.advance(now)
         self.motion.fail(behaviour.frozen_axis, limited=behaviour.limits_range)
 
-    def obey(self, demand: Demand, behaviour: GimbalBehaviour, now: float) -> None:
+    def obey(self, demand: Setpoint, behaviour: GimbalBehaviour, now: float) -> None:
         """Take a setpoint, see :meth:`GimbalMotion.obey`."""
         stop = demand.has_rates_only and not any(
             rate for rate in demand.rates if math.isfinite(rate))
@@ -362,7 +362,7 @@ class SimulatedGimbal(simulated.SimulatedDevice):
         now: float,
     ) -> None:
         try:
-            demand = Demand.from_attitude(message)
+            demand = Setpoint.from_attitude(message)
         except ValueError:
             return
         if demand.frame is YawFrame.VEHICLE or self.mount.motion.heading_known(now):

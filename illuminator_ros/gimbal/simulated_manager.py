@@ -30,7 +30,7 @@ import math
 
 from . import messages as gimbal
 from .axes import LEVEL, Range
-from .manager_setpoint import AnySetpoint, Demand, direction, read_demand, read_roi
+from .manager_setpoint import AnySetpoint, direction, read_roi, read_setpoint, Refused, Setpoint
 from .messages import DEVICE_ID_PARAM, NO_COMPONENT
 from .simulated_device import (
     COMMANDS,
@@ -261,7 +261,7 @@ class SimulatedManager(simulated.SimulatedDevice):
                   | mavlink.GIMBAL_DEVICE_FLAGS_YAW_IN_VEHICLE_FRAME)
         return flags & ~frames if self.behaviour.frame_is_lock else flags
 
-    def _read(self, message: AnySetpoint) -> Demand | None:
+    def _read(self, message: AnySetpoint) -> Setpoint | None:
         """Return the demand of a message, None if it is ignored."""
         behaviour = self.behaviour
         if (isinstance(message, gimbal.GimbalManagerSetPitchyaw) and not behaviour.takes_pitchyaw
@@ -269,31 +269,31 @@ class SimulatedManager(simulated.SimulatedDevice):
                 and not behaviour.takes_manual):
             return None
         try:
-            demand = read_demand(replaced(message, flags=self._flags(message.flags)),
-                                 self.properties.ranges)
+            demand = read_setpoint(replaced(message, flags=self._flags(message.flags)),
+                                   self.properties.ranges)
         except ValueError:
             return None
-        has_both = all(map(math.isfinite, (*demand.target, *demand.rates[1:])))
+        has_both = all(map(math.isfinite, (*demand.angles, *demand.rates[1:])))
         ignored = has_both and not behaviour.angles_with_rates or self._lacks_an_axis(demand)
         return None if ignored else demand
 
-    def _lacks_an_axis(self, demand: Demand) -> bool:
+    def _lacks_an_axis(self, demand: Setpoint) -> bool:
         """Return whether a demand has the angle of only one axis, and the profile ignores it."""
-        _, pitch, yaw = demand.target
+        _, pitch, yaw = demand.angles
         return math.isnan(pitch) is not math.isnan(yaw) and (
             self.behaviour.partial_angles is not None)
 
-    def _obey(self, source: Address, demand: Demand, now: float) -> None:
+    def _obey(self, source: Address, demand: Setpoint, now: float) -> None:
         if self.behaviour.enforces_control and source == self.secondary != self.primary:
             # Nudging adds angles; a rate would override the angles of primary control.
             nudge = Range(-NUDGE_LIMIT, NUDGE_LIMIT)
             roll, pitch, yaw = (
                 (own if math.isfinite(own) else 0.0) + nudge.clip(added)
                 if math.isfinite(added) else math.nan
-                for own, added in zip(self._base, demand.target, strict=True))
-            demand = Demand(demand.flags, demand.frame, (roll, pitch, yaw))
+                for own, added in zip(self._base, demand.angles, strict=True))
+            demand = Setpoint(demand.flags, demand.frame, (roll, pitch, yaw))
         else:
-            self._base = demand.target
+            self._base = demand.angles
         self._roi = None
         self.mount.obey(demand, self.behaviour, now)
 
@@ -315,10 +315,10 @@ class SimulatedManager(simulated.SimulatedDevice):
             return self._configure(source, first)
         effect: simulated.Effect = partial(self._clear_roi, now)
         if command.command == mavlink.MAV_CMD_DO_SET_ROI_LOCATION:
-            read = read_roi(command)
-            if isinstance(read, int):
-                return simulated.CommandReply(read)
-            place, is_relative = read
+            try:
+                place, is_relative = read_roi(command)
+            except Refused as refused:
+                return simulated.CommandReply(refused.result)
             above = self.properties.position.altitude if is_relative else 0.0
             effect = partial(
                 self._set_roi, place._replace(altitude=place.altitude + above), now)
@@ -333,7 +333,7 @@ class SimulatedManager(simulated.SimulatedDevice):
         pitch_rate, yaw_rate = rates if self.behaviour.rates_in_degrees else values[2:]
         try:
             # int() of NaN raises ValueError, and of infinity OverflowError.
-            demand = Demand.from_pitch_yaw(
+            demand = Setpoint.from_pitch_yaw(
                 self._flags(int(flags)), pitch, yaw, pitch_rate, yaw_rate)
         except (ValueError, OverflowError):
             return simulated.CommandReply(mavlink.MAV_RESULT_DENIED)
@@ -381,11 +381,11 @@ class SimulatedManager(simulated.SimulatedDevice):
     def _clear_roi(self, now: float) -> None:
         # "After this command the gimbal manager should ... assume a neutral position."
         self._roi = None
-        self.mount.obey(Demand(mavlink.GIMBAL_DEVICE_FLAGS_NEUTRAL | LEVEL), self.behaviour, now)
+        self.mount.obey(Setpoint(mavlink.GIMBAL_DEVICE_FLAGS_NEUTRAL | LEVEL), self.behaviour, now)
 
     def _point_at_roi(self, now: float) -> None:
         if self._roi is not None and (angles := direction(self._position, self._roi)):
-            self.mount.obey(Demand(LEVEL | mavlink.GIMBAL_DEVICE_FLAGS_YAW_LOCK, YawFrame.EARTH,
+            self.mount.obey(Setpoint(LEVEL | mavlink.GIMBAL_DEVICE_FLAGS_YAW_LOCK, YawFrame.EARTH,
                                    (0.0, *angles)),
                             self.behaviour, now)
 

@@ -21,7 +21,7 @@ import math
 from typing import NamedTuple
 
 from .axes import AT_LIMIT, HAS_AXIS, HAS_FOLLOW, HAS_LOCK, LEVEL, LOCKS, Range, Ranges, RESOLUTION
-from .manager_setpoint import Demand
+from .manager_setpoint import Setpoint
 from ..mavlink.dialect import mavlink, short_names
 from ..payload.mount_attitude import AXES, UNSET_VECTOR, YawFrame
 from ..payload.rotation import Quaternion, Vector
@@ -225,7 +225,7 @@ class GimbalMotion:
                        for axis, angle in enumerate((vehicle.roll, vehicle.pitch)))
         return roll, pitch, -self._heading(now) if self.locked(2) else 0.0
 
-    def obey(self, demand: Demand, now: float) -> None:
+    def obey(self, demand: Setpoint, now: float) -> None:
         """
         Take a setpoint (GIMBAL_DEVICE_SET_ATTITUDE).
 
@@ -233,7 +233,7 @@ class GimbalMotion:
         neither keeps its angle.
         """
         self.advance(now)
-        flags, angles, rates = demand.flags, demand.target, demand.rates
+        flags, angles, rates = demand.flags, demand.angles, demand.rates
         self.flags, self.frame = flags & SETTABLE, demand.frame
         if flags & (mavlink.GIMBAL_DEVICE_FLAGS_RETRACT | mavlink.GIMBAL_DEVICE_FLAGS_NEUTRAL):
             # RETRACT takes precedence (GIMBAL_DEVICE_FLAGS).

@@ -23,7 +23,7 @@ from typing import Any
 from illuminator_ros.gimbal import messages as gimbal
 from illuminator_ros.gimbal import simulated_device, simulated_manager
 from illuminator_ros.gimbal.checks import device, manager
-from illuminator_ros.gimbal.manager_setpoint import Demand
+from illuminator_ros.gimbal.manager_setpoint import Setpoint
 from illuminator_ros.mavlink.dialect import mavlink, replaced
 from illuminator_ros.mavlink.messages import (
     Address,
@@ -178,9 +178,9 @@ def _moves_when_unset(one: ChecksRun) -> None:
     mount = one.device.mount
     original = mount.obey
 
-    def moved(demand: Demand, *others: Any) -> None:
-        unset = all(map(math.isnan, (*demand.target, *demand.rates))) and not demand.is_pose
-        original(Demand(angles=(0.0, 0.5, 0.0)) if unset else demand, *others)
+    def moved(demand: Setpoint, *others: Any) -> None:
+        unset = all(map(math.isnan, (*demand.angles, *demand.rates))) and not demand.is_pose
+        original(Setpoint(angles=(0.0, 0.5, 0.0)) if unset else demand, *others)
     mount.obey = moved
 
 
@@ -223,7 +223,7 @@ def _turns_with_the_vehicle(one: ChecksRun) -> None:
     mount = one.device.mount
     original = mount.obey
 
-    def turned(demand: Demand, *others: Any) -> None:
+    def turned(demand: Setpoint, *others: Any) -> None:
         original(demand._replace(angles=(0.0, -0.26, 0.5)) if (
             demand.flags & mavlink.GIMBAL_DEVICE_FLAGS_YAW_LOCK) else demand, *others)
     mount.obey = turned
@@ -343,7 +343,7 @@ def test_the_gimbal_keeps_its_yaw_lock(kind: str) -> None:
     one = run(kind, drift=0.0)
     motion, lock = (one.device.mount.motion, mavlink.GIMBAL_DEVICE_FLAGS_YAW_LOCK
                     | mavlink.GIMBAL_DEVICE_FLAGS_PITCH_LOCK)
-    motion.obey(Demand(lock, angles=(0.0, -0.2, 0.1)), one.link.now)
+    motion.obey(Setpoint(lock, angles=(0.0, -0.2, 0.1)), one.link.now)
     one.finish()
     assert motion.flags == lock
     assert motion.angles[1:] == pytest.approx((-0.2, 0.1), abs=0.05)

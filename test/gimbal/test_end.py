@@ -23,7 +23,7 @@ from typing import Any
 
 from illuminator_ros.gimbal.gimbal import GimbalSettings
 from illuminator_ros.gimbal.manager import GimbalManager, ManagerSettings
-from illuminator_ros.gimbal.manager_events import DemandRefused, SetpointSent
+from illuminator_ros.gimbal.manager_events import RequestRefused, SetpointSent
 from illuminator_ros.gimbal.manager_with_client import ManagerWithClient
 from illuminator_ros.gimbal.messages import (
     GimbalDeviceSetAttitude,
@@ -192,7 +192,7 @@ def test_a_manager_stops_its_device_and_follows_no_player_any_more(
     assert not any(rate for _, turning in sent for rate in turning if not math.isnan(rate))
     assert len(sent) == 1
     assert set(results) == {mavlink.MAV_RESULT_TEMPORARILY_REJECTED}
-    assert {one.reason for one in of(DemandRefused, rig.events[known:])} == {ENDING}
+    assert {one.reason for one in of(RequestRefused, rig.events[known:])} == {ENDING}
 
 
 def test_ros_as_a_player_of_its_own_manager_turns_the_gimbal_no_more() -> None:

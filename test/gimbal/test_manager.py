@@ -254,7 +254,7 @@ def test_gm_14_a_player_that_is_not_in_control_is_refused(
     assert [ack.result for ack in of(mav.CommandAck, sent)] == (
         [] if isinstance(message, GimbalManagerSetPitchyaw) else [mavlink.MAV_RESULT_DENIED])
     assert rig.messages(GimbalDeviceSetAttitude) == []
-    assert of(manager_events.DemandRefused, rig.events) == [manager_events.DemandRefused(
+    assert of(manager_events.RequestRefused, rig.events) == [manager_events.RequestRefused(
         GUEST, f'{holder} has control' if holder else (
             'the player must take control first'))]
 
@@ -415,7 +415,7 @@ def test_an_invalid_setpoint_is_refused_and_named(message: Any) -> None:
     assert of(GimbalDeviceSetAttitude, sent) == []
     acks = of(mav.CommandAck, sent)
     assert [ack.result for ack in acks] == [mavlink.MAV_RESULT_DENIED] * len(acks)
-    assert len(of(manager_events.DemandRefused, rig.events)) == 1
+    assert len(of(manager_events.RequestRefused, rig.events)) == 1
 
 
 def test_gm_3_a_yaw_lock_is_refused_where_the_device_has_none() -> None:
@@ -424,9 +424,9 @@ def test_gm_3_a_yaw_lock_is_refused_where_the_device_has_none() -> None:
     result = rig.result(PILOT, pitch_yaw_command(0, 0, flags=mavlink.GIMBAL_DEVICE_FLAGS_YAW_LOCK))
 
     assert result is mavlink.MAV_RESULT_DENIED
-    assert 'YAW_LOCK' in of(manager_events.DemandRefused, rig.events)[0].reason
+    assert 'YAW_LOCK' in of(manager_events.RequestRefused, rig.events)[0].reason
     assert rig.give(PILOT, pitch_yaw(0.1, 0.0, flags=mavlink.GIMBAL_DEVICE_FLAGS_YAW_LOCK)) == []
-    assert 'YAW_LOCK' in of(manager_events.DemandRefused, rig.events)[0].reason
+    assert 'YAW_LOCK' in of(manager_events.RequestRefused, rig.events)[0].reason
 
 
 @pytest.mark.parametrize('heading', [NAN, 1.0])
@@ -444,7 +444,7 @@ def test_gm_2_a_yaw_from_north_is_converted_for_a_device_without_north(
 
     if math.isnan(heading):
         assert sent == []
-        assert 'heading' in of(manager_events.DemandRefused, rig.events)[0].reason
+        assert 'heading' in of(manager_events.RequestRefused, rig.events)[0].reason
         return
     assert euler(sent[0]) == (0.0, 0.1, 0.2)
     assert sent[0].flags == mavlink.GIMBAL_DEVICE_FLAGS_YAW_IN_VEHICLE_FRAME
@@ -505,7 +505,7 @@ def test_an_axis_without_an_angle_is_refused_where_its_attitude_is_unknown(
     result = rig.result(PILOT, pitch_yaw_command(pitch, NAN))
 
     assert result is mavlink.MAV_RESULT_DENIED
-    assert unknown in of(manager_events.DemandRefused, rig.events)[0].reason
+    assert unknown in of(manager_events.RequestRefused, rig.events)[0].reason
     assert last(rig).angular_velocity_z == 0.5
 
 
@@ -867,7 +867,7 @@ def test_gm_8_a_region_of_interest_is_answered_with_its_reason(
     rig = following()
 
     assert rig.result(PILOT, command) is result
-    assert len(of(manager_events.DemandRefused, rig.events)) == (
+    assert len(of(manager_events.RequestRefused, rig.events)) == (
         result is not mavlink.MAV_RESULT_ACCEPTED)
 
 
@@ -885,7 +885,7 @@ def test_gm_8_without_a_position_a_region_of_interest_is_rejected_for_now() -> N
     rig.give(AUTOPILOT, position(0.0, 0.0, 0.0))
 
     assert rig.result(PILOT, region(47.1, 8.0, 0.0)) is mavlink.MAV_RESULT_TEMPORARILY_REJECTED
-    assert 'position' in of(manager_events.DemandRefused, rig.events)[0].reason
+    assert 'position' in of(manager_events.RequestRefused, rig.events)[0].reason
 
 
 # GM-22: a device without MAVLink
@@ -1098,7 +1098,7 @@ def test_commands_are_rejected_for_now_until_the_manager_is_active() -> None:
     for command in (pitch_yaw_command(1, 1), region(47.1, 8.0, 0.0)):
         assert rig.result(PILOT, command) == mavlink.MAV_RESULT_TEMPORARILY_REJECTED
     assert rig.messages(GimbalManagerStatus) == []
-    assert of(manager_events.DemandRefused, rig.events) == [manager_events.DemandRefused(
+    assert of(manager_events.RequestRefused, rig.events) == [manager_events.RequestRefused(
         PILOT, 'the manager is not active: listening')] * 2
 
 

@@ -20,7 +20,7 @@ from collections.abc import Callable
 import math
 from pathlib import Path
 
-from illuminator_ros.gimbal.manager_events import DemandRefused
+from illuminator_ros.gimbal.manager_events import RequestRefused
 from illuminator_ros.gimbal.manager_state import (
     MANAGER_TIMEOUT,
     ManagerInput,
@@ -155,7 +155,7 @@ def test_setpoints_and_offsets_end_when_the_manager_becomes_inactive() -> None:
     rig.give(OTHER, status())
     begun = rig.now
     rig.points(PILOT, 0.3)
-    [refused] = of(DemandRefused, rig.events)
+    [refused] = of(RequestRefused, rig.events)
     assert refused.reason == 'the manager is not active: inactive'
     rig.run(MANAGER_TIMEOUT + 5.0, each=rig.heartbeats(PILOT, GUEST))
 

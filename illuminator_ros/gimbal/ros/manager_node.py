@@ -197,7 +197,7 @@ class ManagerNode(ServedPayload):
             self._state_changed(event)
         elif isinstance(event, RoleHolderChanged):
             self._log.info(_control_text(event, self._manager.settings.control.lease), 'control')
-        elif isinstance(event, manager_events.DemandRefused):
+        elif isinstance(event, manager_events.RequestRefused):
             self._log.warning(f'a setpoint of {event.player} is refused: {event.reason}',
                               'refused')
         elif isinstance(event, manager_events.SetpointClipped):
