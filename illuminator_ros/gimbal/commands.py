@@ -16,8 +16,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 import math
+from typing import Generic, NamedTuple, TypeVar
 
 from .axes import LEVEL
 from .messages import GimbalManagerStatus, REMOVE_SENDER, UNCHANGED
@@ -26,6 +28,8 @@ from ..mavlink.dialect import flag_names, mavlink
 from ..mavlink.messages import Address
 from ..payload.messages import GeoPoint, GimbalDeviceAttitudeStatus
 from ..payload.mount_attitude import YawFrame
+
+S = TypeVar('S')
 
 
 @dataclass(frozen=True)
@@ -67,53 +71,45 @@ def setpoint_flags(frame: YawFrame) -> int:
 
 
 @dataclass(frozen=True)
-class Configure:
+class GimbalChange(Generic[S]):
     """
-    Takes primary control, or releases all control of this component.
+    A change of a gimbal, and its command: a :class:`~..payload.attempt.Change`.
 
-    :param us: the address of this component.
+    :param status_name: of the status that shows the change, '' if none does.
     """
 
-    us: Address
-    device_id: int
-    take: bool
+    command: int
+    params: tuple[float, ...]
+    goal: str
+    position: Position | None = None
+    status_name: str = ''
+    shown_by: Callable[[S], bool | None] = lambda status: None
+    actual: Callable[[S], str] = lambda status: ''
     note: str = ''
-    position: None = None
-    command: int = mavlink.MAV_CMD_DO_GIMBAL_MANAGER_CONFIGURE
 
-    @property
-    def params(self) -> tuple[float, ...]:
+    def evidence(self, status: S) -> str:
         """See :class:`~..payload.attempt.Change`."""
-        # The address instead of SENDER, which PX4 reads as the autopilot.
-        primary = self.us if self.take else (REMOVE_SENDER, REMOVE_SENDER)
-        secondary = UNCHANGED if self.take else REMOVE_SENDER
-        return *primary, secondary, secondary, 0, 0, self.device_id
+        return f'confirmed by {self.status_name}'
 
-    @property
-    def goal(self) -> str:
-        """See :class:`~..payload.attempt.Change`."""
-        return 'control taken' if self.take else 'control released'
 
-    def shown_by(self, status: GimbalManagerStatus) -> bool:
-        """See :class:`~..payload.attempt.Change`."""
+def configure(us: Address, device_id: int, *, take: bool) -> GimbalChange[GimbalManagerStatus]:
+    """Return the change that takes primary control, or releases all control of this component."""
+    def is_shown(status: GimbalManagerStatus) -> bool:
         control = Control.of(status)
-        return control.primary == self.us if self.take else not control.includes(self.us)
+        return control.primary == us if take else not control.includes(us)
 
-    def evidence(self, status: GimbalManagerStatus) -> str:
-        """See :class:`~..payload.attempt.Change`."""
-        return 'confirmed by GIMBAL_MANAGER_STATUS'
+    # The address instead of SENDER, which PX4 reads as the autopilot.
+    players = (*us, UNCHANGED, UNCHANGED) if take else (REMOVE_SENDER,) * 4
+    return GimbalChange(
+        mavlink.MAV_CMD_DO_GIMBAL_MANAGER_CONFIGURE, (*players, 0, 0, device_id),
+        'control taken' if take else 'control released',
+        status_name=GimbalManagerStatus.msgname, shown_by=is_shown,
+        actual=lambda status: str(Control.of(status)))
 
-    def actual(self, status: GimbalManagerStatus) -> str:
-        """See :class:`~..payload.attempt.Change`."""
-        return str(Control.of(status))
 
-
-@dataclass(frozen=True)
-class SetFlag:
+class Flag(NamedTuple):
     """
-    Sets or clears one flag of the gimbal, and leaves its angles and rates as they are.
-
-    The status of the device shows the flags; GIMBAL_MANAGER_STATUS of ArduPilot does not.
+    One flag of the gimbal, set or cleared; the status of the device shows it.
 
     :param wish: what is requested, for people.
     :param goal: the state to be reached, for people.
@@ -125,115 +121,52 @@ class SetFlag:
     flag: int
     needed: int
     is_set: bool = True
-    device_id: int = 0
-    note: str = ''
-    position: None = None
-    command: int = mavlink.MAV_CMD_DO_GIMBAL_MANAGER_PITCHYAW
 
-    @property
-    def frame(self) -> YawFrame:
-        """Return the yaw frame that the gimbal has afterwards."""
+    def change(self, device_id: int) -> GimbalChange[GimbalDeviceAttitudeStatus]:
+        """Return the change, which leaves angles and rates as they are."""
         is_locked = self.is_set and self.flag == mavlink.GIMBAL_DEVICE_FLAGS_YAW_LOCK
-        return YawFrame.EARTH if is_locked else YawFrame.VEHICLE
-
-    @property
-    def params(self) -> tuple[float, ...]:
-        """See :class:`~..payload.attempt.Change`."""
-        flags = setpoint_flags(self.frame) | (self.flag if self.is_set else 0)
-        return *(math.nan,) * 4, flags, 0, self.device_id
-
-    def shown_by(self, status: GimbalDeviceAttitudeStatus) -> bool:
-        """See :class:`~..payload.attempt.Change`."""
-        return bool(status.flags & self.flag) is self.is_set
-
-    def evidence(self, status: GimbalDeviceAttitudeStatus) -> str:
-        """See :class:`~..payload.attempt.Change`."""
-        return 'confirmed by GIMBAL_DEVICE_ATTITUDE_STATUS'
-
-    def actual(self, status: GimbalDeviceAttitudeStatus) -> str:
-        """See :class:`~..payload.attempt.Change`."""
-        return ', '.join(flag_names('GIMBAL_DEVICE_FLAGS', status.flags)) or 'no flags'
+        flags = setpoint_flags(YawFrame.EARTH if is_locked else YawFrame.VEHICLE)
+        return GimbalChange(
+            mavlink.MAV_CMD_DO_GIMBAL_MANAGER_PITCHYAW,
+            (*(math.nan,) * 4, flags | (self.flag if self.is_set else 0), 0, device_id), self.goal,
+            status_name=GimbalDeviceAttitudeStatus.msgname,
+            shown_by=lambda status: bool(status.flags & self.flag) is self.is_set,
+            actual=lambda status: ', '.join(
+                flag_names('GIMBAL_DEVICE_FLAGS', status.flags)) or 'no flags')
 
 
-NEUTRAL = SetFlag('turn to neutral', 'neutral position', mavlink.GIMBAL_DEVICE_FLAGS_NEUTRAL,
-                  mavlink.GIMBAL_DEVICE_CAP_FLAGS_HAS_NEUTRAL)
-RETRACT = SetFlag('retract', 'retracted', mavlink.GIMBAL_DEVICE_FLAGS_RETRACT,
-                  mavlink.GIMBAL_DEVICE_CAP_FLAGS_HAS_RETRACT)
+NEUTRAL = Flag('turn to neutral', 'neutral position', mavlink.GIMBAL_DEVICE_FLAGS_NEUTRAL,
+               mavlink.GIMBAL_DEVICE_CAP_FLAGS_HAS_NEUTRAL)
+RETRACT = Flag('retract', 'retracted', mavlink.GIMBAL_DEVICE_FLAGS_RETRACT,
+               mavlink.GIMBAL_DEVICE_CAP_FLAGS_HAS_RETRACT)
 YAW_LOCKS = {
-    True: SetFlag('lock yaw', 'yaw locked', mavlink.GIMBAL_DEVICE_FLAGS_YAW_LOCK,
-                  mavlink.GIMBAL_DEVICE_CAP_FLAGS_HAS_YAW_LOCK),
-    False: SetFlag('unlock yaw', 'yaw follows the vehicle', mavlink.GIMBAL_DEVICE_FLAGS_YAW_LOCK,
-                   0, is_set=False)}
+    True: Flag('lock yaw', 'yaw locked', mavlink.GIMBAL_DEVICE_FLAGS_YAW_LOCK,
+               mavlink.GIMBAL_DEVICE_CAP_FLAGS_HAS_YAW_LOCK),
+    False: Flag('unlock yaw', 'yaw follows the vehicle', mavlink.GIMBAL_DEVICE_FLAGS_YAW_LOCK,
+                0, is_set=False)}
 
 
-class _Unconfirmed:
-    """A change that no status shows."""
-
-    note = ''
-
-    def shown_by(self, status: None) -> None:
-        """See :class:`~..payload.attempt.Change`."""
-
-    def evidence(self, status: None) -> str:
-        """See :class:`~..payload.attempt.Change`."""
-        return ''
-
-    def actual(self, status: None) -> str:
-        """See :class:`~..payload.attempt.Change`."""
-        return ''
-
-
-@dataclass(frozen=True)
-class Stop(_Unconfirmed):
+def stop(flags: int, device_id: int) -> GimbalChange[None]:
     """
-    Stops the gimbal where it points: unlike a setpoint of zero rates, it is acknowledged.
+    Return the change that stops the gimbal: unlike a setpoint of zero rates, it is acknowledged.
 
     :param flags: as in the setpoint.
     """
-
-    flags: int
-    device_id: int
-    goal: str = 'stopped'
-    position: None = None
-    command: int = mavlink.MAV_CMD_DO_GIMBAL_MANAGER_PITCHYAW
-
-    @property
-    def params(self) -> tuple[float, ...]:
-        """See :class:`~..payload.attempt.Change`."""
-        return math.nan, math.nan, 0.0, 0.0, self.flags, 0.0, self.device_id
+    return GimbalChange(mavlink.MAV_CMD_DO_GIMBAL_MANAGER_PITCHYAW,
+                        (math.nan, math.nan, 0.0, 0.0, flags, 0.0, device_id), 'stopped')
 
 
-@dataclass(frozen=True)
-class Point(_Unconfirmed):
+def point(device_id: int, place: GeoPoint | None) -> GimbalChange[None]:
     """
-    Points the gimbal at a place, or at none.
+    Return the change that points the gimbal at a place, or at none.
 
     :param place: with its altitude above mean sea level.
     """
-
-    device_id: int
-    place: GeoPoint | None
-
-    @property
-    def command(self) -> int:
-        """See :class:`~..payload.attempt.Change`."""
-        return (mavlink.MAV_CMD_DO_SET_ROI_LOCATION if self.place
-                else mavlink.MAV_CMD_DO_SET_ROI_NONE)
-
-    @property
-    def params(self) -> tuple[float, ...]:
-        """See :class:`~..payload.attempt.Change`."""
-        return (float(self.device_id),)
-
-    @property
-    def position(self) -> Position | None:
-        """See :class:`~..payload.attempt.Change`."""
-        return self.place and Position(MAV_FRAME_GLOBAL, *self.place)
-
-    @property
-    def goal(self) -> str:
-        """See :class:`~..payload.attempt.Change`."""
-        if self.place is None:
-            return 'point at no place'
-        latitude, longitude, altitude = self.place
-        return f'point at {latitude:.7g}, {longitude:.7g}, {altitude:.4g} m'
+    if place is None:
+        return GimbalChange(
+            mavlink.MAV_CMD_DO_SET_ROI_NONE, (float(device_id),), 'point at no place')
+    latitude, longitude, altitude = place
+    return GimbalChange(
+        mavlink.MAV_CMD_DO_SET_ROI_LOCATION, (float(device_id),),
+        f'point at {latitude:.7g}, {longitude:.7g}, {altitude:.4g} m',
+        Position(MAV_FRAME_GLOBAL, *place))

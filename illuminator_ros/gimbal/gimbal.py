@@ -17,13 +17,14 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Collection
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 import math
+from typing import TypeVar
 
 from . import events
 from . import messages as gimbal
 from .axes import Ranges, read_ranges
-from .commands import NEUTRAL, Point, RETRACT, SetFlag, setpoint_flags, YAW_LOCKS
+from .commands import Flag, GimbalChange, NEUTRAL, point, RETRACT, setpoint_flags, YAW_LOCKS
 from .gimbal_control import GimbalControl, REQUEST_LIMIT
 from .remote_managers import (
     is_late,
@@ -42,8 +43,10 @@ from ..payload.attempt import Done, Result
 from ..payload.command_sources import Sources, SourceSettings
 from ..payload.messages import GeoPoint, GimbalDeviceAttitudeStatus
 from ..payload.mount_attitude import Components, MountAttitude, YawFrame
-from ..payload.reconciler import Desired
+from ..payload.reconciler import Desired, Reconciler
 from ..payload.rotation import Quaternion, Vector
+
+S = TypeVar('S')
 
 
 @dataclass(frozen=True)
@@ -413,16 +416,21 @@ class Gimbal:
         """Hold the yaw against the earth, or let it follow the vehicle (GM-3)."""
         self._set_flag(YAW_LOCKS[lock], now, done)
 
-    def _set_flag(self, change: SetFlag, now: float, done: Done) -> None:
+    def _set_flag(self, flag: Flag, now: float, done: Done) -> None:
         self._begin(now)
-        if reason := self.unavailable(now) or self._missing(change.needed):
+        if reason := self.unavailable(now) or self._missing(flag.needed):
             done(Result(False, reason), now)
             return
-        ended = self._setpoints.suspend(now, done)
-        self._manager.place_changes.cancel(f'superseded by {change.goal}', now, superseded=True)
-        self._manager.pose_changes.want(Desired(
-            replace(change, device_id=self.key.device_id), since=now, limit=REQUEST_LIMIT),
-            now, self._explained(change.wish, ended))
+        self._end_place_changes(flag.goal, now)
+        self._request(self._manager.pose_changes, flag.change(self.key.device_id), flag.wish, now,
+                      self._setpoints.suspend(now, done))
+
+    def _request(
+        self, changes: Reconciler[S], change: GimbalChange[S], wish: str, now: float, done: Done,
+        *, is_stream: bool = False,
+    ) -> None:
+        changes.want(Desired(change, since=now, limit=REQUEST_LIMIT), now,
+                     self._explained(wish, done), is_stream=is_stream)
 
     def _capabilities(self) -> int | None:
         information = self._manager.information
@@ -460,12 +468,10 @@ class Gimbal:
         if reason := self.unavailable(now):
             done(Result(False, reason), now)
             return
-        change = Point(self.key.device_id, place)
-        ended = self._setpoints.suspend(now, done, is_place=place is not None)
-
-        self._manager.place_changes.want(
-            Desired(change, since=now, limit=REQUEST_LIMIT), now,
-            self._explained(change.goal, ended), is_stream=is_stream)
+        change = point(self.key.device_id, place)
+        self._request(
+            self._manager.place_changes, change, change.goal, now,
+            self._setpoints.suspend(now, done, is_place=place is not None), is_stream=is_stream)
 
     # Setpoints
 
@@ -482,7 +488,7 @@ class Gimbal:
             mavlink.GIMBAL_DEVICE_CAP_FLAGS_SUPPORTS_YAW_IN_EARTH_FRAME,
         ) if frame is YawFrame.EARTH else '')
         if not reason:
-            self._end_place_changes(now)
+            self._end_place_changes('a setpoint', now)
             self._setpoints.set_attitude(rotation, frame, now)
         return reason
 
@@ -516,7 +522,7 @@ class Gimbal:
         """
         reason = self._begin_setpoint(now)
         if not reason:
-            self._end_place_changes(now)
+            self._end_place_changes('a setpoint', now)
             self._setpoints.set_rates(rates, now)
         return reason
 
@@ -524,9 +530,9 @@ class Gimbal:
         self._begin(now)
         return self.unavailable(now)
 
-    def _end_place_changes(self, now: float) -> None:
-        """Send no place again, which would undo a later setpoint."""
-        self._manager.place_changes.cancel('superseded by a setpoint', now, superseded=True)
+    def _end_place_changes(self, newer: str, now: float) -> None:
+        """Send no place again, which would undo a later setpoint or request."""
+        self._manager.place_changes.cancel(f'superseded by {newer}', now, superseded=True)
 
     def _message(
         self, frame: YawFrame, q: Components, rates: Vector,

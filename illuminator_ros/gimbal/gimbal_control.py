@@ -19,7 +19,7 @@ from __future__ import annotations
 from collections.abc import Callable
 
 from . import events
-from .commands import Configure, Control
+from .commands import configure, Control
 from .remote_managers import RemoteManager
 from ..mavlink.messages import Address
 from ..payload.attempt import Done, Result
@@ -97,5 +97,5 @@ class GimbalControl:
             return
         self._may_have_it |= take
         manager.control_changes.want(Desired(
-            Configure(self._us, self._key.device_id, take), since=now, limit=REQUEST_LIMIT),
+            configure(self._us, self._key.device_id, take=take), since=now, limit=REQUEST_LIMIT),
             now, ended)

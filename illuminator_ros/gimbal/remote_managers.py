@@ -22,14 +22,14 @@ import math
 from typing import Any
 
 from . import events
-from .commands import Configure, Control, SetFlag, Stop
-from .messages import GimbalManagerInformation, GimbalManagerStatus
+from .commands import Control, stop
+from .messages import GimbalManagerInformation, GimbalManagerStatus, REMOVE_SENDER
 from ..mavlink.command_sender import CommandSender, format_seconds
 from ..mavlink.dialect import mavlink
 from ..mavlink.messages import Address
 from ..payload.attempt import Result, StatusReport, Target
 from ..payload.messages import GimbalDeviceAttitudeStatus
-from ..payload.mount_attitude import YawFrame
+from ..payload.mount_attitude import yaw_frame, YawFrame
 from ..payload.reconciler import Desired, Reconciler
 
 # s of silence after which a manager or a device is lost.
@@ -122,9 +122,9 @@ class RemoteManager:
     def pose_frame(self) -> tuple[YawFrame | None, float]:
         """Return the yaw frame of the request for a pose, None for none; since when, s."""
         desired = self.pose_changes.desired
-        if desired is None or not isinstance(desired.change, SetFlag):
+        if desired is None:
             return None, -math.inf
-        return desired.change.frame, desired.since
+        return yaw_frame(int(desired.change.params[4])), desired.since
 
     @property
     def enforces_control(self) -> bool:
@@ -170,8 +170,7 @@ class RemoteManager:
     @property
     def is_releasing(self) -> bool:
         """Whether a release of control is under way."""
-        return self.control_changes.may_set(
-            lambda change: isinstance(change, Configure) and not change.take)
+        return self.control_changes.may_set(lambda change: change.params[0] == REMOVE_SENDER)
 
     def stop(self, flags: int, device_id: int, now: float, stopped: Callable[[], None]) -> None:
         """
@@ -184,7 +183,7 @@ class RemoteManager:
                 stopped()
 
         self._stops.want(
-            Desired(Stop(flags, device_id), since=now, limit=STOP_LIMIT), now, ended)
+            Desired(stop(flags, device_id), since=now, limit=STOP_LIMIT), now, ended)
 
     def cancel_moves(self, message: str, now: float, *, superseded: bool = False) -> None:
         """End the requests that may turn the gimbal."""
