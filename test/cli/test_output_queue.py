@@ -1,0 +1,56 @@
+# Copyright 2026 The illuminator_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""The queue between a descriptor and a reader that stops reading."""
+
+import os
+import select
+
+from illuminator_ros.cli.output_queue import OutputQueue, QUEUE_SIZE
+from support.waiting import eventually, PATIENCE
+
+LINE = b'x' * 4095 + b'\n'
+
+
+def test_lines_that_do_not_fit_into_the_queue_are_dropped_and_counted() -> None:
+    reading, writing = os.pipe()
+    queue = OutputQueue(writing)
+    sent = 3 * QUEUE_SIZE // len(LINE)
+    for _ in range(sent):
+        assert select.select([], [writing], [], PATIENCE)[1]
+        os.write(writing, LINE)
+    with open(reading, 'rb') as reader:
+        written = [reader.readline() for _ in range(sent // 4)]
+        os.write(writing, b'at last\n')
+        while written[-1] != b'at last\n':
+            written.append(reader.readline())
+        [note] = {*written} - {LINE, b'at last\n', b'\n'}
+        lost = sent - written.count(LINE)
+        assert lost > 0
+        assert note == f'[{lost} lines were dropped while nothing read them]\n'.encode()
+        queue.finish(PATIENCE)
+
+
+def test_a_write_fails_once_the_reader_is_gone_as_without_a_queue() -> None:
+    reading, writing = os.pipe()
+    OutputQueue(writing)
+    os.close(reading)
+
+    def fails() -> bool:
+        try:
+            return os.write(writing, LINE) < 0
+        except BrokenPipeError:
+            return True
+
+    eventually(fails)
