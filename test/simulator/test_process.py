@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""The simulator as a process: blocked, closed or full output, or another encoding."""
+"""The simulator as a process: its terminal, input and output, also blocked or closed."""
 
 from collections.abc import Callable
 import contextlib
@@ -25,7 +25,8 @@ import pytest
 from support.fork_server import prepare_child
 from support.live_link import Bridge
 from support.ports import free_port
-from support.processes import ended, environment, python, ROOT
+from support.processes import ended, environment, python, ROOT, run
+from support.terminals import Terminal
 from support.waiting import eventually, PATIENCE
 
 SIMULATOR = [sys.executable, '-m', 'illuminator_ros.simulator']
@@ -70,10 +71,50 @@ def test_lights_are_served_while_standard_streams_are_closed(closed: str) -> Non
     assert_served('sh', '-c', command, stdout=None, stderr=None)
 
 
-def test_a_name_that_the_encoding_of_the_output_lacks_is_escaped() -> None:
-    with ended(python('illuminator_ros.simulator', f'udpout://127.0.0.1:{free_port()}',
-                      '--light', '1/243=Größe', env={'PYTHONIOENCODING': 'ascii'})) as program:
-        program.wait_for(r'1/243 Gr\xf6\xdfe')
+@pytest.fixture
+def url() -> str:
+    return f'udpin://127.0.0.1:{free_port()}'
+
+
+@pytest.mark.parametrize(('term', 'escapes'), [('xterm', True), ('dumb', False)])
+def test_a_simulator_on_a_terminal_takes_commands_and_escapes_only_where_they_work(
+        url: str, term: str, escapes: bool) -> None:
+    with Terminal('illuminator_ros.simulator', url, '--light', '1/7=bow',
+                  env={'TERM': term}) as screen:
+        screen.wait_for('1/7 bow +off')
+        screen.type('bow on\n')
+        screen.wait_for('ON ')
+        screen.type('quit\n')
+        assert screen.wait() == 0
+    assert ('\x1b' in screen.raw) is escapes
+
+
+def test_a_simulator_on_a_pipe_takes_commands_and_prints_plain_text(url: str) -> None:
+    ended = run('illuminator_ros.simulator', url,
+                typed='on\nbrightness 40\nfault nope\nstatus\nquit\n')
+
+    assert ended.returncode == 0
+    assert "no fault 'nope'" in ended.stdout
+    assert 'ON      40 %' in ended.stdout
+    assert '\x1b' not in ended.stdout
+
+
+def test_text_that_the_encoding_lacks_is_escaped_in_output_and_replaced_in_input(
+        url: str) -> None:
+    ended = run('illuminator_ros.simulator', url, '--light', '1/243=Größe',
+                env={'PYTHONIOENCODING': 'ascii:strict'}, typed='Größe on\nquit\n')
+
+    assert ended.returncode == 0
+    assert r'1/243 Gr\xf6\xdfe' in ended.stdout
+    assert 'no command or component' in ended.stdout
+
+
+def test_a_simulator_whose_input_has_ended_runs_until_a_signal(url: str) -> None:
+    simulator = python('illuminator_ros.simulator', url)
+    simulator.wait_for('link open')
+
+    assert simulator.running
+    assert simulator.end() == 0
 
 
 def test_the_first_message_of_a_peer_is_one_line() -> None:

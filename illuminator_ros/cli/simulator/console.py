@@ -16,16 +16,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
-from functools import partial
+from collections.abc import Iterable, Sequence
 from typing import Any
 
 from .view import ComponentSnapshot
-from ...payload.simulated import ConsoleCommand, Effect, SimulatedComponent, SimulatedDevice
+from ...payload.simulated import ConsoleCommand, SimulatedComponent, SimulatedDevice
 
 Component = SimulatedComponent[SimulatedDevice]
-# Executes a command with its arguments at a time, and returns the answer.
-Execute = Callable[[list[str], float], str | None]
 
 
 def _fault(component: Component, words: list[str], now: float) -> None:
@@ -69,14 +66,19 @@ def describe_commands(devices: Iterable[type[SimulatedDevice]]) -> str:
     return '\n'.join(f'  {usage:20} {text}' for usage, text in rows.items())
 
 
-def _bound(component: Component) -> dict[str, tuple[ConsoleCommand[Any, Any], Execute]]:
-    """Return the commands of a component by name, each with the function that executes it."""
-    def apply(command: ConsoleCommand[object, Effect], words: list[str], now: float) -> None:
-        component.apply(command.do(component.device, words, now), now)
+def _commands(component: Component) -> dict[str, ConsoleCommand[Any, Any]]:
+    return {one.name: one for one in (*component.device.commands, *COMMANDS)}
 
-    return {
-        **{one.name: (one, partial(apply, one)) for one in component.device.commands},
-        **{one.name: (one, partial(one.do, component)) for one in COMMANDS}}
+
+def _execute(
+    component: Component, command: ConsoleCommand[Any, Any], words: list[str], now: float,
+) -> str | None:
+    """Execute a command of a component, and return the answer."""
+    if command in COMMANDS:
+        answer: str | None = command.do(component, words, now)
+        return answer
+    component.apply(command.do(component.device, words, now), now)
+    return None
 
 
 def execute(line: str, components: Sequence[Component], now: float) -> str:
@@ -88,33 +90,25 @@ def execute(line: str, components: Sequence[Component], now: float) -> str:
     words = line.split()
     if not words:
         return ''
-    devices = dict.fromkeys(type(one.device) for one in components)
-    bound = [_bound(one) for one in components]
-    known = {name for commands in bound for name in commands}
-    selected = [commands for one, commands in zip(components, bound, strict=True)
-                if words[0] in (str(one.address), one.name)]
-    if words[0] in ('all', '*') or (selected and words[0] not in known):
+    known = {name for one in components for name in _commands(one)}
+    selected = [one for one in components if words[0] in (str(one.address), one.name)]
+    if selected and words[0] not in known:
         words = words[1:] or ['status']
     else:
-        selected = []
+        selected = list(components)
     name, *rest = words
     if name == 'help':
+        devices = dict.fromkeys(type(one.device) for one in components)
         faults = '\n'.join(device.faults.describe() for device in devices)
         return f'{describe_commands(devices)}\nfaults:\n{faults}'
-    # The option --fault has another syntax for a component than the console.
-    component, colon, fault = words[-1].rpartition(':')
-    if colon and words[:-1] in ([], ['fault'], ['--fault']):
-        return f'for one component: {component} fault {fault}'
-    # A fault in the syntax of --help is a command, too.
-    if name not in known and any(name.partition('=')[0] in one.faults for one in devices):
-        name, rest = 'fault', [name, *rest]
-    targets = [commands[name] for commands in selected or bound if name in commands]
+    targets = [(one, command) for one in selected if (command := _commands(one).get(name))]
     if not targets:
         return f'no command or component {name!r}; help lists the commands'
-    if len(rest) not in targets[0][0].counts:
-        return f'usage: {targets[0][0].usage}'
+    _, command = targets[0]
+    if len(rest) not in command.counts:
+        return f'usage: {command.usage}'
     try:
-        answers = [do(rest, now) for _, do in targets]
+        answers = [_execute(*one, rest, now) for one in targets]
     except ValueError as error:
         return str(error)
     return '\n'.join(filter(None, answers)) or 'done'

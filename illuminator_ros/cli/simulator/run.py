@@ -21,6 +21,7 @@ from collections import Counter
 from collections.abc import Iterable, Mapping
 import contextlib
 import functools
+import io
 import logging
 import os
 import queue
@@ -111,16 +112,12 @@ class _Simulation:
 
     def _listen(self) -> None:
         """Execute the lines of standard input, until its end."""
-        while sys.stdin:
-            try:
-                line = sys.stdin.readline()
-            except UnicodeDecodeError:
-                continue
-            except (OSError, ValueError):
-                return
-            if not line:
-                return
-            self._link.call(functools.partial(self._execute, line.rstrip('\n')))
+        if isinstance(sys.stdin, io.TextIOWrapper):
+            sys.stdin.reconfigure(errors='replace')
+            # For example, a terminal that hangs up.
+            with contextlib.suppress(OSError):
+                for line in sys.stdin:
+                    self._link.call(functools.partial(self._execute, line.rstrip('\n')))
 
     def _execute(self, line: str, now: float) -> None:
         if line.strip() == 'quit':
