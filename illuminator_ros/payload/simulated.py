@@ -62,7 +62,7 @@ Reply = CommandReply | None
 
 class Snapshot(NamedTuple):
     """
-    The state of a simulated device at a moment, for people.
+    The state of a simulated device or component at a moment, for people.
 
     :param text: one line.
     :param state: differs between two snapshots if the second gets a line of its own.
@@ -72,6 +72,10 @@ class Snapshot(NamedTuple):
     text: str
     state: tuple[object, ...]
     drift: float = 0.0
+
+    def differs(self, other: Snapshot | None) -> bool:
+        """Return whether it differs enough from the last shown one for a line of its own."""
+        return other is None or self.state != other.state or abs(self.drift - other.drift) >= 1
 
 
 @dataclass(frozen=True)
@@ -502,6 +506,14 @@ class SimulatedComponent(Generic[D]):
 
     def _transmit(self, message: Message, now: float) -> None:
         self.outgoing.append((self.device.source(message, self.address), message))
+
+    def snapshot(self, now: float) -> Snapshot:
+        """Return the actual state of the device, with the names of component and faults."""
+        name = f'{self.address} {self.device.properties.name}'.rstrip()
+        faults = self.device.faults.active(self.behaviour, self.device.normal)
+        device = self.device.snapshot(now)
+        text = f'{name:12}  {device.text}' + (f'  [{", ".join(faults)}]' if faults else '')
+        return Snapshot(text, (name, *faults, *device.state), device.drift)
 
     def link_opened(self, now: float) -> None:
         """See :meth:`Endpoint.link_opened`; send a heartbeat at once for the new peer."""

@@ -21,12 +21,12 @@ https://micasense.github.io/rededge-api/api/serial.html
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, fields
 from enum import Enum
 from functools import partial
 import math
-from typing import Any, Generic, TypeVar
+from typing import Any, NamedTuple
 
 from . import messages as rededge
 from ..mavlink.dialect import mavlink, raw, replaced
@@ -55,9 +55,6 @@ UNKNOWN = 0xFFFF
 UNKNOWN_SATELLITES = 0xFF
 # The camera's axes in the vehicle's FRD axes at a mount of 0/0/0: x down, y right, z back.
 _DOWN = Quaternion.from_euler(0.0, -math.pi / 2, 0.0)
-
-M = TypeVar('M')
-
 
 class Source(Enum):
     """The source of a value of an image."""
@@ -127,12 +124,17 @@ class ExtendedCameraFeedback(rededge.CameraFeedback):
     mavlink_1_size = rededge.CameraFeedback.unpacker.size
 
 
-@dataclass(frozen=True, slots=True)
-class Injected(Generic[M]):
+class Injected(NamedTuple):
     """A message of the host, and when it was received, s."""
 
-    message: M
+    message: Any
     at: float
+
+
+# The states that a message of the host gives.
+INJECTED: Mapping[type[Message], Sequence[str]] = {
+    rededge.GpsRawInt: ('position', 'time'), GlobalPositionInt: ('position',),
+    SystemTime: ('time',), Attitude: ('attitude',), rededge.MountStatus: ('mount',)}
 
 
 # The type of dataclasses.field() cannot be named.
@@ -192,6 +194,12 @@ def _text(value: object, spec: str) -> str:
     if isinstance(value, Source):
         return value.value
     return format(value, spec)
+
+
+def _utc(message: rededge.GpsRawInt | SystemTime) -> float:
+    """Return the time in a message, s since 1970."""
+    return (message.time_usec if isinstance(message, rededge.GpsRawInt)
+            else message.time_unix_usec) / 1e6
 
 
 def _hundredths(value: int) -> float | None:
@@ -339,10 +347,8 @@ class SimulatedRedEdge(simulated.SimulatedDevice):
     def restart(self, now: float) -> None:
         """See :meth:`SimulatedDevice.restart`; its own GPS has a fix at once."""
         self._count = self._index = 0
-        self._position: Injected[rededge.GpsRawInt | GlobalPositionInt] | None = None
-        self._time: Injected[float] | None = None
-        self._attitude: Injected[Attitude] | None = None
-        self._mount: Injected[rededge.MountStatus] | None = None
+        # By state.
+        self._injected: dict[str, Injected] = {}
         self._ground: float | None = None
         # The feedback of images, with its time.
         self._pending: deque[tuple[float, rededge.CameraFeedback]] = deque(maxlen=MAX_IMAGES)
@@ -382,8 +388,9 @@ class SimulatedRedEdge(simulated.SimulatedDevice):
             is_known = (firmware >= rededge.PARAMETERS
                         and raw(message, 'param_id').rstrip(b'\0') == rededge.VERSION_PARAMETER)
             return (firmware.value(),) if is_known else ()
-        if self.behaviour.injectable:
-            self._inject(message, now)
+        if self.behaviour.injectable and (not isinstance(message, Attitude) or is_finite(message)):
+            self._injected |= {
+                state: Injected(message, now) for state in INJECTED.get(type(message), ())}
         return ()
 
     def _answer(self, source: Address, ping: rededge.Ping) -> Iterable[Message]:
@@ -392,18 +399,6 @@ class SimulatedRedEdge(simulated.SimulatedDevice):
         target = source if self.behaviour.ping_target else Address(0, 0)
         yield replaced(ping, seq=(ping.seq + self.behaviour.ping_sequence) & 0xFFFFFFFF,
                        target_system=target.system, target_component=target.component)
-
-    def _inject(self, message: Message, now: float) -> None:
-        if isinstance(message, rededge.GpsRawInt | GlobalPositionInt):
-            self._position = Injected(message, now)
-        if isinstance(message, rededge.GpsRawInt):
-            self._time = Injected(message.time_usec / 1e6, now)
-        elif isinstance(message, SystemTime):
-            self._time = Injected(message.time_unix_usec / 1e6, now)
-        elif isinstance(message, Attitude) and is_finite(message):
-            self._attitude = Injected(message, now)
-        elif isinstance(message, rededge.MountStatus):
-            self._mount = Injected(message, now)
 
     def _control(
         self, source: Address, control: rededge.DigicamControl, now: float,
@@ -433,47 +428,43 @@ class SimulatedRedEdge(simulated.SimulatedDevice):
         """
         self._count += 1
         time_utc, time_source = self._clock(now)
-        position, attitude, mount = (
-            self._fresh(self._position, now), self._fresh(self._attitude, now),
-            self._fresh(self._mount, now))
+        fresh = {state: self._fresh(state, now) for state in ('position', 'attitude', 'mount')}
+        position, attitude, mount = (one and one.message for one in fresh.values())
         image = Image(**{
             **dict.fromkeys(COLUMNS),
-            **(_position(position.message) if position else _own_position(self.own_gps)),
-            **_orientation(attitude.message if attitude else None,
-                           mount.message if mount else None),
+            **(_position(position) if position else _own_position(self.own_gps)),
+            **_orientation(attitude, mount),
             'camera': self.properties.address.component, 'image': self._count,
             'shot': shot.name.lower(), 'trigger': trigger,
             'img_idx': self._index if trigger == 'mavlink' else None,
             'time_utc_s': time_utc, 'time_source': time_source,
-            'position_source': Source.INJECTED if position else self._own_source,
-            'position_age_s': position and now - position.at,
-            'attitude_source': Source.INJECTED if attitude else Source.NONE,
-            'attitude_age_s': attitude and now - attitude.at,
-            'mount_source': Source.INJECTED if mount else Source.NONE,
-            'mount_age_s': mount and now - mount.at})
+            **{f'{state}_source': self._source(state, now) for state in fresh},
+            **{f'{state}_age_s': one and now - one.at for state, one in fresh.items()}})
         if self._ground is None:
             self._ground = image.altitude_m
         self.images.append(image)
         self.records.emit(image.row())
         return image
 
-    @property
-    def _own_source(self) -> Source:
-        return Source.OWN if self.own_gps else Source.NONE
+    def _fresh(self, state: str, now: float) -> Injected | None:
+        """Return the message with a state of the host, None if there is none, or it is old."""
+        one = self._injected.get(state)
+        expired = one and self.behaviour.expires and now - one.at > self.properties.validity
+        return None if expired else one
 
-    def _fresh(self, injected: Injected[M] | None, now: float) -> Injected[M] | None:
-        expired = injected and self.behaviour.expires and (
-            now - injected.at > self.properties.validity)
-        return None if expired else injected
+    def _source(self, state: str, now: float) -> Source:
+        if self._fresh(state, now):
+            return Source.INJECTED
+        has_own = self.own_gps and state in ('position', 'time')
+        return Source.OWN if has_own else Source.NONE
 
     def _clock(self, now: float) -> tuple[float, Source]:
         """Return the time by the camera's clock, s since 1970, and its source."""
-        if time := self._fresh(self._time, now):
-            return time.message + now - time.at, Source.INJECTED
-        if self.own_gps:
-            return self._epoch + now, Source.OWN
+        source, injected = self._source('time', now), self._injected.get('time')
+        if source is Source.OWN:
+            return self._epoch + now, source
         # A clock that was set once keeps running.
-        return (self._time.message + now - self._time.at if self._time else now), Source.NONE
+        return (_utc(injected.message) + now - injected.at if injected else now), source
 
     def _feedback(self, image: Image, system: int) -> rededge.CameraFeedback:
         kind = ExtendedCameraFeedback if self.behaviour.extension else rededge.CameraFeedback
@@ -504,14 +495,10 @@ class SimulatedRedEdge(simulated.SimulatedDevice):
 
     def snapshot(self, now: float) -> simulated.Snapshot:
         """See :meth:`SimulatedDevice.snapshot`."""
-        injected: tuple[tuple[str, Injected[Any] | None, Source], ...] = (
-            ('position', self._position, self._own_source),
-            ('attitude', self._attitude, Source.NONE), ('mount', self._mount, Source.NONE))
         count = f'{self._count:4} image{"s" if self._count != 1 else " "}'
-        state = (count, f'time {self._clock(now)[1].value}', *(
-            f'{name} {(Source.INJECTED if self._fresh(one, now) else other).value}'
-            for name, one, other in injected))
-        return simulated.Snapshot('  '.join(state), state)
+        shown = (count, *(f'{state} {self._source(state, now).value}'
+                          for state in ('time', 'position', 'attitude', 'mount')))
+        return simulated.Snapshot('  '.join(shown), shown)
 
 
 def _microseconds(seconds: float) -> int:

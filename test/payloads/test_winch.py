@@ -20,7 +20,6 @@ from illuminator_ros.cli.payloads import PAYLOADS
 from illuminator_ros.cli.simulator.components import components, Scenario, scenario
 from illuminator_ros.cli.simulator.console import execute
 from illuminator_ros.cli.simulator.options import parser, payload_types
-from illuminator_ros.cli.simulator.view import ComponentSnapshot
 from illuminator_ros.illuminator.client import IlluminatorClient
 from illuminator_ros.illuminator.light import Settings
 from illuminator_ros.mavlink.command_sender import CommandSender
@@ -136,7 +135,7 @@ def test_the_console_gives_each_command_to_the_components_that_have_it() -> None
     devices = simulated('--light', '1/9=bow', '--winch', '1/8=deck').components
     assert execute('on', devices, 0.0) == 'done'
     assert 'no command' in execute('deck on', devices, 0.0)
-    assert [str(ComponentSnapshot.of(one, 0.0)).split()[:3] for one in devices] == [
+    assert [one.snapshot(0.0).text.split()[:3] for one in devices] == [
         ['1/9', 'bow', 'ON'], ['1/8', 'deck', '0.0']]
 
 

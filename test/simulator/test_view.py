@@ -20,7 +20,7 @@ import re
 import shutil
 from typing import Any
 
-from illuminator_ros.cli.simulator.view import ComponentSnapshot, LiveView, PlainView
+from illuminator_ros.cli.simulator.view import LiveView, PlainView
 from illuminator_ros.illuminator.simulated import SimulatedIlluminator
 from illuminator_ros.illuminator.simulated_properties import (
     FAULTS,
@@ -85,7 +85,7 @@ def terminal(monkeypatch: pytest.MonkeyPatch) -> Terminal:
 @pytest.fixture
 def live(terminal: Terminal, device: Light) -> LiveView:
     view = LiveView(terminal)
-    view.show([ComponentSnapshot.of(device, 0.0)])
+    view.show([device.snapshot(0.0)])
     return view
 
 
@@ -94,11 +94,11 @@ def test_a_line_has_the_actual_state_the_flags_and_the_faults(device: Light) -> 
           mode='external_sync')
     device.device.heat_to(85.0, 0.0)
     device.behave(FAULTS.add(device.behaviour, 'drop'), 0.0)
-    assert re.split(r'  +', str(ComponentSnapshot.of(device, 0.1))) == [
+    assert re.split(r'  +', device.snapshot(0.1).text) == [
         '1/243 bow', 'ON', '30 %', 'strobe 0.5 s, 25 %', '85.0 degC', 'external_sync',
         'thermal throttling', '[drop]']
     device.behave(FAULTS.add(IlluminatorBehaviour(), 'thermistor'), 0.0)
-    assert '85.0 degC' in str(ComponentSnapshot.of(device, 0.1))
+    assert '85.0 degC' in device.snapshot(0.1).text
 
 
 def test_a_plain_line_is_written_when_the_state_changes(device: Light) -> None:
@@ -106,7 +106,7 @@ def test_a_plain_line_is_written_when_the_state_changes(device: Light) -> None:
     view = PlainView(stream)
     for enabled in (False, False, True, True):
         press(device, 0.0, enabled=enabled)
-        view.show([ComponentSnapshot.of(device, 0.0)])
+        view.show([device.snapshot(0.0)])
     view.say('')
     off, on = stream.getvalue().splitlines()
     assert ('off' in off, 'ON' in on, '\x1b' in stream.getvalue()) == (True, True, False)
@@ -116,12 +116,12 @@ def test_the_live_view_updates_the_line_and_keeps_what_is_typed(
         device: Light, terminal: Terminal, live: LiveView) -> None:
     terminal.write('brightn')
     device.device.heat_to(50.0, 0.0)
-    live.show([ComponentSnapshot.of(device, 0.0)])
+    live.show([device.snapshot(0.0)])
     terminal.write('ess')
     line, prompt = terminal.screen()
     assert ('50.0 degC' in line, prompt) == (True, '> brightness')
     before = terminal.getvalue()
-    live.show([ComponentSnapshot.of(device, 0.0)])
+    live.show([device.snapshot(0.0)])
     assert terminal.getvalue() == before
 
 
@@ -140,11 +140,11 @@ def test_the_live_view_fits_the_terminal(device: Light, terminal: Terminal) -> N
     press(device, 0.0, enabled=True)
     device.device.heat_to(85.0, 0.0)
     lights = [device, *(simulated(address=Address(1, n)) for n in range(1, 20))]
-    LiveView(terminal).show([ComponentSnapshot.of(one, 0.0) for one in lights])
+    LiveView(terminal).show([one.snapshot(0.0) for one in lights])
     screen = terminal.screen()
     assert screen[0].endswith('  thermal throttling')
     assert (len(screen), screen[5]) == (7, '... and 15 more')
     device.behave(FAULTS.add(FAULTS.add(device.behaviour, 'cold-throttling'),
                              'no-terminator'), 0.0)
-    LiveView(terminal).show([ComponentSnapshot.of(device, 0.0)])
+    LiveView(terminal).show([device.snapshot(0.0)])
     assert max(map(len, terminal.screen())) == 79

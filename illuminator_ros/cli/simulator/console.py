@@ -19,7 +19,6 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from typing import Any
 
-from .view import ComponentSnapshot
 from ...payload.simulated import ConsoleCommand, SimulatedComponent, SimulatedDevice
 
 Component = SimulatedComponent[SimulatedDevice]
@@ -54,7 +53,7 @@ COMMANDS: Sequence[ConsoleCommand[Component, str | None]] = (
     ConsoleCommand('clear [NAME]', 'end one fault, or all', _clear, (0, 1)),
     ConsoleCommand('faults', 'show the present faults', _faults),
     ConsoleCommand('status', 'show the state of each component',
-                   lambda component, words, now: str(ComponentSnapshot.of(component, now))),
+                   lambda component, words, now: component.snapshot(now).text),
 )
 OTHERS = (('help', 'show this'), ('quit', 'end'))
 

@@ -34,7 +34,7 @@ from .components import components, load, Scenario, Types
 from .console import execute
 from .csv_file import write_records
 from .options import parser, payload_types
-from .view import ComponentSnapshot, LiveView, PlainView
+from .view import LiveView, PlainView
 from ..options import mavlink_version, signing
 from ..termination import Termination
 from ...mavlink.link import Link
@@ -42,7 +42,7 @@ from ...mavlink.link_thread import LinkThreadError
 from ...mavlink.messages import Address
 from ...mavlink.url import parse_url, Url
 from ...payload.payload_type import PayloadType
-from ...payload.simulated import SimulatedComponents, SimulatedDevice
+from ...payload.simulated import SimulatedComponents, SimulatedDevice, Snapshot
 
 # s between updates of the view.
 VIEW_INTERVAL = 0.2
@@ -68,7 +68,7 @@ class _Simulation:
         # Text to write, with the line that it answers; None ends the process.
         self._texts: queue.Queue[tuple[str, str | None] | None] = queue.Queue(MAX_TEXTS)
         self._ended = threading.Event()
-        self._snapshots: list[ComponentSnapshot] = []
+        self._snapshots: list[Snapshot] = []
         live = (sys.stdout is not None and sys.stdout.isatty() and not options.plain
                 and os.environ.get('TERM') not in DUMB_TERMINALS)
         self._view: PlainView | LiveView = (LiveView if live else PlainView)(sys.stdout)
@@ -107,8 +107,7 @@ class _Simulation:
         self._put(None)
 
     def _take_snapshots(self, now: float) -> None:
-        self._snapshots = [
-            ComponentSnapshot.of(component, now) for component in self._endpoint.components]
+        self._snapshots = [one.snapshot(now) for one in self._endpoint.components]
 
     def _listen(self) -> None:
         """Execute the lines of standard input, until its end."""

@@ -18,47 +18,13 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 import contextlib
-from dataclasses import dataclass
 import shutil
 from typing import TextIO
 
-from ...payload.simulated import SimulatedComponent, SimulatedDevice, Snapshot
+from ...payload.simulated import Snapshot
 
 # Lines of a terminal that are left for the console.
 SPARE_LINES = 4
-
-
-@dataclass(frozen=True)
-class ComponentSnapshot:
-    """
-    The state of a simulated component at a moment, for people.
-
-    :param name: its address and name.
-    :param device: the state of its device.
-    :param faults: its present faults, '' for none.
-    """
-
-    name: str
-    device: Snapshot
-    faults: str
-
-    @classmethod
-    def of(cls, component: SimulatedComponent[SimulatedDevice], now: float) -> ComponentSnapshot:
-        """Return the actual state of a component, whatever it reports."""
-        device = component.device
-        faults = device.faults.active(device.behaviour, device.normal)
-        return cls(' '.join(filter(None, (str(component.address), component.name))),
-                   device.snapshot(now), f'[{", ".join(faults)}]' if faults else '')
-
-    def __str__(self) -> str:
-        """Return the line."""
-        return '  '.join(filter(None, (f'{self.name:12}', self.device.text, self.faults)))
-
-    def differs(self, other: ComponentSnapshot | None) -> bool:
-        """Return whether it differs enough from the last shown one for a new line."""
-        return other is None or (
-            (self.device.state, self.faults) != (other.device.state, other.faults)
-            or abs(self.device.drift - other.device.drift) >= 1)
 
 
 class PlainView:
@@ -66,14 +32,14 @@ class PlainView:
 
     def __init__(self, stream: TextIO) -> None:
         self._stream = stream
-        self._shown: dict[str, ComponentSnapshot] = {}
+        self._shown: dict[int, Snapshot] = {}
 
-    def show(self, components: Sequence[ComponentSnapshot]) -> None:
+    def show(self, components: Sequence[Snapshot]) -> None:
         """Show the present state of the components."""
-        for one in components:
-            if one.differs(self._shown.get(one.name)):
-                self._shown[one.name] = one
-                self.say(str(one))
+        for number, one in enumerate(components):
+            if one.differs(self._shown.get(number)):
+                self._shown[number] = one
+                self.say(one.text)
 
     def say(self, text: str, *, typed: str | None = None) -> None:
         """Write a text that is not empty, such as an event or an answer."""
@@ -97,11 +63,11 @@ class LiveView:
         self._lines: list[str] = []
         self._height = 0
 
-    def show(self, components: Sequence[ComponentSnapshot]) -> None:
+    def show(self, components: Sequence[Snapshot]) -> None:
         """Show the present state of the components."""
         size = shutil.get_terminal_size()
         room = max(size.lines - SPARE_LINES, 1)
-        lines = [str(one) for one in components[:room]]
+        lines = [one.text for one in components[:room]]
         if len(components) > room:
             lines[-1] = f'... and {len(components) - room + 1} more'
         lines = [line[:size.columns - 1] for line in lines]
