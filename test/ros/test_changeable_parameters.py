@@ -25,6 +25,7 @@ from illuminator_ros.mavlink.messages import Address
 from illuminator_ros.rededge.ros.camera_node import MOUNT_PARAMETERS, PARAMETERS
 from illuminator_ros.ros.parameters import LINK_PARAMETERS, ParameterSpec
 import pytest
+from std_msgs.msg import Float32
 from support.light import CONFIGURE, free_port, ServedLight
 from support.ros import Parameters, Ros, running_bridge
 
@@ -44,7 +45,7 @@ def guarded(ros: Ros) -> Iterator[Parameters]:
 
 def test_a_lower_limit_dims_the_light_at_once_and_is_shown(own_ros: Ros) -> None:
     parameters, port = Parameters(own_ros), free_port()
-    with (running_bridge(own_ros.domain, port),
+    with (running_bridge(own_ros.domain, port) as bridge,
           ServedLight(port, brightness=80.0) as light):
         parameters.wait(brightness=80.0)
 
@@ -59,6 +60,8 @@ def test_a_lower_limit_dims_the_light_at_once_and_is_shown(own_ros: Ros) -> None
         assert descriptor.additional_constraints == 'at most 50 %, which is max_brightness'
         [refused] = parameters.set(brightness=60.0)
         assert refused.reason == 'brightness 60 % is above max_brightness 50 %'
+        own_ros.publish(Float32, '/illuminator/cmd/brightness', 60.0)
+        bridge.wait_for('brightness 60 % is above max_brightness 50 %: the limit is sent')
         # All or none, and the limit is put back.
         result = parameters.set_atomically(max_brightness=40.0, brightness=45.0)
         assert result.reason == 'brightness 45 % is above max_brightness 40 %'
@@ -115,6 +118,7 @@ def test_the_descriptors_show_which_parameters_may_be_set(guarded: Parameters) -
 
     assert [descriptor.read_only for descriptor in guarded.describe(*names)] == [
         not spec.changeable for spec in LIGHT_PARAMETERS]
+    assert 'at least 0.1 s' in guarded.describe('strobe_period')[0].additional_constraints
 
 
 @pytest.mark.parametrize('spec', SPECS, ids=lambda spec: spec.name)
@@ -135,6 +139,9 @@ def test_changes_by_others_are_undone_from_the_moment_at_which_the_parameter_is_
     parameters, port = Parameters(own_ros), free_port()
     with running_bridge(own_ros.domain, port) as bridge, ServedLight(port) as light:
         parameters.wait(mode='internal_control')
+        light.report(enable=1)
+        bridge.wait_for('light 1/243 was switched on by another sender')
+        light.report(enable=0)
         assert parameters.set(external_changes='reassert')[0].successful
         light.report(enable=1)
 

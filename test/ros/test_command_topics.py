@@ -59,60 +59,6 @@ def test_refusal_is_logged_and_parameters_keep_their_values(
         assert parameters.get('brightness') == before
 
 
-def test_brightness_message_keeps_the_other_fields_and_moves_the_parameter(
-    ros: Ros, light: ServedLight, parameters: Parameters,
-) -> None:
-    light.report(mode=1, strobe_period=2.0, strobe_duty_cycle=20.0)
-    parameters.wait(strobe_period=2.0)
-
-    ros.publish(Float32, BRIGHTNESS, 41.0)
-
-    [command] = light.wait_for(CONFIGURE)
-    assert params(command) == (1.0, 41.0, 2.0, 20.0)
-    parameters.wait(brightness=41.0)
-
-
-@pytest.mark.parametrize('name', ['enable', 'enable_all'])
-def test_subscriptions_to_switches_are_reliable(
-    ros: Ros, parameters: Parameters, name: str,
-) -> None:
-    (subscription,) = ros.node.get_subscriptions_info_by_topic(f'/illuminator/cmd/{name}')
-
-    assert subscription.qos_profile.reliability is ReliabilityPolicy.RELIABLE
-
-
-@pytest.mark.parametrize('name', ['enable', 'enable_all'])
-def test_off_message_is_sent_while_the_light_has_not_acknowledged_an_on(
-    ros: Ros, light: ServedLight, name: str,
-) -> None:
-    light.fake.held[ON_OFF] = []
-    topic = f'/illuminator/cmd/{name}'
-    ros.publish(Bool, topic, True)
-    light.wait_for(ON_OFF)
-
-    ros.publish(Bool, topic, False)
-
-    eventually(lambda: not light.commands(ON_OFF)[-1].param1)
-
-
-@pytest.mark.parametrize('name', ['enable', 'enable_all'])
-def test_on_message_that_waits_is_not_sent_after_the_light_was_switched_off(
-    ros: Ros, light: ServedLight, name: str,
-) -> None:
-    light.fake.applies = False
-    ros.publish(Bool, f'/illuminator/cmd/{name}', True, True)
-    light.wait_for(ON_OFF)
-    light.fake.applies = True
-
-    assert ros.enable(False).success
-    answered = ros.enable(False)
-
-    # The queue is empty once a second OFF was confirmed.
-    assert answered.success
-    assert light.fake.fields['enable'] == 0
-    assert not light.commands(ON_OFF)[-1].param1
-
-
 def test_best_effort_publisher_is_heard(
     ros: Ros, light: ServedLight, parameters: Parameters,
 ) -> None:

@@ -17,6 +17,7 @@
 from collections.abc import Iterator
 import threading
 from typing import Any
+from unittest import mock
 
 from diagnostic_msgs.msg import DiagnosticArray
 from illuminator_ros.illuminator.client import IlluminatorClient
@@ -53,23 +54,9 @@ def light(served: tuple[Bridge, ServedLight]) -> ServedLight:
     return served[1]
 
 
-class Fault:
-    """Makes a method raise, and counts how often."""
-
-    def __init__(self, owner: type, method: str) -> None:
-        self.calls = 0
-        self._patch = pytest.MonkeyPatch()
-        self._patch.setattr(owner, method, self._fail)
-
-    def _fail(self, *arguments: object, **named: object) -> None:
-        self.calls += 1
-        raise RuntimeError('injected')
-
-    def __enter__(self) -> 'Fault':
-        return self
-
-    def __exit__(self, *error: object) -> None:
-        self._patch.undo()
+def fault(owner: type, method: str) -> Any:
+    """Make a method raise, and count how often."""
+    return mock.patch.object(owner, method, side_effect=RuntimeError('injected'))
 
 
 def assert_works(ros: Ros) -> None:
@@ -83,7 +70,7 @@ def test_the_light_goes_off_although_a_payload_fails_at_the_end(
 ) -> None:
     with (ServedLight(port, enable=1) as light,
           embedded_bridge(own_ros.domain, port, off_on_shutdown=True) as bridge,
-          Fault(IlluminatorClient, 'close')):
+          fault(IlluminatorClient, 'close')):
         Parameters(own_ros).wait(brightness=100.0)
 
         bridge.end()
@@ -126,7 +113,7 @@ def start_set(ros: Ros, atomically: bool) -> Call:
 def test_service_that_fails_inside_answers_with_the_exception(
     ros: Ros, light: ServedLight, owner: type, method: str, service: str,
 ) -> None:
-    with Fault(owner, method):
+    with fault(owner, method):
         if service.startswith('set'):
             response: Any = start_set(ros, service.endswith('atomically')).result()
             result = response.result if service.endswith('atomically') else response.results[0]
@@ -141,7 +128,7 @@ def test_service_that_fails_inside_answers_with_the_exception(
 
 
 def test_parameter_service_that_fails_inside_answers_empty(ros: Ros, light: ServedLight) -> None:
-    with Fault(PayloadNode, 'list_parameters'):
+    with fault(PayloadNode, 'list_parameters'):
         response = Parameters(ros).start(ListParameters, 'list_parameters').result()
 
     assert response.result.names == []
@@ -153,10 +140,10 @@ def test_parameter_service_that_fails_inside_answers_empty(ros: Ros, light: Serv
 def test_publishing_goes_on_after_it_has_failed(
     ros: Ros, light: ServedLight, owner: type, method: str,
 ) -> None:
-    with Fault(owner, method) as fault:
+    with fault(owner, method) as failing:
         light.report(brightness=12.0, error_status=4)
         CLOCK.forward(1.0)
-        eventually(lambda: fault.calls)
+        eventually(lambda: failing.called)
     light.report(error_status=0)
 
     assert_works(ros)
@@ -171,9 +158,9 @@ def test_command_topic_goes_on_after_it_has_failed(
     ros: Ros, light: ServedLight, topic: str, type_: Any, value: object, method: str,
 ) -> None:
     light.report(enable=0)
-    with Fault(Light, method) as fault:
+    with fault(Light, method) as failing:
         ros.publish(type_, f'/illuminator/cmd/{topic}', value)
-        eventually(lambda: fault.calls)
+        eventually(lambda: failing.called)
 
     ros.publish(Bool, '/illuminator/cmd/enable', True)
     eventually(lambda: light.fake.fields['enable'])

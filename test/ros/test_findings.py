@@ -167,20 +167,14 @@ def test_lost_frames_are_a_warning_unless_the_light_has_restarted() -> None:
     assert value(link, 'frames_lost') == '60'
 
 
-def test_another_sender_with_our_address_is_an_error() -> None:
-    reported = Reported()
-    reported.status()
-    reported.receive(frame_of(heartbeat(mavlink.MAV_TYPE_ONBOARD_CONTROLLER), 100, BRIDGE))
-    assert found(reported.statuses()['link']) == (
-        ERROR, 'another sender uses our address 1/194')
-
-
-def test_another_sender_with_our_address_is_the_reason_for_a_missing_light() -> None:
+def test_another_sender_with_our_address_is_an_error_and_the_reason_for_a_missing_light() -> None:
     reported = Reported()
     reported.receive(frame_of(heartbeat(mavlink.MAV_TYPE_ONBOARD_CONTROLLER), 100, BRIDGE))
-
     assert reported.statuses()['link'].message.endswith(
         'another sender uses our address 1/194: set component_id to a free one here or there')
+    reported.status()
+    assert found(reported.statuses()['link']) == (
+        ERROR, 'another sender uses our address 1/194')
 
 
 FOREIGN = frame_of(heartbeat(2), 0, AUTOPILOT)

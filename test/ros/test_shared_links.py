@@ -14,17 +14,15 @@
 
 """Two bridges on one link, and two lights behind one component."""
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 import contextlib
 
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
-import pytest
-from std_msgs.msg import Bool
+from std_msgs.msg import Float32
 from support.fake_light import FakeLight
 from support.light import Address
 from support.live_link import EndpointLink
 from support.ports import free_port
-from support.processes import Program
 from support.ros import Parameters, Ros, running_bridge, running_simulator, STREAM
 from support.shared_address import SharedAddress
 from support.slow import CLOCK, SlowLink, SPEED
@@ -69,38 +67,20 @@ def test_two_bridges_of_different_addresses_share_the_lights_and_do_not_clash(
         assert not any(CLASH in array.status[0].message for array in arrays.messages)
 
 
-@pytest.fixture(scope='module')
-def contradiction(domain: int) -> Iterator[tuple[Program, SharedAddress]]:
-    """Run a bridge and an autopilot with two lights, one on and one off."""
-    port = free_port()
-    url = f'udpout://127.0.0.1:{port}'
+def test_two_lights_at_one_address_are_a_warning_and_change_no_parameter(
+    own_ros: Ros, port: int,
+) -> None:
     lights = SharedAddress(
         FakeLight(Address(1, 1), heartbeat_type=None, stream=0.1 * SPEED, brightness=100.0),
-        FakeLight(Address(1, 1), heartbeat_type=None, stream=0.1 * SPEED, enable=1,
-                  brightness=40.0))
-    with running_bridge(domain, port) as bridge, EndpointLink(url, lights, kind=SlowLink):
+        FakeLight(Address(1, 1), heartbeat_type=None, stream=0.1 * SPEED, brightness=40.0))
+    with (running_bridge(own_ros.domain, port) as bridge,
+          EndpointLink(f'udpout://127.0.0.1:{port}', lights, kind=SlowLink)):
         bridge.wait_for('several lights answer as 1/1: parameters stay as they are')
-        yield bridge, lights
-
-
-def test_two_lights_at_one_address_are_a_warning_and_a_set_reaches_both_unconfirmed(
-    ros: Ros, contradiction: tuple[Program, SharedAddress],
-) -> None:
-    recorder = ros.subscribe(DiagnosticArray, '/diagnostics', STREAM)
-    parameters = Parameters(ros)
-    events = parameters.events()
-    enabled = ros.subscribe(Bool, '/illuminator/enabled', STREAM)
-    CLOCK.forward(1.0)
-    recorder.wait(lambda array: array.status[1].level == DiagnosticStatus.WARN
-                  and SHARED in array.status[1].message)
-    enabled.wait(count=30)
-    assert set(enabled.values) == {False, True}
-    assert events.messages == []
-    assert contradiction[0].count('was changed') <= 1
-
-    result, = parameters.set(brightness=60.0)
-    assert not result.successful
-    assert 'several lights answer as 1/1' in result.reason
-    assert [light.fields['brightness'] for light in contradiction[1].lights] == [60.0, 60.0]
-    # The lights still differ in whether they are on, so the parameter stays.
-    assert parameters.get('brightness') != [60.0]
+        arrays = own_ros.subscribe(DiagnosticArray, '/diagnostics', STREAM)
+        events = Parameters(own_ros).events()
+        own_ros.subscribe(Float32, '/illuminator/brightness', STREAM).wait(count=30)
+        CLOCK.forward(1.0)
+        arrays.wait(lambda array: array.status[1].level == DiagnosticStatus.WARN
+                    and SHARED in array.status[1].message)
+        assert events.messages == []
+        assert bridge.count('was changed') <= 1
