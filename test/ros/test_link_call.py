@@ -18,61 +18,28 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from typing import Any
+from unittest.mock import Mock
 
-from illuminator_ros.ros.link_call import LinkCalls, MAX_PENDING
-import pytest
+from illuminator_ros.ros.link_call import LinkCalls
 
 
-class CallerLink:
-    """
-    A link that calls functions at once, and answers requests when it is told to.
+def test_requests_beyond_the_limit_are_refused_at_once_and_each_is_answered_once() -> None:
+    answers: list[Callable[[str], None]] = []
+    answered: list[str] = []
+    # Any: a link that calls functions at once.
+    link: Any = Mock(call=lambda function: function(0.0))
+    calls = LinkCalls(link, Mock(), 2)
 
-    :ivar answered: the answers that callers got.
-    """
-
-    def __init__(self) -> None:
-        self.answered: list[str] = []
-        self._answers: list[Callable[[str], None]] = []
-
-    def call(self, function: Callable[[float], None]) -> None:
-        function(0.0)
-
-    def ask(self, calls: LinkCalls) -> None:
-        calls.ask(lambda now, answer: self._answers.append(answer), self.answered.append,
+    def ask() -> None:
+        calls.ask(lambda now, answer: answers.append(answer), answered.append,
                   'refused: {}'.format)
 
-    def answer(self) -> None:
-        self._answers.pop(0)('done')
-
-
-@pytest.fixture
-def link() -> CallerLink:
-    return CallerLink()
-
-
-@pytest.fixture
-def calls(link: CallerLink) -> LinkCalls:
-    anything: Any = link
-    return LinkCalls(anything, anything)
-
-
-def test_request_beyond_the_limit_is_refused_at_once_until_another_is_answered(
-        link: CallerLink, calls: LinkCalls) -> None:
-    for _ in range(MAX_PENDING + 1):
-        link.ask(calls)
-    assert link.answered == [
-        f'refused: busy: {MAX_PENDING} requests wait for an answer already']
-    link.answer()
-    link.ask(calls)
-    assert link.answered[1:] == ['done']
-
-
-def test_each_request_that_waits_is_refused_at_the_end_and_answered_once(
-        link: CallerLink, calls: LinkCalls) -> None:
     for _ in range(3):
-        link.ask(calls)
-    link.answer()
-    calls.refuse_waiting('the end')
-    link.answer()
-    calls.refuse_waiting('the end')
-    assert link.answered == ['done', 'refused: the end', 'refused: the end']
+        ask()
+    assert answered == ['refused: busy: 2 requests wait for an answer already']
+    answers[0]('done')
+    ask()
+    for _ in range(2):
+        calls.refuse_waiting('the end')
+        answers[1]('done')
+    assert answered[1:] == ['done', 'refused: the end', 'refused: the end']

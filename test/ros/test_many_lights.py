@@ -116,24 +116,6 @@ def test_parameter_events_of_each_light_name_its_node(ros: Ros, lights: Group) -
         assert [one.value.double_value for one in event.changed_parameters] == [40.0 + number]
 
 
-def test_services_parameters_and_topics_of_other_lights_go_on_while_one_is_silent(
-    ros: Ros, lights: Group,
-) -> None:
-    silent = '/illuminator_1_243'
-    lights[silent].fake.results[ON_OFF] = None
-    waiting = ros.start_enable(node=silent)
-    lights[silent].wait_for(ON_OFF)
-
-    for node in NODES:
-        if node != silent:
-            assert ros.enable(node=node).success
-            assert Parameters(ros, node).set(brightness=33.0)[0].successful
-
-    assert not waiting.answered
-    lights[silent].acknowledge(ON_OFF, mavlink.MAV_RESULT_FAILED, source=NODES[silent])
-    waiting.result()
-
-
 @pytest.mark.parametrize('node', ['/illuminator', '/belly'])
 def test_lost_light_keeps_its_node_and_is_served_again_when_it_returns(
     ros: Ros, group: tuple[Program, Group], lights: Group, node: str,

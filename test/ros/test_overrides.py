@@ -30,12 +30,6 @@ OWN: dict[str, Any] = {
 ALL, FULL, SHORT = '/**', '/illuminator', 'illuminator'
 
 
-@pytest.fixture
-def light(port: int) -> ServedLight:
-    """Return a light that is not yet on the link."""
-    return ServedLight(port, **OWN)
-
-
 def write(path: Path, *sections: tuple[str, dict[str, Any]]) -> str:
     """Write a parameter file with these sections, in this order; return its path."""
     path.write_text(''.join(f'{section}: {json.dumps({"ros__parameters": values})}\n'
@@ -43,18 +37,15 @@ def write(path: Path, *sections: tuple[str, dict[str, Any]]) -> str:
     return str(path)
 
 
-@pytest.mark.parametrize(('given', 'section', 'sent'), [
-    ({'brightness': 60.5}, None, (2.0, 60.5, 2.0, 10.0)),
+@pytest.mark.parametrize(('given', 'sent'), [
+    ({'brightness': 60.5}, (2.0, 60.5, 2.0, 10.0)),
     ({'mode': 'internal_control', 'brightness': 1, 'strobe_period': 3.5,
-      'strobe_duty_cycle': 50}, None, (1.0, 1.0, 3.5, 50.0)),
-    *(({'brightness': 60}, section, (2.0, 60.0, 2.0, 10.0)) for section in (ALL, FULL, SHORT)),
-])
+      'strobe_duty_cycle': 50}, (1.0, 1.0, 3.5, 50.0))])
 def test_overrides_are_sent_with_the_first_connection_in_one_command(
-    own_ros: Ros, port: int, light: ServedLight, tmp_path: Path, given: dict[str, Any],
-    section: str | None, sent: tuple[float, ...],
+    own_ros: Ros, port: int, given: dict[str, Any], sent: tuple[float, ...],
 ) -> None:
-    file = ('--params-file', write(tmp_path / 'p.yaml', (section, given))) if section else ()
-    with running_bridge(own_ros.domain, port, *file, **({} if file else given)) as bridge, light:
+    with (running_bridge(own_ros.domain, port, **given) as bridge,
+          ServedLight(port, **OWN) as light):
         bridge.wait_for('light 1/243 configured: ')
 
         assert [params(command) for command in light.commands(CONFIGURE)] == [sent]
