@@ -14,12 +14,12 @@
 # limitations under the License.
 
 """
-Runs the bridge, simulated lights and a gimbal over a faulty line for a given time.
+Runs the bridge with faulty simulated lights and a faulty gimbal for a given time.
 
-The line loses, repeats, reorders, delays and corrupts frames and is cut, and the router between
-them and one of two lights are restarted, while services, parameters and setpoints are in use.
-Every request must be answered in time. At the end the bridge must serve as at the beginning, with
-no more memory, threads and descriptors than after its warm-up.
+The devices lose, repeat, reorder, delay and corrupt messages, fall silent, and are restarted,
+while services, parameters and setpoints are in use. Every request must be answered in time. At the
+end the bridge must serve as at the beginning, with no more memory, threads and descriptors than
+after its warm-up.
 
     python3 test/soak/run.py --seconds 3600 --seed 1
 
@@ -45,10 +45,8 @@ sys.path[:0] = [str(TEST.parent), str(TEST)]
 from geometry_msgs.msg import Vector3, Vector3Stamped  # noqa: E402
 from std_msgs.msg import Float32  # noqa: E402
 from std_srvs.srv import Trigger  # noqa: E402
-from support.fault_proxy import FaultProxy, NO_FAULTS  # noqa: E402
-from support.faulty_wire import Faults  # noqa: E402
 from support.ports import free_port  # noqa: E402
-from support.processes import Program, start_interpreter  # noqa: E402
+from support.processes import Program, python, start_interpreter  # noqa: E402
 from support.ros import bridge_arguments, own_domain, Parameters, Ros  # noqa: E402
 
 # Growth of a process after its warm-up: memory in MB, threads, descriptors. The middleware opens
@@ -61,15 +59,11 @@ CALM = 4.0
 REPORT_INTERVAL = 30.0
 GIMBAL = '/gimbal_manager'
 
-FAULTS = {
-    'nothing': NO_FAULTS,
-    'loss': Faults(drop=0.3, latency=0.0),
-    'reordering': Faults(reorder=0.5, duplicate=0.3, latency=0.0),
-    'delays': Faults(delay=0.3, latency=0.01),
-    'noise': Faults(corrupt=0.3, latency=0.0),
-    'everything': Faults(0.1, 0.1, 0.1, 0.1, 0.1),
-    'silence': Faults(drop=1.0, latency=0.0),
-}
+DEVICES = {'light': ('--component-id', '243'), 'further light': ('--component-id', '244'),
+           'gimbal': ('--payload', 'gimbal')}
+# Faults of the simulator; '' for none.
+FAULTS = ('', 'drop=0.3', 'duplicate=0.3', 'delay=0.3', 'corrupt=0.3', 'silence',
+          'drop=0.1,duplicate=0.1,delay=0.1,corrupt=0.1')
 
 
 class Usage(NamedTuple):
@@ -98,34 +92,30 @@ class Usage(NamedTuple):
 
 
 class Soak:
-    """The programs, the line between them, and a client."""
+    """The programs, and a client."""
 
     def __init__(self, seed: str, domain: int) -> None:
         self.random = random.Random(seed)
         self.counts: Counter[str] = Counter()
         self.problems: list[str] = []
-        port = free_port()
-        self.proxy = FaultProxy(port, self.random.randrange(1 << 30))
+        self._port = free_port()
         self.bridge = start_interpreter(
             'illuminator_ros.bridge',
-            *bridge_arguments(port, payloads='[illuminator, gimbal_manager]'),
+            *bridge_arguments(self._port, payloads='[illuminator, gimbal_manager]'),
             env={'ROS_DOMAIN_ID': str(domain)})
-        self.light = self._simulator('--component-id', '243')
-        self.restarted = self._simulator('--component-id', '244')
-        self.gimbal = self._simulator('--payload', 'gimbal')
+        self._devices = {name: self._device(name) for name in DEVICES}
         self.client = Ros(domain)
         self.parameters = Parameters(self.client)
         self._calls: list[tuple[float, str, Any]] = []
 
-    def _simulator(self, *arguments: str) -> Program:
-        return start_interpreter(
-            'illuminator_ros.simulator', f'udpout://127.0.0.1:{self.proxy.port}', *arguments)
+    def _device(self, name: str, fault: str = '') -> Program:
+        return python('illuminator_ros.simulator', f'udpout://127.0.0.1:{self._port}',
+                      *DEVICES[name], *(('--fault', fault) if fault else ()))
 
     def close(self) -> None:
         """End all programs."""
         self.client.close()
-        for program, name in ((self.bridge, 'bridge'), (self.light, 'simulator'),
-                              (self.restarted, 'simulator'), (self.gimbal, 'gimbal')):
+        for name, program in {'bridge': self.bridge, **self._devices}.items():
             if not program.running:
                 self.problems.append(f'{name} has ended by itself')
             elif program.end() != 0:
@@ -133,23 +123,17 @@ class Soak:
             program.kill()
             if 'Traceback' in program.log or 'internal error' in program.log:
                 self.problems.append(f'{name} has printed:\n{program.log[-3000:]}')
-        self.proxy.close()
 
-    def usages(self) -> dict[str, Usage]:
-        """Return the resources of the two programs that run from the beginning to the end."""
-        return {'bridge': Usage.of(self.bridge.pid), 'simulator': Usage.of(self.light.pid)}
+    def restart(self, name: str, fault: str = '') -> None:
+        """Restart a device with a fault."""
+        self._devices[name].kill()
+        self._devices[name] = self._device(name, fault)
 
     def disturb(self) -> None:
-        """Change the faults of the line, or restart the router or a light."""
-        fault = self.random.choice([*FAULTS, 'router restart', 'light restart'])
-        self.counts[fault] += 1
-        if fault == 'router restart':
-            self.proxy.restart()
-        elif fault == 'light restart':
-            self.restarted.kill()
-            self.restarted = self._simulator('--component-id', '244')
-        else:
-            self.proxy.set(FAULTS[fault])
+        """Restart one of the devices with another fault."""
+        fault = self.random.choice(FAULTS)
+        self.counts[fault or 'no fault'] += 1
+        self.restart(self.random.choice(list(DEVICES)), fault)
 
     def request(self) -> None:
         """Begin one request of some kind."""
@@ -191,7 +175,7 @@ class Soak:
         self._calls = waiting
 
     def run(self, seconds: float) -> None:
-        """Disturb the line and send requests for a time, s."""
+        """Disturb the devices and send requests for a time, s."""
         until = time.monotonic() + seconds
         next_fault = next_report = time.monotonic()
         while time.monotonic() < until:
@@ -204,12 +188,12 @@ class Soak:
             time.sleep(self.random.uniform(0.0, 0.1))
             if seconds > REPORT_INTERVAL and time.monotonic() >= next_report:
                 next_report = time.monotonic() + REPORT_INTERVAL
-                print('; '.join(f'{name} {usage}' for name, usage in self.usages().items()),
-                      flush=True)
+                print(f'bridge {Usage.of(self.bridge.pid)}', flush=True)
 
     def calm_down(self) -> None:
         """End the faults, and wait for the requests that are under way."""
-        self.proxy.set(NO_FAULTS)
+        for name in DEVICES:
+            self.restart(name)
         until = time.monotonic() + ANSWER_LIMIT + 1.0
         while self._calls and time.monotonic() < until:
             self.collect()
@@ -246,14 +230,13 @@ def soak(seconds: float, seed: str) -> int:
         # Modules that are imported late, and buffers, must be there before usage is compared.
         one.run(warm_up)
         one.calm_down()
-        before = one.usages()
+        before = Usage.of(one.bridge.pid)
         one.run(seconds - warm_up)
         one.calm_down()
         one.check_service()
-        after = one.usages()
-    for name, usage in after.items():
-        print(f'{name}: after the warm-up {before[name]}; at the end {usage}')
-        one.problems += [f'{name}: {growth}' for growth in usage.excess(before[name])]
+        after = Usage.of(one.bridge.pid)
+    print(f'bridge: after the warm-up {before}; at the end {after}')
+    one.problems += [f'bridge: {growth}' for growth in after.excess(before)]
     print(', '.join(f'{name} {count}' for name, count in sorted(one.counts.items())))
     for problem in one.problems:
         print(f'PROBLEM: {problem}')
