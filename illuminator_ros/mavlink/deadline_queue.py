@@ -16,7 +16,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Hashable
+from collections.abc import Hashable
 import heapq
 import itertools
 import math
@@ -32,16 +32,13 @@ class DeadlineQueue(Generic[K]):
     Postponing, which every heartbeat does, takes little time: the entry in the heap stays and is
     checked when its old time comes.
 
-    :param deadline_of: returns the deadline of a key that was noted by ``changed``.
-    :ivar changed: must be called with a key whose deadline may have changed; ``deadline_of`` is
-        called when the deadline is needed.
+    :ivar changed: must be called with a key to which something has happened; the key is due until
+        its deadline is set.
     """
 
-    def __init__(self, deadline_of: Callable[[K], float] = lambda key: math.inf) -> None:
-        self._deadline_of = deadline_of
-        self._changed: set[K] = set()
-        # The method of the set itself: each message calls it, often more than once.
-        self.changed: Callable[[K], None] = self._changed.add
+    def __init__(self) -> None:
+        # In the order of the changes.
+        self._changed: dict[K, None] = {}
         self._deadlines: dict[K, float] = {}
         self._heap: list[tuple[float, int, K]] = []
         # The earliest entry of each key in the heap.
@@ -49,11 +46,16 @@ class DeadlineQueue(Generic[K]):
         self._order = itertools.count()
 
     def __len__(self) -> int:
-        """Return how many keys have a deadline, as far as that is known."""
+        """Return how many keys have a deadline."""
         return len(self._deadlines)
+
+    def changed(self, key: K) -> None:
+        """Note that something has happened to a key: it is due until its deadline is set."""
+        self._changed[key] = None
 
     def set(self, key: K, deadline: float) -> None:  # noqa: A003
         """Set the deadline of a key, infinity for none."""
+        self._changed.pop(key, None)
         if deadline == math.inf:
             self._deadlines.pop(key, None)
             return
@@ -67,9 +69,9 @@ class DeadlineQueue(Generic[K]):
 
     def next_deadline(self) -> float:
         """Return the earliest deadline, infinity if there is none."""
-        while self._changed:
-            key = self._changed.pop()
-            self.set(key, self._deadline_of(key))
+        return -math.inf if self._changed else self._earliest()
+
+    def _earliest(self) -> float:
         while self._heap:
             entered, _, key = self._heap[0]
             deadline = self._deadlines.get(key, math.inf)
@@ -86,12 +88,12 @@ class DeadlineQueue(Generic[K]):
         return math.inf
 
     def due(self, now: float) -> list[K]:
-        """Return the keys whose deadline has come; each keeps it until it gets another."""
+        """Return the keys that are due; each stays due until its deadline is set."""
         keys = []
-        while self.next_deadline() <= now:
+        while self._earliest() <= now:
             _, _, key = heapq.heappop(self._heap)
             self._entered.pop(key, None)
             keys.append(key)
         for key in keys:
             self._enter(key, self._deadlines[key])
-        return keys
+        return list(dict.fromkeys((*self._changed, *keys)))

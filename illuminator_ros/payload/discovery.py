@@ -99,7 +99,7 @@ class Discovery(Generic[D]):
         self._wanted = wanted
         self.candidates: dict[Address, D] = {}
         self._found_at: dict[Address, float] = {}
-        self._deadlines: DeadlineQueue[Address] = DeadlineQueue(self._deadline_of)
+        self._deadlines: DeadlineQueue[Address] = DeadlineQueue()
         self.changed = self._deadlines.changed
         self.next_deadline = self._deadlines.next_deadline
 
@@ -172,15 +172,10 @@ class Discovery(Generic[D]):
         """Poll the devices that have something to do, and forget silent ones."""
         for address in self._deadlines.due(now):
             device = self.get(address)
-            if device is None:
-                continue
-            if now >= self._forgotten_at(device):
+            if device is not None and now >= self._forgotten_at(device):
                 self._drop(address, now)
-            else:
+                device = None
+            if device is not None:
                 device.poll(now)
-                self.changed(address)
-
-    def _deadline_of(self, address: Address) -> float:
-        device = self.get(address)
-        return math.inf if device is None else min(
-            device.next_deadline(), self._forgotten_at(device))
+            self._deadlines.set(address, math.inf if device is None else min(
+                device.next_deadline(), self._forgotten_at(device)))

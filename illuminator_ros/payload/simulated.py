@@ -547,7 +547,6 @@ class SimulatedComponent(Generic[D]):
                 self._send(self.device.message(message_id, now), now)
         for message in self.device.poll(now):
             self._send(message, now)
-        self._changed()
 
     def next_deadline(self) -> float:
         """See :meth:`Endpoint.next_deadline`."""
@@ -572,8 +571,7 @@ class SimulatedComponents(Endpoint, Generic[D]):
         self.new_peers: Listeners[Address] = Listeners()
         self._peers: set[Address] = set()
         # By index of the component.
-        self._deadlines: DeadlineQueue[int] = DeadlineQueue(
-            lambda index: self.components[index].next_deadline())
+        self._deadlines: DeadlineQueue[int] = DeadlineQueue()
         self.components = [
             SimulatedComponent(one, now, self.outgoing,
                                functools.partial(self._deadlines.changed, index))
@@ -600,7 +598,9 @@ class SimulatedComponents(Endpoint, Generic[D]):
     def poll(self, now: float) -> None:
         """See :meth:`Endpoint.poll`."""
         for index in self._deadlines.due(now):
-            self.components[index].poll(now)
+            component = self.components[index]
+            component.poll(now)
+            self._deadlines.set(index, component.next_deadline())
 
     def next_deadline(self) -> float:
         """See :meth:`Endpoint.next_deadline`."""
