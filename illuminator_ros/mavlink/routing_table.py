@@ -147,9 +147,11 @@ class Router:
         A message to all components of a system goes everywhere, too: some may not have been heard
         yet. So does each while a line has heard more components than it remembers.
         """
-        is_one = target.system and target.component
-        is_full = any(table.is_full(now) for table in self._tables)
-        found = self._known(target, peers, now) if is_one and not is_full else ()
+        # One peer needs no search.
+        if (not (target.system and target.component) or sum(map(len, peers)) < 2
+                or any(table.is_full(now) for table in self._tables)):
+            return peers
+        found = self._known(target, peers, now)
         return found if any(found) else peers
 
     def targets(self, frame: Frame, peers: Peers, now: float) -> Peers:
