@@ -25,7 +25,6 @@ from illuminator_ros.illuminator.ros.parameters import LIGHT_PARAMETERS
 from illuminator_ros.illuminator.simulated_properties import PROFILES
 from illuminator_ros.ros.parameters import LINK_PARAMETERS
 import pytest
-from support.tables import table
 import yaml
 
 ROOT = Path(__file__).parents[1]
@@ -184,15 +183,6 @@ def test_joystick_launch_file_remaps_each_topic_of_its_configuration() -> None:
     assert set(remapped) == used
     for before, after in remapped.items():
         assert after == before.replace('illuminator/', '$(var name)/$(var source)')
-
-
-def test_page_lists_each_argument_of_the_bridge_with_its_default() -> None:
-    rows = [[cell.strip('`') for cell in row[:2]]
-            for row in table(PAGE, 'argument of `bridge.launch.xml`')]
-    defaults = {argument.attrib['name']: argument.attrib['default']
-                for argument in FILES['bridge.launch.xml'].findall('arg')}
-    assert {name: default.replace('$SHARE', f'$(find-pkg-share {OURS})')
-            for name, default in rows} == defaults
 
 
 def test_page_names_each_installed_file() -> None:

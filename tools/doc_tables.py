@@ -25,6 +25,7 @@ from pathlib import Path
 import re
 import sys
 from typing import Any, TYPE_CHECKING
+import xml.etree.ElementTree as ET
 
 from illuminator_ros.cli.payloads import PAYLOADS
 from illuminator_ros.cli.simulator.console import COMMANDS as CONSOLE_COMMANDS
@@ -47,7 +48,8 @@ if TYPE_CHECKING:
     from illuminator_ros.ros.node import Endpoint
     from illuminator_ros.ros.parameters import ParameterSpec
 
-DOC = Path(__file__).resolve().parent.parent / 'doc'
+ROOT = Path(__file__).resolve().parent.parent
+DOC = ROOT / 'doc'
 Rows = Iterable[Sequence[str]]
 # The rows of each table, by page and heading.
 Tables = dict[tuple[str, str], Rows]
@@ -77,6 +79,14 @@ def of_both(device: list[list[str]], manager: list[list[str]]) -> Rows:
             *([*row, 'manager'] for row in manager if row not in device)]
 
 
+def launch_arguments(file: str) -> Rows:
+    """Return the rows of the arguments of a launch file."""
+    for argument in ET.parse(ROOT / 'launch' / file).getroot().findall('arg'):
+        default = argument.attrib['default'].replace('$(find-pkg-share illuminator_ros)', '$SHARE')
+        yield [f'`{argument.attrib["name"]}`', f'`{default}`' if default else '',
+               argument.attrib['description']]
+
+
 def tool_tables() -> Tables:
     """Return the tables of the tools that need no ROS."""
     return {
@@ -91,6 +101,7 @@ def tool_tables() -> Tables:
              f'{field.low:.10g} to {field.high:.10g}',
              '' if field.unknown is None else str(field.unknown)]
             for cls, fields in FIELDS.items() for name, field in fields.items()],
+        ('ros', 'argument of `bridge.launch.xml`'): launch_arguments('bridge.launch.xml'),
         ('simulator', 'command'): [
             *([f'`{one.usage}`', one.help] for one in LIGHT_COMMANDS),
             *([f'`{one.usage}`', one.help] for one in CONSOLE_COMMANDS),
@@ -229,6 +240,9 @@ def ros_tables() -> Tables:
              meaning_of(spec)] for spec in DEVICE_PARAMETERS],
         ('reference', 'parameter of the link'): parameters(
             (*LINK_PARAMETERS, *LIGHT_PARAMETERS)),
+        ('beam', 'parameter of the beam'): parameters([
+            spec for spec in LIGHT_PARAMETERS if spec.name in (
+                'frame_id', 'beam_range', 'beam_angle', 'mounted_on')]),
         ('gimbal', 'parameter of the gimbal'): parameters(GIMBAL_PARAMETERS),
         ('gimbal_manager', 'parameter of the manager'): parameters(MANAGER_PARAMETERS),
         ('rededge', 'parameter of the camera'): parameters(
