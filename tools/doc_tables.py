@@ -81,10 +81,12 @@ def of_both(device: list[list[str]], manager: list[list[str]]) -> Rows:
 
 def launch_arguments(file: str) -> Rows:
     """Return the rows of the arguments of a launch file."""
+    rows = []
     for argument in ET.parse(ROOT / 'launch' / file).getroot().findall('arg'):
         default = argument.attrib['default'].replace('$(find-pkg-share illuminator_ros)', '$SHARE')
-        yield [f'`{argument.attrib["name"]}`', f'`{default}`' if default else '',
-               argument.attrib['description']]
+        rows.append([f'`{argument.attrib["name"]}`', f'`{default}`' if default else '',
+                     argument.attrib['description']])
+    return rows
 
 
 def tool_tables() -> Tables:
