@@ -28,6 +28,7 @@ from .messages import (
     GimbalManagerSetAttitude,
     GimbalManagerStatus,
     NON_MAVLINK_IDS,
+    rates_of,
     REMOVE_SENDER,
 )
 from .remote_managers import Repetition
@@ -98,7 +99,7 @@ class GimbalClient(Payload):
     def link_closed(self, now: float, reason: str) -> None:
         """See :meth:`Payload.link_closed`."""
         for gimbal in self._gimbals.values():
-            gimbal.link_closed(now, reason)
+            gimbal.components_lost(gimbal.addresses, now, reason)
 
     def components_lost(self, lost: Collection[Address], now: float, reason: str) -> None:
         """See :meth:`Payload.components_lost`."""
@@ -117,14 +118,13 @@ class GimbalClient(Payload):
         elif isinstance(message, GimbalManagerStatus):
             if gimbal := self._managed(source, message.gimbal_device_id):
                 gimbal.take_status(source, message, now)
-                if gimbal.is_managed_by(source) and not gimbal.has_information_of(source):
+                if gimbal.lacks_information_of(source):
                     self._reopen(source, now)
         elif isinstance(message, GimbalManagerInformation):
             if gimbal := self._managed(source, message.gimbal_device_id):
                 gimbal.take_information(source, message, now)
-                if gimbal.has_information_of(source):
-                    self._component(source, now).query.finish()
-                    self._queries.set(source, math.inf)
+                self._component(source, now).query.finish()
+                self._queries.set(source, math.inf)
         elif (isinstance(message, GimbalDeviceInformation)
                 and (gimbal := self._sender(source, message.gimbal_device_id))):
             gimbal.take_device_information(message)
@@ -225,9 +225,8 @@ class GimbalClient(Payload):
                 return math.isnan(pitch) and math.isnan(yaw) and rates == [0.0, 0.0]
             return (sent.command == mavlink.MAV_CMD_DO_GIMBAL_MANAGER_CONFIGURE
                     and sent.params[0] == REMOVE_SENDER)
-        return isinstance(sent, GimbalManagerSetAttitude) and not any((
-            *map(math.isfinite, sent.q), sent.angular_velocity_x, sent.angular_velocity_y,
-            sent.angular_velocity_z))
+        return (isinstance(sent, GimbalManagerSetAttitude)
+                and not any((*map(math.isfinite, sent.q), *rates_of(sent))))
 
     def close(self, now: float) -> None:
         """See :meth:`Payload.close`."""

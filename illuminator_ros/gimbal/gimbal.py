@@ -168,12 +168,6 @@ class Gimbal:
     def _manager(self) -> RemoteManager:
         return self._managers.used
 
-    def link_closed(self, now: float, reason: str) -> None:
-        """Record that the link is closed, and the reason."""
-        self._link_problem = reason
-        self._managers.link_closed(now, reason)
-        self._check(now)
-
     def components_lost(self, lost: Collection[Address], now: float, reason: str) -> None:
         """Record that some components cannot be reached, and the reason."""
         if self.key.address in lost or self._manager.address in lost:
@@ -199,14 +193,15 @@ class Gimbal:
         if manager is not None or is_device:
             self._check(now)
 
-    def is_managed_by(self, address: Address) -> bool:
-        """Return whether a manager announces the gimbal."""
-        return self._managers.get(address) is not None
+    @property
+    def addresses(self) -> set[Address]:
+        """Return the addresses of its device and of its managers."""
+        return {self.key.address, *self._managers.all}
 
-    def has_information_of(self, address: Address) -> bool:
-        """Return whether a manager has sent its GIMBAL_MANAGER_INFORMATION."""
+    def lacks_information_of(self, address: Address) -> bool:
+        """Return whether a component manages it without GIMBAL_MANAGER_INFORMATION so far."""
         manager = self._managers.get(address)
-        return manager is not None and manager.information is not None
+        return manager is not None and manager.information is None
 
     def unreachable(self, now: float) -> str:
         """Return why the gimbal is not connected, for people; '' if it is."""
@@ -322,7 +317,7 @@ class Gimbal:
         may_turn = setpoints.may_turn
         setpoints.end(now)
         if may_turn and manager.is_heard(now):
-            manager.stop(setpoints.stop(now), self.key.device_id, now, setpoints.has_stopped)
+            manager.stop(setpoints.stop(now), self.key.device_id, now, setpoints.forget)
         self._request_control(False, now, done)
 
     def _request_control(self, take: bool, now: float, done: Done) -> None:
@@ -444,26 +439,18 @@ class Gimbal:
         names = [short_names('GIMBAL_DEVICE_CAP_FLAGS')[one] for one in enough]
         return f'gimbal {self.key} does not have {" or ".join(names)}'
 
-    def set_roi(
-        self, latitude: float, longitude: float, altitude: float, now: float, done: Done, *,
-        is_stream: bool = False,
-    ) -> None:
-        """
-        Point at a place.
-
-        :param latitude: deg, and longitude.
-        :param altitude: m above mean sea level.
-        :param is_stream: whether its publisher repeats it, so that a newer one replaces it.
-        """
-        self._point(GeoPoint(latitude, longitude, altitude), now, done, is_stream=is_stream)
-
     def clear_roi(self, now: float, done: Done) -> None:
         """Stop pointing at a place."""
-        self._point(None, now, done)
+        self.set_roi(None, now, done)
 
-    def _point(
+    def set_roi(
         self, place: GeoPoint | None, now: float, done: Done, *, is_stream: bool = False,
     ) -> None:
+        """
+        Point at a place, or at none.
+
+        :param is_stream: whether its publisher repeats it, so that a newer one replaces it.
+        """
         self._begin(now)
         if reason := self.unavailable(now):
             done(Result(False, reason), now)
@@ -571,18 +558,18 @@ class Gimbal:
     def next_deadline(self) -> float:
         """Return when :meth:`poll` is due, infinity if never."""
         manager = self._manager
-        deadlines = [self._sources.next_deadline(),
-                     *(one.next_deadline() for one in manager.reconcilers)]
-        if self._control.known is not None:
-            deadlines.append(manager.control_deadline())
+        is_known = self._control.known is not None
+        if self._connected and is_known and self._control.take_due:
+            return -math.inf
+        due = min(self._sources.next_deadline(),
+                  *(one.next_deadline() for one in manager.reconcilers))
+        if is_known:
+            due = min(due, manager.control_deadline())
         if self._connected:
-            deadlines += (manager.heard_at + SILENCE_LIMIT, self._device.heard_at + SILENCE_LIMIT,
-                          self._device.next_deadline(), manager.status_query.due)
-            if self._control.take_due and self._control.known is not None:
-                return -math.inf
-        if self.in_control:
-            deadlines.append(self._setpoints.next_deadline())
-        return min(deadlines)
+            due = min(due, manager.heard_at + SILENCE_LIMIT,
+                      self._device.heard_at + SILENCE_LIMIT, self._device.next_deadline(),
+                      manager.status_query.due)
+        return min(due, self._setpoints.next_deadline()) if self.in_control else due
 
     def snapshot(self, now: float) -> events.GimbalSnapshot:
         """Return the gimbal at this moment."""

@@ -203,6 +203,7 @@ class RemoteManagers:
     :param first: the manager that has announced the gimbal.
     :param emit: takes the events.
     :ivar used: the manager that is used.
+    :ivar all: the managers that have announced it, by address.
     :ivar announced_at: when a manager last announced the gimbal, s.
     """
 
@@ -215,7 +216,7 @@ class RemoteManagers:
         self._commands = commands
         self._emit = emit
         self.used = RemoteManager(first, commands, key)
-        self._all = {first: self.used}
+        self.all = {first: self.used}
         self._others: set[Address] = set()
 
     @property
@@ -225,20 +226,20 @@ class RemoteManagers:
 
     def get(self, address: Address) -> RemoteManager | None:
         """Return a manager that announces the gimbal."""
-        return self._all.get(address)
+        return self.all.get(address)
 
     def announce(self, address: Address, now: float) -> RemoteManager | None:
         """Note an announcement; return the manager, None if there are too many."""
         self.announced_at = now
-        if address not in self._all and len(self._all) < MAX_MANAGERS:
-            self._all[address] = RemoteManager(address, self._commands, self._key)
-        if manager := self._all.get(address):
+        if address not in self.all and len(self.all) < MAX_MANAGERS:
+            self.all[address] = RemoteManager(address, self._commands, self._key)
+        if manager := self.all.get(address):
             manager.heard_at = now
         return manager
 
     def choose(self, now: float) -> None:
         """Use another manager if the used one is lost, and report further ones."""
-        heard = [one for one in self._all.values() if one.is_heard(now)]
+        heard = [one for one in self.all.values() if one.is_heard(now)]
         if not heard:
             return
         if self.used not in heard:
@@ -250,18 +251,14 @@ class RemoteManagers:
             self._emit(events.SecondManager(self._key, self.used.address, other))
         self._others = others
 
-    def link_closed(self, now: float, reason: str) -> None:
-        """Lose all managers at once."""
-        self.components_lost([manager.address for manager in self._all.values()], now, reason)
-
     def components_lost(self, lost: Collection[Address], now: float, reason: str) -> None:
         """Lose some managers at once."""
-        for manager in [one for one in self._all.values() if one.address in lost]:
+        for manager in [one for one in self.all.values() if one.address in lost]:
             manager.heard_at = min(manager.heard_at, now - SILENCE_LIMIT)
             for one in manager.reconcilers:
                 one.lost(reason, now)
 
     def close(self, message: str, now: float) -> None:
         """End all requests: the process ends."""
-        for manager in self._all.values():
+        for manager in self.all.values():
             manager.cancel(message, now, superseded=True)

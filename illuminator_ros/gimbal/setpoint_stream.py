@@ -22,7 +22,7 @@ from enum import Enum
 import math
 
 from .axes import TURNING
-from .messages import GimbalManagerSetAttitude
+from .messages import GimbalManagerSetAttitude, rates_of
 from ..mavlink.dialect import mavlink
 from ..payload.attempt import Done, Result
 from ..payload.messages import GimbalDeviceAttitudeStatus
@@ -189,10 +189,9 @@ class SetpointStream:
         assert self._last is not None and self._last.message is not None
         return self._last.message.flags
 
-    def has_stopped(self) -> None:
-        """Note that the last zero has arrived."""
-        if self._last is not None and self._last.kind is Kind.ZERO:
-            self._last.due.clear()
+    def forget(self) -> None:
+        """Note that the gimbal follows no setpoint any more: the last zero has arrived."""
+        self._last = None
 
     def end(self, now: float) -> None:
         """Repeat no attitude, and end a rate or a place with a zero once it can be sent."""
@@ -263,7 +262,7 @@ class SetpointStream:
         self, status: GimbalDeviceAttitudeStatus, attitude: MountAttitude | None, now: float,
     ) -> bool | None:
         """Return whether the device turns, None if its next attitude will show that."""
-        rates = status.angular_velocity_x, status.angular_velocity_y, status.angular_velocity_z
+        rates = rates_of(status)
         if any(abs(rate) > TURNING for rate in rates):
             return True
         if attitude is None or all(map(math.isfinite, rates)):

@@ -31,10 +31,21 @@ from illuminator_ros.gimbal.setpoint_stream import REPEATS
 from illuminator_ros.mavlink import messages as mav
 from illuminator_ros.mavlink.dialect import mavlink, short_names
 from illuminator_ros.payload.attempt import Done
+from illuminator_ros.payload.messages import GeoPoint
 from illuminator_ros.payload.mount_attitude import YawFrame
 from illuminator_ros.payload.rotation import Quaternion
 import pytest
-from support.gimbals import ALL, AUTOPILOT, DEVICE, FakeManager, in_control, OTHER, OURS, Rig
+from support.gimbals import (
+    ALL,
+    AUTOPILOT,
+    DEVICE,
+    FakeManager,
+    in_control,
+    OTHER,
+    OURS,
+    PLACE,
+    Rig,
+)
 
 CONFIGURE = mavlink.MAV_CMD_DO_GIMBAL_MANAGER_CONFIGURE
 NONE = mav.Address(0, 0)
@@ -427,7 +438,7 @@ def test_gm_8_place_to_point_at_is_sent_with_full_precision_above_sea_level() ->
     rig = in_control()
 
     success, message = asked(rig, lambda gimbal, now, done: gimbal.set_roi(
-        47.3977419, 8.5455938, 488.5, now, done))
+        GeoPoint(47.3977419, 8.5455938, 488.5), now, done))
 
     assert success
     assert message.startswith('MAV_RESULT_ACCEPTED (1 try')
@@ -439,7 +450,7 @@ def test_gm_8_place_to_point_at_is_sent_with_full_precision_above_sea_level() ->
 
 
 def set_roi(gimbal: Gimbal, now: float, done: Done) -> None:
-    gimbal.set_roi(47.0, 8.5, 500.0, now, done)
+    gimbal.set_roi(PLACE, now, done)
 
 
 @pytest.mark.parametrize('later', [
@@ -480,7 +491,8 @@ def test_of_requests_for_a_pose_that_overlap_the_last_one_decides() -> None:
 def test_of_places_in_a_stream_the_newest_is_sent_once_the_one_before_is_acknowledged() -> None:
     rig = in_control()
     for number in range(5):
-        rig.gimbal.set_roi(47.0 + number, 8.5, 0.0, rig.now, rig.done, is_stream=True)
+        rig.gimbal.set_roi(
+            GeoPoint(47.0 + number, 8.5, 0.0), rig.now, rig.done, is_stream=True)
     rig.run(1.0)
 
     assert [one.x for one in rig.messages(mav.CommandInt)] == [470000000, 510000000]

@@ -51,7 +51,7 @@ from support.gimbal_manager import (
     position,
     region,
 )
-from support.gimbals import FakeManager, OURS, Rig
+from support.gimbals import FakeManager, OURS, PLACE, Rig
 from support.records import Answer
 
 ENDING = 'the bridge is ending'
@@ -84,7 +84,7 @@ def use(rig: Rig, draw: random.Random) -> list[Answer]:
     requests = (
         gimbal.take_control, gimbal.take_control, gimbal.set_neutral, gimbal.retract,
         gimbal.clear_roi, lambda *rest: gimbal.set_yaw_lock(draw.random() < 0.5, *rest),
-        lambda *rest: gimbal.set_roi(47.0, 8.0, 500.0, *rest))
+        lambda *rest: gimbal.set_roi(PLACE, *rest))
     setpoints = (
         lambda: gimbal.set_rates((0.0, draw.random(), 0.2), now),
         lambda: gimbal.set_attitude(Quaternion.from_euler(0.0, 0.2, 0.0), YawFrame.VEHICLE, now),

@@ -32,6 +32,7 @@ from illuminator_ros.mavlink.command_sender import CommandSender
 from illuminator_ros.mavlink.component import Component
 from illuminator_ros.mavlink.dialect import mavlink
 from illuminator_ros.payload.attempt import Result
+from illuminator_ros.payload.messages import GeoPoint
 from illuminator_ros.payload.mount_attitude import YawFrame
 from illuminator_ros.payload.rotation import Quaternion
 import pytest
@@ -124,7 +125,7 @@ def test_ros_gets_the_attitude_of_the_device_and_a_region_of_interest() -> None:
     rig.ask(rig.gimbal.take_control)
     rig.give(AUTOPILOT, position(47.0, 8.0, 500.0))
 
-    assert rig.ask(rig.gimbal.set_roi, 47.001, 8.0, 500.0) == ''
+    assert rig.ask(rig.gimbal.set_roi, GeoPoint(47.001, 8.0, 500.0)) == ''
 
     assert math.isclose(euler(rig.messages(GimbalDeviceSetAttitude)[-1])[2], 0.0, abs_tol=1e-3)
 

@@ -28,7 +28,7 @@ from illuminator_ros.payload.mount_attitude import from_mavlink, to_mavlink, Yaw
 from illuminator_ros.payload.rotation import Quaternion, Vector
 import pytest
 from pytest import approx
-from support.gimbals import ALL, FakeManager, in_control, NAN, OTHER, OURS, Rig
+from support.gimbals import ALL, FakeManager, in_control, NAN, OTHER, OURS, PLACE, Rig
 
 EARTH, VEHICLE = YawFrame.EARTH, YawFrame.VEHICLE
 LEVEL = mavlink.GIMBAL_DEVICE_FLAGS_ROLL_LOCK | mavlink.GIMBAL_DEVICE_FLAGS_PITCH_LOCK
@@ -353,7 +353,7 @@ def test_zero_that_is_lost_is_sent_again_when_the_device_is_heard_again() -> Non
 
 @pytest.mark.parametrize('start', [
     lambda rig: rig.gimbal.set_rates((0.0, 0.0, 0.2), rig.now),
-    lambda rig: rig.gimbal.set_roi(47.0, 8.5, 500.0, rig.now, lambda *_: None)],
+    lambda rig: rig.gimbal.set_roi(PLACE, rig.now, lambda *_: None)],
     ids=['rate', 'place'])
 def test_zero_of_a_release_while_the_manager_is_lost_is_sent_when_it_is_heard_again(
         start: Callable[[Rig], object]) -> None:
@@ -412,7 +412,7 @@ MOVES: list[Callable[[Rig], object]] = [
     lambda rig: rig.gimbal.set_attitude(Quaternion(), VEHICLE, rig.now),
     lambda rig: rig.gimbal.set_angles((0.0, 0.2, 0.0), VEHICLE, rig.now),
     lambda rig: rig.gimbal.set_neutral(rig.now, rig.done),
-    lambda rig: rig.gimbal.set_roi(47.0, 8.5, 500.0, rig.now, rig.done)]
+    lambda rig: rig.gimbal.set_roi(PLACE, rig.now, rig.done)]
 
 
 def test_at_the_end_of_the_process_only_a_zero_its_command_and_the_release_are_sent() -> None:
@@ -463,7 +463,7 @@ def test_nothing_moves_the_gimbal_while_its_control_is_released() -> None:
     rig = in_control()
     rig.managers[0].answers = False
     rig.gimbal.set_neutral(rig.now, rig.done)
-    rig.gimbal.set_roi(47.0, 8.5, 500.0, rig.now, rig.done)
+    rig.gimbal.set_roi(PLACE, rig.now, rig.done)
     rig.run(0.1)
     asked_at = rig.now
 

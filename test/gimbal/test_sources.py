@@ -27,7 +27,7 @@ from illuminator_ros.payload.arbitration import Cause, HolderChanged
 from illuminator_ros.payload.command_sources import SourceSettings
 from illuminator_ros.payload.mount_attitude import from_mavlink, YawFrame
 import pytest
-from support.gimbals import FakeManager, in_control, OURS, Rig
+from support.gimbals import FakeManager, in_control, OURS, PLACE, Rig
 
 NAMES = ('safety', 'operator', 'default', 'autonomy')
 TIMEOUT = 2.0
@@ -84,7 +84,7 @@ def test_the_next_source_has_the_gimbal_afterwards_and_must_send_a_setpoint(
 @pytest.mark.parametrize('end', ENDS.values())
 @pytest.mark.parametrize(('start', 'sent'), [
     (lambda rig: rig.gimbal.set_rates((0.0, 0.0, 0.2), rig.now), [pytest.approx(-0.2)]),
-    (lambda rig: rig.gimbal.set_roi(47.0, 8.0, 500.0, rig.now, rig.done), [])],
+    (lambda rig: rig.gimbal.set_roi(PLACE, rig.now, rig.done), [])],
     ids=['rate', 'place'])
 def test_a_rate_or_a_place_ends_with_the_hold_of_its_source(
         start: Callable[[Rig], object], sent: list[float], end: Callable[[Rig], object]) -> None:
@@ -136,7 +136,7 @@ def test_a_takeover_ends_the_commands_of_the_lower_source_and_their_resends() ->
     rig.gimbal.claim('autonomy', rig.now)
     rig.gimbal.set_neutral(rig.now, rig.done)
     rig.gimbal.claim('autonomy', rig.now)
-    rig.gimbal.set_roi(47.0, 8.0, 500.0, rig.now, rig.done)
+    rig.gimbal.set_roi(PLACE, rig.now, rig.done)
     rig.run(0.1)
     point(rig, 'safety')
     taken_at = rig.now

@@ -31,13 +31,14 @@ from illuminator_ros.mavlink.component import Component, Endpoint
 from illuminator_ros.mavlink.dialect import entry_names, mavlink
 from illuminator_ros.mavlink.link import Link
 from illuminator_ros.payload.attempt import Result
-from illuminator_ros.payload.messages import GimbalDeviceAttitudeStatus
+from illuminator_ros.payload.messages import GeoPoint, GimbalDeviceAttitudeStatus
 from support.live_link import EndpointLink
 
 OURS, AUTOPILOT, DEVICE, OTHER = (mav.Address(1, component) for component in (194, 1, 154, 195))
 NAN = math.nan
 ALL = sum(entry_names('GIMBAL_DEVICE_CAP_FLAGS'))
 LEVEL = (1.0, 0.0, 0.0, 0.0)
+PLACE = GeoPoint(47.0, 8.5, 500.0)
 
 E = TypeVar('E', bound=GimbalEvent)
 M = TypeVar('M', bound=mav.Message)

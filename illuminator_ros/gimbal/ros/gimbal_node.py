@@ -278,7 +278,7 @@ class GimbalNode:
             return ros_node.CommandTopic(endpoint, take, read)
 
         def point(gimbal: Gimbal, place: GeoPoint, now: float) -> str:
-            gimbal.set_roi(*place, now, pointed, is_stream=True)
+            gimbal.set_roi(place, now, pointed, is_stream=True)
             return ''
 
         def pointed(result: Result, now: float) -> None:
