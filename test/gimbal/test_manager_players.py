@@ -39,9 +39,9 @@ from support.faulty_wire import Faults, FaultyWire
 from support.frames import Codec
 from support.gimbal_manager import (
     configure,
+    EVERYWHERE,
     information,
     ManagerRig,
-    NAN,
     of,
     pitch_yaw,
     pitch_yaw_command,
@@ -51,8 +51,6 @@ from support.gimbal_manager import (
 LEASE = 2.0
 SECONDS, STEP = 12.0, 0.02
 KINDS = ('obeys', 'lies', 'dies', 'floods', 'forges')
-EVERYWHERE: dict[str, Any] = {
-    f'{axis}_{end}': NAN for axis in ('roll', 'pitch', 'yaw') for end in ('min', 'max')}
 
 
 def address_of(number: int) -> mav.Address:

@@ -38,6 +38,7 @@ from illuminator_ros.payload.messages import (
     GimbalDeviceAttitudeStatus,
     GlobalPositionInt,
 )
+from illuminator_ros.payload.mount_attitude import AXES
 from illuminator_ros.payload.rotation import Quaternion
 
 OURS, DEVICE, AUTOPILOT = mav.Address(1, 194), mav.Address(1, 154), mav.Address(1, 1)
@@ -49,6 +50,9 @@ FULL = (mavlink.GIMBAL_DEVICE_CAP_FLAGS_HAS_RETRACT | mavlink.GIMBAL_DEVICE_CAP_
         | mavlink.GIMBAL_DEVICE_CAP_FLAGS_HAS_YAW_AXIS
         | mavlink.GIMBAL_DEVICE_CAP_FLAGS_HAS_YAW_LOCK
         | mavlink.GIMBAL_DEVICE_CAP_FLAGS_SUPPORTS_YAW_IN_EARTH_FRAME)
+# The ranges of a device without stops.
+EVERYWHERE: dict[str, Any] = {
+    f'{axis}_{end}': NAN for axis in AXES for end in ('min', 'max')}
 T = TypeVar('T')
 
 
@@ -230,7 +234,7 @@ def configure(
 
 
 def pitch_yaw_command(pitch: float, yaw: float, pitch_rate: float = NAN, yaw_rate: float = NAN,
-                      flags: int = 0, device_id: int = 0) -> mav.CommandLong:
+                      flags: float = 0, device_id: int = 0) -> mav.CommandLong:
     """Return MAV_CMD_DO_GIMBAL_MANAGER_PITCHYAW, deg and deg/s."""
     return long(mavlink.MAV_CMD_DO_GIMBAL_MANAGER_PITCHYAW, pitch, yaw, pitch_rate, yaw_rate,
                 flags, 0, device_id)
