@@ -57,6 +57,7 @@ NUMBER, INTEGER, STRING, BOOLEAN = (
          'forward_urls: 8 URLs, but 7 are possible')]),
     ({'connection_url': 'tcp:127.0.0.1:5760', 'forward_urls': ['tcpout://127.0.0.1:5760']},
      "forward_urls: 'tcpout://127.0.0.1:5760' and 'tcp:127.0.0.1:5760' are the same link"),
+    ({'names': ['belly']}, "names: 'belly' is not of the form 1/244=belly"),
     ({'names': ['1/244=2 fast']}, "names: '2 fast' is not a valid node name"),
     ({'names': ['1/244=belly', '1/245=belly']}, "'1/245=belly' repeats an address or a name"),
     ({'names': ['1/244=belly', '1/244=nose']}, "'1/244=nose' repeats an address or a name"),
