@@ -17,38 +17,19 @@
 from collections.abc import Iterator
 import math
 from pathlib import Path
-import signal
-import sys
-import threading
 
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
-from illuminator_ros.illuminator.events import StatusReceived
-from illuminator_ros.illuminator.model import Status
-from illuminator_ros.illuminator.ros.beam import BeamPublisher
-from illuminator_ros.illuminator.ros.parameters import BeamGeometry
 from illuminator_ros.payload.mount_attitude import to_mavlink, YawFrame
 from illuminator_ros.payload.rotation import Quaternion
 import pytest
 from rclpy.qos import DurabilityPolicy, ReliabilityPolicy
-from support.fake_light import status_message
 from support.gimbals import FakeManager, OTHER, served_gimbals
 from support.light import Address, ServedLight
 from support.ports import free_port
 from support.processes import Program
 from support.ros import Parameters, Ros, running_bridge, STREAM
 from support.slow import pass_time_until, SlowLink
-from support.waiting import eventually
 from visualization_msgs.msg import Marker
-
-# A program that has subscribed to a beam.
-VIEWER = """
-import rclpy
-from visualization_msgs.msg import Marker
-rclpy.init()
-node = rclpy.create_node('viewer')
-node.create_subscription(Marker, '/tester/beam', print, 1)
-rclpy.spin(node)
-"""
 
 
 @pytest.fixture(scope='module')
@@ -120,28 +101,6 @@ def test_each_light_has_a_beam_of_its_own_which_is_deleted_when_the_bridge_ends(
     two_beams.end()
     for recorder in recorders:
         recorder.wait(gone)
-
-
-def test_removal_of_beams_does_not_wait_for_a_viewer_that_is_stopped(own_ros: Ros) -> None:
-    viewer = Program(sys.executable, '-c', VIEWER, env={'ROS_DOMAIN_ID': str(own_ros.domain)})
-    try:
-        beam = BeamPublisher(own_ros.node, BeamGeometry('bow', 20.0, 1.0, 0))
-        eventually(lambda: own_ros.node.count_subscribers('/tester/beam'))
-        viewer.send(signal.SIGSTOP)
-
-        def remove() -> None:
-            for _ in range(20):
-                beam.take(StatusReceived(
-                    Address(1, 243), Status.from_message(status_message(enable=1)), 0.0))
-                beam.close()
-
-        removing = threading.Thread(target=remove)
-        removing.start()
-        # A bridge must end within a second.
-        removing.join(0.5)
-        assert not removing.is_alive()
-    finally:
-        viewer.kill()
 
 
 def test_beam_is_off_by_default_and_its_messages_are_not_imported(

@@ -17,18 +17,19 @@ The commands of ``ros2`` that the documentation shows, by rclpy: the wheels have
 ``python -m support.ros2_commands service call NAME TYPE VALUES`` and so on.
 """
 
-from collections.abc import Callable
 import contextlib
 from importlib import import_module
+import os
 import sys
+import threading
 from typing import Any
 
 from builtin_interfaces.msg import Time
-import rclpy
+from rclpy.duration import Duration
 from rclpy.node import Node
-from rclpy.parameter_client import AsyncParameterClient
-from rclpy.qos import HistoryPolicy, qos_profile_system_default
-from support.waiting import PATIENCE
+from rclpy.qos import HistoryPolicy
+from support.ros import Parameters, Ros
+from support.waiting import eventually, PATIENCE
 import yaml
 
 
@@ -62,82 +63,50 @@ def show(message: Any, indent: str = '') -> None:
             print(f'{indent}{name}: {text}', flush=True)
 
 
-def service_call(node: Node, name: str, type_name: str, values: str = '{}') -> None:
+def service_call(ros: Ros, name: str, type_name: str, values: str = '{}') -> None:
     """Call a service and print the answer."""
     type_ = type_of(type_name)
-    client = node.create_client(type_, name)
-    assert client.wait_for_service(PATIENCE), name
-    future = client.call_async(set_fields(type_.Request(), yaml.safe_load(values), node))
-    rclpy.spin_until_future_complete(node, future, timeout_sec=PATIENCE)
-    print(future.result())
+    print(ros.call(type_, name, set_fields(type_.Request(), yaml.safe_load(values), ros.node)))
 
 
-def param_set(node: Node, of: str, name: str, value: str) -> None:
-    """Set a parameter of a node and print the outcome."""
-    client = AsyncParameterClient(node, of)
-    assert client.wait_for_services(PATIENCE), of
-    number = float(value)
-    future = client.set_parameters([rclpy.parameter.Parameter(name, value=number)])
-    rclpy.spin_until_future_complete(node, future, timeout_sec=PATIENCE)
-    [result] = future.result().results
+def param_set(ros: Ros, of: str, name: str, value: str) -> None:
+    """Set a number of a node and print the outcome."""
+    [result] = Parameters(ros, of).set(**{name: float(value)})
     print('Set parameter successful' if result.successful else result.reason)
 
 
-def topic_pub(node: Node, *arguments: str) -> None:
+def topic_pub(ros: Ros, *arguments: str) -> None:
     """Publish once to one subscriber (-1), or at a rate (-r)."""
     *how, name, type_name, values = arguments
     type_ = type_of(type_name)
-    publisher = node.create_publisher(type_, name, qos_profile_system_default)
-
-    def publish() -> None:
-        publisher.publish(set_fields(type_(), yaml.safe_load(values), node))
-
+    publisher = ros.node.create_publisher(type_, name, 10)
     if how == ['-1']:
-        matched = rclpy.task.Future()
-        timer = node.create_timer(0.05, lambda: (
-            matched.set_result(None)
-            if publisher.get_subscription_count() and not matched.done() else None))
-        rclpy.spin_until_future_complete(node, matched, timeout_sec=PATIENCE)
-        timer.cancel()
-        publish()
-        assert publisher.wait_for_all_acked(rclpy.duration.Duration(seconds=PATIENCE))
-    else:
-        node.create_timer(1 / float(how[1]), publish)
-        rclpy.spin(node)
+        eventually(publisher.get_subscription_count)
+    period = threading.Event()
+    while True:
+        publisher.publish(set_fields(type_(), yaml.safe_load(values), ros.node))
+        if how == ['-1']:
+            assert publisher.wait_for_all_acked(Duration(seconds=PATIENCE))
+            return
+        period.wait(1 / float(how[1]))
 
 
-def topic_echo(node: Node, name: str, type_name: str = '') -> None:
+def topic_echo(ros: Ros, name: str, type_name: str = '') -> None:
     """Print the messages on a topic, with the durability and reliability of its publisher."""
-    found = rclpy.task.Future()
-
-    def look() -> None:
-        if not found.done() and (infos := node.get_publishers_info_by_topic(name)):
-            found.set_result(infos[0])
-
-    timer = node.create_timer(0.05, look)
-    rclpy.spin_until_future_complete(node, found, timeout_sec=PATIENCE)
-    timer.cancel()
-    info = found.result()
+    info = eventually(lambda: ros.node.get_publishers_info_by_topic(name))[0]
     info.qos_profile.history, info.qos_profile.depth = HistoryPolicy.KEEP_LAST, 10
-    node.create_subscription(type_of(type_name or info.topic_type), name, show, info.qos_profile)
-    rclpy.spin(node)
+    ros.node.create_subscription(
+        type_of(type_name or info.topic_type), name, show, info.qos_profile)
+    threading.Event().wait()
 
 
-COMMANDS: dict[tuple[str, str], Callable[..., None]] = {
+COMMANDS: dict[tuple[str, str], Any] = {
     ('service', 'call'): service_call, ('param', 'set'): param_set,
     ('topic', 'pub'): topic_pub, ('topic', 'echo'): topic_echo}
 
 
-def main() -> None:
-    """Run the command of the arguments."""
-    first, second, *arguments = sys.argv[1:]
-    rclpy.init()
-    node = Node('ros2_command', enable_rosout=False)
-    with contextlib.suppress(KeyboardInterrupt, rclpy.executors.ExternalShutdownException):
-        COMMANDS[first, second](node, *arguments)
-    node.destroy_node()
-    rclpy.try_shutdown()
-
-
 if __name__ == '__main__':
-    main()
+    first, second, *given = sys.argv[1:]
+    with (contextlib.closing(Ros(int(os.environ['ROS_DOMAIN_ID']))) as client,
+          contextlib.suppress(KeyboardInterrupt)):
+        COMMANDS[first, second](client, *given)

@@ -17,6 +17,7 @@
 from collections.abc import Iterator
 import signal
 import sys
+import threading
 
 from diagnostic_msgs.msg import DiagnosticArray
 from illuminator_ros.mavlink.dialect import mavlink
@@ -26,6 +27,7 @@ from rclpy.qos import QoSProfile, ReliabilityPolicy
 from std_msgs.msg import Bool, Float32
 from std_srvs.srv import SetBool, Trigger
 from support import ros
+from support.embedded import embedded_bridge
 from support.light import Address, eventually, free_port, ServedLight
 from support.processes import ended, Program, python, start_interpreter
 from support.recording import Call
@@ -141,34 +143,24 @@ def test_too_few_descriptors_end_the_start_without_a_traceback(
     assert 'Traceback' not in program.log
 
 
-NO_THREADS = """
-import sys, threading
-from illuminator_ros.cli.bridge import main
+def test_thread_that_cannot_be_started_is_tried_again(
+    own_ros: ros.Ros, port: int, monkeypatch: pytest.MonkeyPatch,
+    capfd: pytest.CaptureFixture[str],
+) -> None:
+    start, refused = threading.Thread.start, list[str]()
 
-start, refused = threading.Thread.start, []
+    def start_later(thread: threading.Thread) -> None:
+        if thread.name in ('housekeeping', 'mavlink-link') and refused.count(thread.name) < 2:
+            refused.append(thread.name)
+            raise RuntimeError("can't start new thread")
+        start(thread)
 
-
-def start_later(thread):
-    if thread.name in ('housekeeping', 'mavlink-link') and refused.count(thread.name) < 2:
-        refused.append(thread.name)
-        raise RuntimeError("can't start new thread")
-    start(thread)
-
-
-threading.Thread.start = start_later
-sys.exit(main())
-"""
-
-
-def test_thread_that_cannot_be_started_is_tried_again(own_ros: ros.Ros, port: int) -> None:
-    program = Program(sys.executable, '-c', NO_THREADS, *ros.bridge_arguments(port), env={
-        'ROS_DOMAIN_ID': str(own_ros.domain)})
-    with ended(program), ended(python(
-            'illuminator_ros.simulator', f'udpout://127.0.0.1:{port}')):
-        program.wait_for("can't start new thread: too many threads or processes; trying again")
-        program.wait_for('light 1/243 connected')
-        # Retry: the clock of the machine may pause for longer than a confirmation takes.
-        eventually(lambda: own_ros.enable().success)
+    with ServedLight(port):
+        monkeypatch.setattr(threading.Thread, 'start', start_later)
+        with embedded_bridge(own_ros.domain, port):
+            ros.Parameters(own_ros).wait(brightness=100.0)
+    assert len(refused) == 4
+    assert "can't start new thread: too many threads or processes" in capfd.readouterr().err
 
 
 def test_node_of_a_light_that_was_silent_for_long_is_removed(own_ros: ros.Ros, port: int) -> None:
