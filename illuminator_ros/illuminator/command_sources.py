@@ -51,14 +51,13 @@ class LightSources(Sources):
             self._desired.pop(source, None)
         return super().claim(source, now)
 
-    def remember(self, source: str, *, enabled: bool | None = None,
-                 brightness: float | None = None) -> None:
+    def remember(self, source: str, newer: DesiredState) -> None:
         """Keep values that a source has requested, as long as it claims the light."""
         if self.is_claimed_by(source):
-            old = self._desired.get(source, DesiredState())
+            older = self._desired.get(source, DesiredState())
             self._desired[source] = DesiredState(
-                old.enabled if enabled is None else enabled,
-                old.brightness if brightness is None else brightness)
+                older.enabled if newer.enabled is None else newer.enabled,
+                older.brightness if newer.brightness is None else newer.brightness)
 
     def forget_switch(self, source: str) -> None:
         """Forget the ON or OFF of a source."""

@@ -21,7 +21,7 @@ from dataclasses import dataclass
 import math
 
 from . import events
-from .command_sources import LightSources
+from .command_sources import DesiredState, LightSources
 from .light_configuration import LightConfiguration
 from .light_queries import LightQueries, STATUS
 from .light_switch import LightSwitch, RULES, SwitchRule
@@ -314,10 +314,11 @@ class Light:
         """
         def finished(result: Result, now: float) -> None:
             if result.success:
-                self._sources.remember(source, enabled=on)
+                self._sources.remember(source, desired)
             done(result, now)
 
-        refusal = self._claim(source, now, is_stream=is_stream, enabled=on)
+        desired = DesiredState(enabled=on)
+        refusal = self._claim(source, now, desired, is_stream=is_stream)
         if self._can_reach(now, done, refusal):
             self._switch.ask(on, now, finished, detail, is_stream=is_stream)
             self._changed(self, now)
@@ -338,8 +339,7 @@ class Light:
         return self._sources.holder or ''
 
     def _claim(
-        self, source: str, now: float, *, is_stream: bool, enabled: bool | None = None,
-        brightness: float | None = None,
+        self, source: str, now: float, desired: DesiredState, *, is_stream: bool,
     ) -> str:
         """Take a request; return why a source may not command the light, '' if it may."""
         if refusal := self._target.commands.refusal:
@@ -353,9 +353,9 @@ class Light:
         self._changed(self, now)
         self._change_holder(self._sources.claim(source, now), now)
         # A request to a lost light has no effect later, but an OFF ends a remembered ON.
-        if is_stream and (self.connected or enabled is False):
-            self._sources.remember(source, enabled=enabled, brightness=brightness)
-        elif enabled is False:
+        if is_stream and (self.connected or desired.enabled is False):
+            self._sources.remember(source, desired)
+        elif desired.enabled is False:
             self._sources.forget_switch(source)
         return self._sources.refusal(source)
 
@@ -424,10 +424,12 @@ class Light:
         """
         def finished(result: Result, now: float) -> None:
             if result.success:
-                self._sources.remember(DEFAULT, brightness=changes.get('brightness'))
+                self._sources.remember(
+                    DEFAULT, DesiredState(brightness=changes.get('brightness')))
             done(result, now)
 
-        if self._can_reach(now, done, self._claim(DEFAULT, now, is_stream=False)):
+        refusal = self._claim(DEFAULT, now, DesiredState(), is_stream=False)
+        if self._can_reach(now, done, refusal):
             self._configuration.configure(changes, now, finished)
 
     def set_brightness(
@@ -443,7 +445,8 @@ class Light:
             if not (result.superseded or self.is_held_by_other(source)):
                 self._emit(events.SetpointFailed(self.address, result.message))
 
-        refusal = self._claim(source, now, is_stream=True, brightness=brightness)
+        refusal = self._claim(
+            source, now, DesiredState(brightness=brightness), is_stream=True)
         if self._can_reach(now, failed, refusal):
             self._configuration.set_brightness(brightness, now)
 

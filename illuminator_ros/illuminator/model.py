@@ -76,6 +76,7 @@ class Mode(IntEnum):
 # The modes that can be commanded; UNKNOWN can only be reported.
 MODES = {mode.label: mode for mode in Mode if mode is not Mode.UNKNOWN}
 _MODES = {int(mode): mode for mode in Mode}
+_ENABLED = {0: False, 1: True}
 
 
 def float32(value: float) -> float:
@@ -172,6 +173,9 @@ FIELDS = ('mode', 'brightness', 'strobe_period', 'strobe_duty_cycle')
 # Unit and upper limit of the fields that are numbers.
 _NUMBERS = {'brightness': ('%', 100.0), 'strobe_period': ('s', MAX_STROBE_PERIOD),
             'strobe_duty_cycle': ('%', 100.0)}
+# The plausible values of the numbers of ILLUMINATOR_STATUS, in the order of :class:`Status`.
+_RANGES = {**{name: (0.0, upper) for name, (_, upper) in _NUMBERS.items()},
+           'temp_c': (ABSOLUTE_ZERO_C, MAX_TEMPERATURE_C)}
 
 
 def checked(name: str, value: object, strobe_range: StrobeRange | None = None) -> Mode | float:
@@ -298,38 +302,23 @@ class Status:
     @classmethod
     def from_message(cls, message: IlluminatorStatus) -> Status:
         """Read a message. Any content is accepted: an invalid field is marked, not raised."""
-        brightness, duty = message.brightness, message.strobe_duty_cycle
-        strobe_range = StrobeRange(message.min_strobe_period, message.max_strobe_period)
-        if (message.enable in (0, 1) and message.mode in _MODES and 0.0 <= brightness <= 100.0
-                and 0.0 <= duty <= 100.0 and 0.0 <= message.strobe_period <= MAX_STROBE_PERIOD
-                and ABSOLUTE_ZERO_C <= message.temp_c <= MAX_TEMPERATURE_C):
-            return cls(
-                message.uptime_ms, message.enable == 1, _MODES[message.mode],
-                message.mode_bitmask, message.error_status, brightness, message.strobe_period,
-                duty, message.temp_c, strobe_range, (), message.gimbal_device_id)
-        invalid: list[str] = []
-
-        def number(name: str, low: float, high: float) -> float | None:
-            value = getattr(message, name)
-            if math.isfinite(value) and low <= value <= high:
-                return float(value)
-            invalid.append(f'{name} {value:g}')
-            return None
-
-        try:
-            mode = Mode(message.mode)
-        except ValueError:
-            mode = Mode.UNKNOWN
-            invalid.append(f'mode {message.mode}')
-        if message.enable not in (0, 1):
-            invalid.append(f'enable {message.enable}')
+        enabled, mode = _ENABLED.get(message.enable), _MODES.get(message.mode)
+        invalid = [f'{name} {getattr(message, name)}'
+                   for name, value in (('mode', mode), ('enable', enabled)) if value is None]
+        numbers: list[float | None] = []
+        for name, (low, high) in _RANGES.items():
+            number: float = getattr(message, name)
+            # A comparison with NaN is false.
+            is_plausible = low <= number <= high
+            numbers.append(number if is_plausible else None)
+            if not is_plausible:
+                invalid.append(f'{name} {number:g}')
+        brightness, strobe_period, strobe_duty_cycle, temperature = numbers
         return cls(
-            message.uptime_ms, bool(message.enable) if message.enable in (0, 1) else None,
-            mode, message.mode_bitmask, message.error_status,
-            number('brightness', 0, 100), number('strobe_period', 0, MAX_STROBE_PERIOD),
-            number('strobe_duty_cycle', 0, 100),
-            number('temp_c', ABSOLUTE_ZERO_C, MAX_TEMPERATURE_C),
-            strobe_range, tuple(invalid), message.gimbal_device_id)
+            message.uptime_ms, enabled, mode or Mode.UNKNOWN, message.mode_bitmask,
+            message.error_status, brightness, strobe_period, strobe_duty_cycle, temperature,
+            StrobeRange(message.min_strobe_period, message.max_strobe_period), tuple(invalid),
+            message.gimbal_device_id)
 
     @property
     def complete(self) -> bool:
