@@ -18,11 +18,8 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
-import math
 import random
 
-from illuminator_ros.illuminator.client import enable_all
-from illuminator_ros.illuminator.commands import SWITCHES
 from illuminator_ros.illuminator.events import (
     AutomaticSwitch,
     DesiredStateFailed,
@@ -32,23 +29,20 @@ from illuminator_ros.illuminator.events import (
     SetpointFailed,
 )
 from illuminator_ros.illuminator.light import Light, Settings
-from illuminator_ros.illuminator.messages import STATUS_ID
-from illuminator_ros.illuminator.model import SafetyLimits, Status
+from illuminator_ros.illuminator.model import SafetyLimits
 from illuminator_ros.illuminator.simulated_properties import (
     IlluminatorBehaviour,
     IlluminatorProperties,
 )
-from illuminator_ros.mavlink.command_sender import CommandSender
 from illuminator_ros.mavlink.dialect import mavlink
 from illuminator_ros.mavlink.messages import Address, CommandAck
-from illuminator_ros.payload.attempt import Result, StatusReport, Target
+from illuminator_ros.payload.attempt import Result
 from illuminator_ros.payload.command_sources import SourceSettings
-from illuminator_ros.payload.last_change import LastChange
 import pytest
 from support.back_to_back import BRIDGE, Pair
-from support.fake_light import FakeLight, LIGHT, status_message
+from support.fake_light import FakeLight
 from support.faulty_wire import Faults
-from support.records import Answer
+from support.random_users import RandomUsers
 from support.shared_address import SharedAddress
 
 ON_OFF, CONFIGURE = mavlink.MAV_CMD_ILLUMINATOR_ON_OFF, mavlink.MAV_CMD_DO_ILLUMINATOR_CONFIGURE
@@ -98,82 +92,6 @@ class Ending:
                 and (address is None or address.component == message.target_component)]
 
 
-class Users:
-    """Everything that may change a light, at random."""
-
-    def __init__(self, pair: Pair, draw: random.Random) -> None:
-        self.pair = pair
-        self.draw = draw
-        self.answers: list[Answer] = []
-        self.is_open = True
-
-    def act(self) -> None:
-        """Take one random action."""
-        self.draw.choice([*(self.enable, self.configure, self.dim) * 4, self.enable_all,
-                          self.refresh, self.desire, self.release, self.restart, self.press,
-                          self.cut, self.open, self.open])()
-        self.pair.turn()
-
-    def light(self) -> Light | None:
-        lights: list[Light | None] = [*self.pair.controller.lights.values()]
-        return self.draw.choice(lights or [None])
-
-    def answer(self) -> Answer:
-        """Return a new answer."""
-        self.answers.append(answer := Answer(self.pair.now))
-        return answer
-
-    def enable(self) -> None:
-        if light := self.light():
-            light.enable(self.draw.random() < 0.8, self.pair.now, self.answer(),
-                         source=self.draw.choice(SOURCES), is_stream=self.draw.random() < 0.5)
-
-    def enable_all(self) -> None:
-        if lights := [*self.pair.controller.lights.values()]:
-            enable_all(lights, True, self.pair.now, self.answer(), name=str)
-
-    def configure(self) -> None:
-        if light := self.light():
-            light.configure({'brightness': float(self.draw.randrange(81)), 'strobe_period': 1.0},
-                            self.pair.now, self.answer())
-
-    def dim(self) -> None:
-        if light := self.light():
-            light.set_brightness(float(self.draw.randrange(101)), self.pair.now,
-                                 source=self.draw.choice(SOURCES))
-
-    def refresh(self) -> None:
-        if light := self.light():
-            light.refresh(self.pair.now, self.answer())
-
-    def desire(self) -> None:
-        if light := self.light():
-            light.set_desired({'strobe_duty_cycle': 30.0}, self.pair.now)
-
-    def release(self) -> None:
-        if light := self.light():
-            light.release(self.draw.choice(SOURCES), self.pair.now)
-
-    def restart(self) -> None:
-        self.draw.choice(self.pair.devices).restart(self.pair.now)
-
-    def press(self) -> None:
-        """Let another sender change a light, which the bridge may undo."""
-        device = self.draw.choice(self.pair.devices)
-        device.apply(device.device.press(
-            self.pair.now, enabled=False, brightness=100.0), self.pair.now)
-
-    def cut(self) -> None:
-        if self.draw.random() < 0.2:
-            self.pair.close()
-            self.is_open = False
-
-    def open(self) -> None:  # noqa: A003
-        if not self.is_open:
-            self.pair.open()
-            self.is_open = True
-
-
 def lights(draw: random.Random) -> list[IlluminatorProperties]:
     """Return three lights, one of which is heard only later."""
     return [
@@ -193,7 +111,7 @@ def test_whatever_is_under_way_and_comes_an_off_is_the_last_change_and_reports_a
         reassert=draw.random() < 0.5, off_after_silence=draw.choice((0.0, 0.5)),
         limits=SafetyLimits(max_brightness=80.0), off_on_release=draw.random() < 0.5,
         sources=draw.choice((None, SourceSettings(SOURCES, draw.choice((0.3, 60.0)))))))
-    users, ending = Users(pair, draw), Ending(pair)
+    users, ending = RandomUsers(pair, draw, *SOURCES, others_switch_on=False), Ending(pair)
     pair.run(draw.choice((0.1, 4.0, 5.0)))
     for _ in range(40):
         users.act()
@@ -402,42 +320,35 @@ def test_a_light_that_does_not_show_off_is_reported_with_the_reason(
     assert not is_permanent or len(ending.changes()) == 1
 
 
-class Last:
-    """The last OFF of a light, whose command was sent at 0 s, and its reports."""
+@pytest.mark.parametrize('result', [
+    mavlink.MAV_RESULT_DENIED, mavlink.MAV_RESULT_FAILED, mavlink.MAV_RESULT_ACCEPTED])
+def test_a_light_that_shows_off_stays_reported_whatever_the_late_acknowledgement_is(
+    ending: Ending, light: FakeLight, result: int,
+) -> None:
+    light.results[ON_OFF] = None
+    ending.begin()
+    light.fields['enable'] = 0
+    ending.pair.run(0.01)
+    light.send(light.status(ending.pair.now))
+    ending.pair.run(0.01)
+    assert ending.reports[light.source].success
+    light.send(CommandAck(ON_OFF, result, 0, 0, *BRIDGE))
+    ending.pair.run(0.3)
 
-    def __init__(self) -> None:
-        self.sender = CommandSender(BRIDGE)
-        target = Target(LIGHT, self.sender, kind='light', status_id=STATUS_ID,
-                        status_name='ILLUMINATOR_STATUS')
-        self.reports: list[tuple[float, bool]] = []
-        self.off: LastChange[Status] = LastChange(
-            target, SWITCHES[False],
-            lambda result, now: self.reports.append((now, result.success)))
-        self.off.poll(0.0)
-
-    def take(
-        self, on: bool, now: float, *, sent_by: float | None = None, shared_address: bool = False,
-    ) -> None:
-        """Take a status."""
-        self.off.reported(StatusReport(
-            Status.from_message(status_message(enable=int(on))),
-            now if sent_by is None else sent_by, shared_address=shared_address), now)
+    assert ending.reports[light.source].success
 
 
-def test_a_light_that_shows_off_stays_reported_whatever_the_late_acknowledgement_is() -> None:
-    last = Last()
-    last.take(False, 0.1)
-    before = list(last.reports)
-    denied = CommandAck(ON_OFF, mavlink.MAV_RESULT_DENIED, 0, 0, *BRIDGE)
-    last.sender.acknowledge(LIGHT, denied, 0.2)
+def test_a_status_that_may_be_older_than_the_off_is_followed_by_a_request_for_another(
+    ending: Ending, light: FakeLight,
+) -> None:
+    pair = ending.pair
+    light.results[ON_OFF], light.fields['enable'] = None, 0
+    older = light.status(pair.now)
+    light.stream, light.fields['enable'] = 0.0, 1
+    pair.run(0.01)
+    ending.begin()
+    light.send(older)
+    pair.run(0.01)
 
-    assert last.reports == before
-    assert last.off.next_deadline() == math.inf
-
-
-def test_a_status_that_may_be_older_than_the_off_is_followed_by_a_request_for_another() -> None:
-    last = Last()
-    last.take(False, 0.01, sent_by=-0.01)
-
-    assert last.reports == [(0.0, False)]
-    assert last.off.next_deadline() <= 0.02
+    assert not ending.reports[light.source].success
+    assert pair.commands(mavlink.MAV_CMD_REQUEST_MESSAGE, since=ending.ended_at)

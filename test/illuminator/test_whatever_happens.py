@@ -16,18 +16,18 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 import random
 
-from illuminator_ros.illuminator.light import Light, Settings
+from illuminator_ros.illuminator.light import Settings
 from illuminator_ros.illuminator.model import Mode
 from illuminator_ros.illuminator.simulated_properties import IlluminatorProperties
 from illuminator_ros.illuminator.thermal import ThermalProperties
 from illuminator_ros.mavlink.messages import Address
+from illuminator_ros.payload.command_sources import DEFAULT
 import pytest
 from support.back_to_back import Pair
 from support.faulty_wire import Faults
-from support.records import Answer
+from support.random_users import RandomUsers
 
 SECONDS = 90.0
 # s after the repair of the line within which all requests must be answered and all states known:
@@ -39,101 +39,27 @@ LIGHTS = [IlluminatorProperties(address=Address(1, one), thermal=ThermalProperti
           for one in (243, 244)]
 
 
-class Chaos:
-    """Takes random actions."""
-
-    def __init__(self, seed: int) -> None:
-        self.draw = random.Random(seed)
-        faults = Faults(**{kind: self.draw.choice((0.0, 0.1, 0.3)) for kind in (
-            'drop', 'duplicate', 'reorder', 'delay', 'corrupt')})
-        settings = Settings(status_interval=self.draw.choice((0.0, 0.2)),
-                            restore_configuration=self.draw.random() < 0.7)
-        self.pair = Pair(LIGHTS, there=faults, settings=settings, seed=seed,
-                         uptime=self.draw.choice((0.0, 1000.0)))
-        self.lights = self.pair.devices
-        self.sets: list[Answer] = []
-        self.others: list[Answer] = []
-        self.is_open = True
-
-    def act(self) -> None:
-        """Take one random action."""
-        users = [self.enable, self.configure, self.publish, self.refresh] * 4
-        self.draw.choice([*users, self.cut, self.open, self.restart, self.change, self.hush])()
-        self.pair.turn()
-
-    def light(self) -> Light | None:
-        lights: list[Light | None] = [*self.pair.controller.lights.values()]
-        return self.draw.choice(lights or [None])
-
-    def answer(self, answers: list[Answer]) -> Answer:
-        """Append a new answer to the list, and return it."""
-        answer = Answer(self.pair.now)
-        answers.append(answer)
-        return answer
-
-    def enable(self) -> None:
-        if light := self.light():
-            light.enable(self.draw.random() < 0.5, self.pair.now, self.answer(self.others))
-
-    def configure(self) -> None:
-        if light := self.light():
-            values = {'brightness': self.draw.randrange(101),
-                      'strobe_period': self.draw.choice((0, 1))}
-            light.configure(values, self.pair.now, self.answer(self.sets))
-
-    def publish(self) -> None:
-        if light := self.light():
-            for _ in range(self.draw.randint(1, 5)):
-                light.set_brightness(float(self.draw.randrange(101)), self.pair.now)
-
-    def refresh(self) -> None:
-        if light := self.light():
-            light.refresh(self.pair.now, self.answer(self.others))
-
-    def cut(self) -> None:
-        self.pair.close()
-        self.is_open = False
-
-    def open(self) -> None:  # noqa: A003
-        if not self.is_open:
-            self.pair.open()
-            self.is_open = True
-
-    def restart(self) -> None:
-        self.draw.choice(self.lights).restart(self.pair.now)
-
-    def change(self) -> None:
-        """Let another sender change a light."""
-        lamp = self.draw.choice(self.lights).device
-        lamp.enabled = self.draw.random() < 0.5
-        lamp.configuration = replace(
-            lamp.configuration, mode=self.draw.choice(list(Mode)[1:]),
-            brightness=float(self.draw.randrange(101)))
-
-    def hush(self) -> None:
-        """Lose all frames of the lights for 1 to 6 s; after 3 s a light is lost."""
-        faults = self.pair.far.wire.faults
-        self.pair.far.wire.faults = replace(faults, drop=1.0)
-        self.pair.run(self.draw.uniform(1.0, 6.0))
-        self.pair.far.wire.faults = faults
-
-
 @pytest.mark.parametrize('seed', range(30))
 def test_random_schedules_end_with_one_answer_each_and_the_true_state(seed: int) -> None:
-    chaos = Chaos(seed)
-    pair = chaos.pair
+    draw = random.Random(seed)
+    faults = Faults(**{kind: draw.choice((0.0, 0.1, 0.3)) for kind in (
+        'drop', 'duplicate', 'reorder', 'delay', 'corrupt')})
+    pair = Pair(LIGHTS, there=faults, seed=seed, uptime=draw.choice((0.0, 1000.0)),
+                settings=Settings(status_interval=draw.choice((0.0, 0.2)),
+                                  restore_configuration=draw.random() < 0.7))
+    users = RandomUsers(pair, draw, DEFAULT)
     end = pair.now + SECONDS
     while pair.now < end:
-        chaos.act()
-        pair.run(chaos.draw.choice((0.0, 0.01, 0.1, 0.5, 2.0)))
+        users.act(users.hush)
+        pair.run(draw.choice((0.0, 0.01, 0.1, 0.5, 2.0)))
     pair.mend()
-    chaos.open()
+    users.open()
     pair.run(RECOVERY)
 
-    assert {len(answer.results) for answer in chaos.sets + chaos.others} == {1}
-    assert max(answer.seconds for answer in chaos.sets) <= 0.9
-    assert max(answer.seconds for answer in chaos.others) <= LONGEST
-    for simulated in chaos.lights:
+    assert {len(answer.results) for answer in users.answers} == {1}
+    assert max(answer.seconds for answer in users.sets) <= 0.9
+    assert max(answer.seconds for answer in users.answers) <= LONGEST
+    for simulated in pair.devices:
         light = pair.controller.lights[simulated.address]
         assert light.connected
         followed = light.snapshot(pair.now).configuration
