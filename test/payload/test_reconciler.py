@@ -12,7 +12,11 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""A reconciler moves a property to its desired value and answers each caller once, truthfully."""
+"""
+A reconciler moves a property to its desired value and answers each caller once, truthfully.
+
+test/illuminator/test_requests.py has its answers, test/illuminator/test_truth.py its evidence.
+"""
 
 from __future__ import annotations
 
@@ -69,25 +73,19 @@ class Bench:
         self.sender = CommandSender(US)
         target = Target(DEVICE, self.sender, kind='device', status_id=status_id,
                         status_name='STATUS')
-        self.ready_at = -math.inf
         self.reconciler: Reconciler[int] = Reconciler(
-            target, earliest=lambda change: self.ready_at,
-            overtakes=lambda change: change.params == (0.0,))
+            target, overtakes=lambda change: change.params == (0.0,))
 
-    def want(
-        self, level: int, *, is_stream: bool = False, limit: float = 30.0,
-        command: int = SET_LEVEL,
-    ) -> list[Result]:
+    def want(self, level: int, *, command: int = SET_LEVEL) -> list[Result]:
         """Want a level, and return the list that gets its results."""
         results: list[Result] = []
         self.reconciler.want(
-            Desired(Level(level, command=command), since=self.now, limit=limit), self.now,
-            lambda result, now: results.append(result), is_stream=is_stream)
+            Desired(Level(level, command=command), since=self.now), self.now,
+            lambda result, now: results.append(result))
         return results
 
-    def report(self, level: int, *, sent_by: float | None = None, shared: bool = False) -> None:
-        self.reconciler.reported(StatusReport(
-            level, self.now if sent_by is None else sent_by, shared_address=shared), self.now)
+    def report(self, level: int) -> None:
+        self.reconciler.reported(StatusReport(level, self.now), self.now)
 
     def acknowledge(self, result: int = ACCEPTED, command: int = SET_LEVEL) -> None:
         self.sender.acknowledge(DEVICE, CommandAck(command, result, 0, 0, *US), self.now)
@@ -120,53 +118,6 @@ def messages(*answers: Sequence[Result]) -> list[str]:
     return [answer[0].message.partition(' (')[0] if answer else '' for answer in answers]
 
 
-def test_a_status_after_the_acknowledgement_that_shows_the_value_is_the_only_success(
-    bench: Bench,
-) -> None:
-    answer = bench.want(1)
-    bench.report(1)
-    sent_at = bench.now
-    bench.run(0.1)
-    bench.acknowledge()
-    bench.report(1, sent_by=sent_at - 0.1)
-    bench.report(5)
-    assert answer == []
-    bench.report(1)
-    assert messages(answer) == ['level 1, confirmed by STATUS: MAV_RESULT_ACCEPTED']
-    assert answer[0].success
-
-
-@pytest.mark.parametrize(('result', 'level', 'shared', 'message'), [
-    (ACCEPTED, 5, False, 'level 1 not confirmed: MAV_RESULT_ACCEPTED, but STATUS shows level 5'),
-    (ACCEPTED, 1, True,
-     'level 1 not confirmed: MAV_RESULT_ACCEPTED, but several devices answer as 1/7'),
-    (ACCEPTED, None, False,
-     'level 1 not confirmed: MAV_RESULT_ACCEPTED, but no STATUS came within 1.00 s'),
-    (DENIED, 1, False, 'refused: MAV_RESULT_DENIED'),
-    (None, 1, False, 'no acknowledgement')], ids=str)
-def test_an_attempt_that_fails_says_why(
-    bench: Bench, result: int | None, level: int | None, shared: bool, message: str,
-) -> None:
-    answer = bench.want(1)
-    if result is not None:
-        bench.acknowledge(result)
-    if level is not None:
-        bench.run(0.01)
-        bench.report(level, shared=shared)
-    bench.run(10.0)
-    assert messages(answer) == [message]
-    assert not answer[0].success
-
-
-def test_a_device_that_never_sends_a_status_succeeds_as_not_confirmed() -> None:
-    bench = Bench()
-    answer = bench.want(1)
-    bench.acknowledge()
-    bench.run(1.0)
-    assert messages(answer) == ['level 1, accepted, not confirmed']
-    assert answer[0].success
-
-
 @pytest.mark.parametrize(('result', 'message', 'success'), [
     (ACCEPTED, 'MAV_RESULT_ACCEPTED', True), (DENIED, 'refused: MAV_RESULT_DENIED', False)])
 def test_the_acknowledgement_decides_where_no_status_shows_the_property(
@@ -188,60 +139,6 @@ def test_a_newer_value_by_another_command_need_not_wait_for_the_acknowledgement(
     bench.acknowledge(command=OTHER_COMMAND)
     bench.run(10.0)
     assert (messages(answer), bench.sent) == (['MAV_RESULT_ACCEPTED'], [1.0, 2.0])
-
-
-def test_equal_values_share_a_command_and_its_outcome(bench: Bench) -> None:
-    answers = [bench.want(1), bench.want(1), bench.want(1, is_stream=True)]
-    bench.acknowledge()
-    bench.report(1)
-    assert [answer[0].success for answer in answers] == [True] * 3
-    assert bench.sent == [1.0]
-
-
-@pytest.mark.parametrize(('newer', 'sent'), [(2, [1.0]), (0, [1.0, 0.0])])
-def test_a_newer_value_supersedes_an_older_one_and_is_sent_after_it_unless_it_overtakes(
-    bench: Bench, newer: int, sent: list[float],
-) -> None:
-    older, answer = bench.want(1), bench.want(newer)
-    assert messages(older, answer) == [f'superseded by level {newer}', '']
-    assert bench.sent == sent
-    bench.acknowledge()
-    bench.run(0.01)
-    assert bench.sent[-1] == newer
-    assert 1.0 not in bench.sent[1:]
-
-
-def test_a_value_waits_for_its_earliest_time_and_fails_if_that_does_not_come(
-    bench: Bench,
-) -> None:
-    bench.ready_at = bench.now + 1.0
-    answer = bench.want(1)
-    bench.run(0.9)
-    assert bench.sent == []
-    bench.run(0.2)
-    assert bench.sent == [1.0]
-    bench.ready_at = math.inf
-    late = bench.want(2, limit=0.5)
-    bench.run(0.6)
-    assert messages(answer, late) == [
-        'superseded by level 2', 'not sent: the command before it has not ended']
-
-
-@pytest.mark.parametrize(('end', 'message', 'tries'), [
-    (lambda bench: bench.reconciler.cancel('cancelled', bench.now), 'cancelled', 1),
-    (lambda bench: bench.reconciler.lost('lost', bench.now), 'no acknowledgement', 1),
-    (lambda bench: bench.reconciler.stop('released', bench.now), 'no acknowledgement', 1),
-    (lambda bench: None, 'no acknowledgement', 4)], ids=['cancel', 'lost', 'stop', 'nothing'])
-def test_a_value_that_is_given_up_is_not_resent(
-    bench: Bench, end: object, message: str, tries: int,
-) -> None:
-    answer = bench.want(1)
-    bench.run(0.1)
-    assert callable(end)
-    end(bench)
-    bench.run(10.0)
-    assert messages(answer) == [message]
-    assert bench.sent == [1.0] * tries
 
 
 def test_an_answer_may_want_another_value_twice(bench: Bench) -> None:
