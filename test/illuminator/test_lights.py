@@ -128,22 +128,6 @@ def test_a_restart_is_one_event_after_the_light_is_heard_again(
     assert pair.light.restarts == events.count('restarted')
 
 
-@pytest.mark.parametrize(('heartbeat', 'status'), [(0.0, 0.5), (0.5, 0.0)])
-def test_a_light_without_a_clock_may_have_restarted_whichever_message_comes_first(
-    heartbeat: float, status: float,
-) -> None:
-    light = without_clock()
-    pair = Pair(light).settle()
-    light.silent = True
-    pair.run(10.0)
-    light.silent = False
-    light.restart(pair.now)
-    light.heartbeat.due = pair.now + heartbeat
-    light.delay_status(status)
-    pair.run(3.0)
-    assert pair.recorder.events[2:] == ['connected', 'restarted']
-
-
 # The stream of statuses
 
 @pytest.mark.parametrize(('stream', 'results', 'least', 'most'), [

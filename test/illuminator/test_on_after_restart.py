@@ -350,49 +350,32 @@ def test_overrides_of_a_light_that_is_lost_before_its_first_status_are_sent_befo
     assert [success for success, _ in pair.recorder.restorations] == [True]
 
 
-def test_an_on_is_not_resent_to_a_light_that_was_lost() -> None:
+@pytest.mark.parametrize(('ask', 'restarts', 'text', 'fields'), [
+    (lambda pair: pair.ask_enable(True), True, 'no acknowledgement (2 tries',
+     {'enable': 0, 'brightness': 30.0}),
+    (lambda pair: pair.ask_configure(brightness=50), False, 'no acknowledgement (',
+     {'enable': 1, 'brightness': 30.0}),
+    (lambda pair: pair.ask_enable(False), False, 'off, confirmed by ILLUMINATOR_STATUS',
+     {'enable': 0, 'brightness': 30.0}),
+], ids=['on', 'set', 'off'])
+def test_only_an_off_is_resent_to_a_light_that_was_lost(
+    ask: Callable[[Pair], Answer], restarts: bool, text: str, fields: dict[str, float],
+) -> None:
     light = FakeLight()
     light.boot = START
     pair = agreed(light)
-    light.silent = True
-    pair.run(2.4)
-    answer = pair.ask_enable(True)
-    pair.run_until(lambda: not pair.light.connected)
-    pair.run(0.45)
-    light.restart(pair.now)
-    light.silent = False
-    pair.run(5.0)
-
-    assert light.shone == []
-    assert answer.result.message.startswith('no acknowledgement (2 tries')
-
-
-def test_a_set_is_not_resent_to_a_light_that_was_lost() -> None:
-    light = FakeLight()
-    pair = agreed(light)
-    light.silent = True
-    pair.run(2.9)
-    answer = pair.ask_configure(brightness=50)
-    pair.run_until(lambda: not pair.light.connected)
-    light.silent = False
-    pair.run(5.0)
-
-    assert not answer.result.success
-    assert light.fields['brightness'] == 30.0
-
-
-def test_an_off_is_resent_to_a_light_that_was_lost() -> None:
-    light = FakeLight()
-    pair = agreed(light)
     assert pair.enable(True).success
     light.silent = True
-    pair.run(2.9)
-    pair.ask_enable(False)
+    pair.run(2.6)
+    answer = ask(pair)
     pair.run_until(lambda: not pair.light.connected)
+    if restarts:
+        light.restart(pair.now)
     light.silent = False
-    pair.run(2.0)
+    pair.run(5.0)
 
-    assert light.fields['enable'] == 0
+    assert answer.result.message.startswith(text)
+    assert light.fields == light.fields | fields
 
 
 def test_a_light_that_restarts_without_a_loss_is_brought_within_the_limits_again() -> None:
@@ -450,29 +433,6 @@ def test_a_restoration_from_before_a_loss_does_not_end_the_one_after_it() -> Non
     switch_on_at_connection(pair)
 
     assert light.shone == [60.0]
-
-
-def test_an_on_that_undoes_an_off_and_waits_is_not_sent_to_a_light_that_has_restarted() -> None:
-    light = FakeLight()
-    pair = agreed(light, Settings(reassert=True))
-    assert pair.enable(True).success
-    pair.run(3.0)
-    light.fields['enable'] = 0
-    light.results[ON_OFF] = None
-    pair.run(1.1)
-    assert pair.commands(ON_OFF, since=pair.now - 1.1)
-    lose(pair, light)
-    light.silent = True
-    pair.run(20.0)
-    light.silent = False
-    light.results.clear()
-    light.shone.clear()
-    light.restart(pair.now)
-    heartbeat_first(light, pair.now)
-    pair.run(20.0)
-
-    assert pair.light.restarts == 1
-    assert light.shone == []
 
 
 @pytest.mark.parametrize('first', [mavlink.MAV_RESULT_TEMPORARILY_REJECTED, None])

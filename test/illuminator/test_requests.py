@@ -265,20 +265,6 @@ def test_an_on_of_a_stream_that_waits_is_not_sent_after_a_later_off(
     assert [answer.result.superseded for answer in answers] == [True, True]
 
 
-def test_an_on_of_a_stream_that_waits_fails_when_the_light_is_lost(
-    fake: FakeLight, faked: Pair,
-) -> None:
-    fake.results[ON_OFF] = None
-    faked.ask_enable(False, is_stream=True)
-    answer = faked.ask_enable(True, is_stream=True)
-    faked.close()
-    assert 'is lost' in answer.result.message
-    fake.results.clear()
-    faked.open()
-    faked.run(10.0)
-    assert not any(m.param1 for m in faked.commands(ON_OFF))
-
-
 @pytest.mark.parametrize('apart', [0.05, 0.5])
 def test_offs_in_a_row_succeed_though_the_light_takes_its_time(
     fake: FakeLight, faked: Pair, apart: float,
@@ -376,25 +362,6 @@ def test_an_answer_that_raises_does_not_hold_up_other_requests(pair: Pair) -> No
         pair.run(5.0)
     assert pair.wait_for(answer).success
     assert pair.enable(True).success
-
-
-# The end
-
-def test_the_end_answers_each_request_once_and_sends_nothing_that_waited(
-    fake: FakeLight, faked: Pair,
-) -> None:
-    fake.results |= {ON_OFF: IN_PROGRESS, CONFIGURE: None}
-    answers = [faked.ask_enable(True), faked.ask_enable(True), faked.ask_configure(brightness=50)]
-    faked.light.set_brightness(60.0, faked.now)
-    faked.light.set_desired({'strobe_period': 1.0}, faked.now)
-    faked.run(0.1)
-    sent = len(faked.commands(ON_OFF, CONFIGURE))
-    faked.controller.close(faked.now)
-    assert [(answer.result.success, answer.result.message) for answer in answers] == [
-        (False, 'the bridge is ending')] * 3
-    faked.run(60.0)
-    assert [len(answer.results) for answer in answers] == [1, 1, 1]
-    assert len(faked.commands(ON_OFF, CONFIGURE)) == sent
 
 
 # The time of a set
