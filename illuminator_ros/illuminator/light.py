@@ -27,9 +27,8 @@ from .light_queries import LightQueries, STATUS
 from .light_switch import LightSwitch, RULES, SwitchRule
 from .messages import STATUS_ID
 from .model import Changes, SafetyLimits, Status, StrobeRange
-from .status_tracker import StatusTracker
+from .status_tracker import NewestStatus, StatusTracker
 from ..mavlink.command_sender import CommandResult, CommandSender, format_seconds
-from ..mavlink.dialect import mavlink
 from ..mavlink.messages import Address
 from ..payload.arbitration import Cause, HolderChanged
 from ..payload.attempt import Done, Result, Target
@@ -65,36 +64,6 @@ class Settings:
     sources: SourceSettings | None = None
     off_on_release: bool = False
     switch_rules: tuple[SwitchRule, ...] = RULES
-
-
-@dataclass
-class _Newest:
-    """
-    The newest status.
-
-    :param status: None before the first.
-    :param at: when it came, s.
-    :param measures_temperature: whether a temperature other than 0 was ever reported.
-    """
-
-    status: Status | None = None
-    at: float = -math.inf
-    measures_temperature: bool = False
-
-    def take(self, status: Status, now: float) -> None:
-        """Take a status."""
-        self.status, self.at = status, now
-        # Lights that do not measure send 0 (ArduSub), and a sensor rarely reads exactly 0.
-        self.measures_temperature |= bool(status.temperature)
-
-    @property
-    def temperature(self) -> float | None:
-        """Return the temperature, degC; None where it is not measured, or the sensor fails."""
-        status = self.status
-        if (status is None or not self.measures_temperature
-                or status.error_flags & mavlink.ILLUMINATOR_ERROR_FLAGS_THERMISTOR_FAILURE):
-            return None
-        return status.temperature
 
 
 class Light:
@@ -133,18 +102,17 @@ class Light:
             status_name=STATUS)
         self._queries = LightQueries(
             self._target, settings.status_interval, settings.heartbeat_timeout)
+        self._newest = NewestStatus()
         self._configuration = LightConfiguration(
-            self._target, emit, limits=settings.limits, restore=settings.restore_configuration,
-            reassert=settings.reassert,
+            self._target, emit, self._newest, limits=settings.limits,
+            restore=settings.restore_configuration, reassert=settings.reassert,
             must_wait=lambda: (
                 bool(commands.refusal) or self._switch.may_brightness_undo_off()))
         self._switch = LightSwitch(
-            self._target, emit, self._configuration,
+            self._target, emit, self._configuration, self._newest,
             off_after_silence=settings.off_after_silence, reassert=settings.reassert,
             earliest_on=self._earliest_on, rules=settings.switch_rules)
         self._tracker = StatusTracker()
-        self._newest = _Newest()
-        self._is_shared = False
         self._link_failure = ''
         self._sources = LightSources(settings.sources)
 
@@ -182,12 +150,12 @@ class Light:
             if self._tracker.proof_due < math.inf:
                 self._queries.need_status(self._tracker.proof_due)
             return
-        self._newest.take(status, now)
+        was_shared = self._newest.is_shared
+        self._newest.take(report, now)
         if restarted:
             self._restarted(now)
-        if self._is_shared is not report.shared_address:
-            self._is_shared = report.shared_address
-            self._emit(events.AddressShared(self.address, self._is_shared))
+        if report.shared_address is not was_shared:
+            self._emit(events.AddressShared(self.address, report.shared_address))
         self._forget_silenced(now)
         self._switch.reported(report, now, restarted=restarted)
         self._configuration.reported(
@@ -245,7 +213,7 @@ class Light:
     @property
     def strobe_range(self) -> StrobeRange:
         """Return the strobe periods that the light reports to be possible."""
-        return self.status.strobe_range if self.status else StrobeRange()
+        return self._newest.strobe_range
 
     def unreachable(self, now: float) -> str:
         """Return why requests cannot reach the light, for people; '' if they can."""

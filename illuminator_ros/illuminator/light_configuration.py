@@ -42,6 +42,7 @@ from .model import (
     StrobeRange,
     unexpected_differences,
 )
+from .status_tracker import NewestStatus
 from ..payload.attempt import Done, Result, StatusReport, Target
 from ..payload.reconciler import Desired, Reconciler
 from ..payload.repeat_limit import RepeatLimit
@@ -174,6 +175,7 @@ class LightConfiguration:
     Keeps one light configured. No I/O; times are s.
 
     :param emit: takes the events.
+    :param newest: the newest status.
     :param limits: apply to each command that is sent.
     :param restore: whether a light that has restarted gets its confirmed configuration again.
     :param reassert: whether changes by other senders are undone.
@@ -184,7 +186,7 @@ class LightConfiguration:
     """
 
     def __init__(
-        self, target: Target, emit: Callable[[events.LightEvent], None], *,
+        self, target: Target, emit: Callable[[events.LightEvent], None], newest: NewestStatus, *,
         limits: SafetyLimits, restore: bool = True, reassert: bool = False,
         must_wait: Callable[[], bool] = lambda: False,
     ) -> None:
@@ -192,11 +194,11 @@ class LightConfiguration:
         self.guard = LimitGuard(limits, emit, events.LimitExceeded(target.address, (), ''))
         self._address = target.address
         self._emit = emit
+        self._newest = newest
         self._restores = restore
         self._must_wait = must_wait
         self._undoing = undoing_limit(reassert)
         self._reconciler: Reconciler[Status] = Reconciler(target, self._ended)
-        self._report: StatusReport[Status] | None = None
         self._setpoint: float | None = None
         self._required = Required()
         # The result of the last command, None before the first.
@@ -234,14 +236,6 @@ class LightConfiguration:
         """When the last command was sent, s."""
         return self._reconciler.last_sent.at if self._reconciler.last_sent else -math.inf
 
-    @property
-    def _status(self) -> Status | None:
-        return self._report.status if self._report else None
-
-    @property
-    def _strobe_range(self) -> StrobeRange:
-        return self._report.status.strobe_range if self._report else StrobeRange()
-
     # Settings
 
     def change_limits(self, limits: SafetyLimits, now: float) -> None:
@@ -253,7 +247,7 @@ class LightConfiguration:
         desired = self._reconciler.desired
         if desired is not None and isinstance(desired.change, Configure):
             goal = desired.change.configuration
-            limited = limits.clipped(goal, self._strobe_range)
+            limited = limits.clipped(goal, self._newest.strobe_range)
             if limited != goal:
                 # A resend would exceed the limits. The newest setpoint is sent as the limit.
                 if self._is_stream and self._setpoint is None:
@@ -261,8 +255,9 @@ class LightConfiguration:
                 self._reconciler.cancel(
                     ', '.join(limits.excess(goal)) or 'a limit was changed', now,
                     superseded=desired.reason == _SETPOINT)
-        if self._status is not None and (self.agreed.confirmed or self._status.complete):
-            self._keep_limits(self._status.configuration(self.agreed.confirmed or NOTHING), now)
+        status = self._newest.status
+        if status is not None and (self.agreed.confirmed or status.complete):
+            self._keep_limits(status.configuration(self.agreed.confirmed or NOTHING), now)
 
     def change_reassert(self, reassert: bool) -> None:
         """Undo changes by other senders from now on, or follow them."""
@@ -344,7 +339,8 @@ class LightConfiguration:
             self._required = Required()
 
     def _checked(self, changes: Changes) -> dict[str, float]:
-        return {name: checked(name, value, self._strobe_range) for name, value in changes.items()}
+        return {name: checked(name, value, self._newest.strobe_range)
+                for name, value in changes.items()}
 
     def _change(self, values: Changes) -> Configure:
         """
@@ -373,7 +369,7 @@ class LightConfiguration:
                         f'set to {DEFAULT_DUTY_CYCLE:g} %')
             goal = replace(self._sendable(base, values), **values)
         # Each command is made here, so the limits apply to every command.
-        limited = self.guard.limits.clipped(goal, self._strobe_range)
+        limited = self.guard.limits.clipped(goal, self._newest.strobe_range)
         return Configure(limited, list(dict.fromkeys((*names, *goal.differences(limited)))), note)
 
     def _sendable(self, base: Configuration, changes: Changes) -> Configuration:
@@ -382,14 +378,14 @@ class LightConfiguration:
 
         Otherwise a light that once reported a value out of its range would deny every change.
         """
-        if self._status is None:
+        if self._newest.status is None:
             return base
-        reported = self._status.configuration(base)
+        reported = self._newest.status.configuration(base)
         ruled_out = {}
         for name in FIELDS:
             try:
                 if name != 'mode' and name not in changes:
-                    checked(name, getattr(base, name), self._strobe_range)
+                    checked(name, getattr(base, name), self._newest.strobe_range)
             except InvalidValue:
                 ruled_out[name] = getattr(reported, name)
         return replace(base, **ruled_out)
@@ -406,7 +402,7 @@ class LightConfiguration:
                                or value == getattr(change.configuration, name)])
             self.agreed.accept(change.configuration, status)
         elif result.contradicted:
-            self.agreed.contradicted(change.configuration, self._status, result.message)
+            self.agreed.contradicted(change.configuration, self._newest.status, result.message)
         if desired.reason == _REQUIRED:
             self._required_ended(result, now)
         elif desired.reason == _SETPOINT and not (result.success or result.superseded):
@@ -469,7 +465,6 @@ class LightConfiguration:
         :param can_follow: whether the status shows a change for certain.
         :param switched_at: when the light was last switched by us, s.
         """
-        self._report = report
         was_changing = self.is_changing
         self._reconciler.reported(report, now)
         status = report.status
@@ -552,7 +547,7 @@ class LightConfiguration:
         if required.requirement is Requirement.OVERRIDE and not required.has_ended:
             return None
         goal = self.guard.limits.clipped(
-            replace(confirmed, **required.values), self._strobe_range)
+            replace(confirmed, **required.values), self._newest.strobe_range)
         not_shown = goal.differences(reported)
         if status.error_flags & DIMMING_FLAGS:
             not_shown.append('brightness')
@@ -576,10 +571,10 @@ class LightConfiguration:
     def _keep_limits(self, reported: Configuration, now: float) -> None:
         """Bring a light that exceeds a limit back within it, once."""
         # Values that undo a change by another sender may be due only later.
-        if (self.guard.check(reported, self._strobe_range)
+        if (self.guard.check(reported, self._newest.strobe_range)
                 and self._required.requirement is Requirement.OTHER_SENDER
                 and (due := self.guard.due(now)) is not None):
-            limited = self.guard.limits.clipped(reported, self._strobe_range)
+            limited = self.guard.limits.clipped(reported, self._newest.strobe_range)
             values = {name: getattr(limited, name) for name in reported.differences(limited)}
             self._required = self._required.and_also(values, Requirement.LIMIT, due)
 
@@ -618,7 +613,7 @@ class LightConfiguration:
         is_unconfirmed = self._reconciler.is_busy or (
             self._outcome is not None and not self._outcome.success)
         if (self.agreed.confirmed is not None and self.agreed.confirmed.brightness == value
-                and not is_unconfirmed and not (self._report and self._report.shared_address)):
+                and not is_unconfirmed and not self._newest.is_shared):
             return
         try:
             change = self._change({'brightness': value})
@@ -640,7 +635,7 @@ class LightConfiguration:
         required.due = now + RESTORE_INTERVAL + limit - CONFIGURE_LIMIT
         for name, value in list(required.values.items()):
             try:
-                checked(name, value, self._strobe_range)
+                checked(name, value, self._newest.strobe_range)
             except InvalidValue as error:
                 self._drop_fields([name])
                 self._restored(False, str(error))

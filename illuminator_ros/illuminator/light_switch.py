@@ -35,6 +35,7 @@ from .light_configuration import (
     undoing_limit,
 )
 from .model import DIMMING_FLAGS, Mode, Status
+from .status_tracker import NewestStatus
 from ..mavlink.command_sender import format_seconds
 from ..mavlink.dialect import mavlink
 from ..payload.attempt import Change, Done, Result, StatusReport, Target
@@ -141,6 +142,7 @@ class LightSwitch:
     Switches one light. No I/O; times are s.
 
     :param emit: takes the events.
+    :param newest: the newest status.
     :param configuration: of the light: an OFF replaces it where brightness is the switch.
     :param reassert: whether a switch by another sender is undone.
     :param earliest_on: returns the time before which an ON must not be sent.
@@ -150,14 +152,15 @@ class LightSwitch:
 
     def __init__(
         self, target: Target, emit: Callable[[events.LightEvent], None],
-        configuration: LightConfiguration, *, off_after_silence: float, reassert: bool,
-        earliest_on: Callable[[], float], rules: Sequence[SwitchRule] = RULES,
+        configuration: LightConfiguration, newest: NewestStatus, *, off_after_silence: float,
+        reassert: bool, earliest_on: Callable[[], float], rules: Sequence[SwitchRule] = RULES,
     ) -> None:
         self.state = SwitchState(off_after_silence)
         self.brightness = BrightnessAsSwitch()
         self._target = target
         self._emit = emit
         self._configuration = configuration
+        self._newest = newest
         self._rules = rules
         self._reconciler: Reconciler[Status] = Reconciler(
             target, self._ended, overtakes=_is_off,
@@ -173,8 +176,8 @@ class LightSwitch:
         self._undoing = undoing_limit(reassert)
         # Whether a status has shown it on since the last OFF that was confirmed.
         self._was_on = False
-        # The newest status and whether several lights send from the address.
-        self._report: StatusReport[Status] | None = None
+        # Whether the last status showed that heat has switched the light off.
+        self._was_hot = False
         # When the light has last confirmed or refused a switch: it will not execute it later.
         self._settled_at = -math.inf
         # When another rule may come into force, s; at once after a change of the state.
@@ -344,10 +347,6 @@ class LightSwitch:
         return self._reconciler.last_sent.at if self._reconciler.last_sent else -math.inf
 
     @property
-    def _is_shared(self) -> bool:
-        return self._report is not None and self._report.shared_address
-
-    @property
     def may_be_on(self) -> bool:
         """Whether the light, or one of several at its address, is on or may go on."""
         # A light that sends no status may be on if it was switched on, and so may one of several
@@ -356,8 +355,8 @@ class LightSwitch:
         state, sent = self.state, self._reconciler.last_sent
         return bool(
             state.enabled or self._reconciler.may_set(_is_on)
-            or sent and _is_on(sent.change) and (state.enabled is None or self._is_shared)
-            or self._was_on and self._is_shared)
+            or sent and _is_on(sent.change) and (state.enabled is None or self._newest.is_shared)
+            or self._was_on and self._newest.is_shared)
 
     def _last_on_at(self, now: float) -> float:
         """Return the time after which no ON was sent, s, unless it has succeeded or failed."""
@@ -377,7 +376,7 @@ class LightSwitch:
 
     def is_known_off(self, now: float) -> bool:
         """Return whether the light is off, and no command of ours may still switch it on."""
-        return (self.state.enabled is False and not self._is_shared
+        return (self.state.enabled is False and not self._newest.is_shared
                 and not self._reconciler.may_set(_is_on) and not self.is_own(True, now)
                 and not (self.brightness.off_brightness == 0.0
                          and self._configuration.has_values_to_send))
@@ -397,14 +396,14 @@ class LightSwitch:
         self._due = -math.inf
         state, enabled = self.state, report.status.enabled
         before, state.enabled = state.enabled, enabled
-        last, self._report = self._report, report
         self._was_on |= bool(enabled)
         if enabled is False:
             confirmed = self._configuration.agreed.confirmed
             self.brightness.reported(
                 report.status, was_dimmed=bool(before and confirmed and confirmed.brightness)
                 and not self._configuration.is_changing)
-        was_hot = last is not None and _is_hot(last.status)
+        was_hot, self._was_hot = self._was_hot, bool(
+            report.status.error_flags & mavlink.ILLUMINATOR_ERROR_FLAGS_OVER_TEMPERATURE_SHUTDOWN)
         # Several lights at one address seem to be one light that switches repeatedly, and a light
         # that has cooled down switches itself on.
         is_busy = self._reconciler.is_busy
@@ -469,7 +468,3 @@ class LightSwitch:
         if not connected:
             return due
         return min(due, self._due, self._last_off.next_deadline() if self._last_off else math.inf)
-
-
-def _is_hot(status: Status) -> bool:
-    return bool(status.error_flags & mavlink.ILLUMINATOR_ERROR_FLAGS_OVER_TEMPERATURE_SHUTDOWN)

@@ -22,7 +22,8 @@ from enum import Enum
 import math
 import operator
 
-from .model import DIMMING_FLAGS, Mode, NOTHING, Status, unexpected_differences
+from .model import DIMMING_FLAGS, Mode, NOTHING, Status, StrobeRange, unexpected_differences
+from ..mavlink.dialect import mavlink
 from ..payload.attempt import StatusReport
 
 WRAP_MS = 1 << 32
@@ -64,7 +65,6 @@ class Uptime(Enum):
     RUNNING = 'running'
     RESTARTED = 'restarted'
     LATE = 'late'
-    NO_CLOCK = 'no clock'
 
 
 class UptimeClock:
@@ -108,10 +108,8 @@ class UptimeClock:
         elapsed = now - last_at
         if uptime_ms == last_ms:
             # A repeated status, two statuses within a millisecond, or a light without a clock.
-            is_same = elapsed < NO_CLOCK_TIME and (self._has_clock or not was_lost)
-            if is_same:
-                return Uptime.RUNNING
-            return Uptime.RESTARTED if was_lost else Uptime.NO_CLOCK
+            is_same = self._has_clock and elapsed < NO_CLOCK_TIME
+            return Uptime.RESTARTED if was_lost and not is_same else Uptime.RUNNING
         ahead_ms = uptime_difference(uptime_ms, last_ms)
         has_progressed = ahead_ms >= 0
         lag = elapsed - ahead_ms / 1000
@@ -295,7 +293,6 @@ class AddressConflict:
         self._by_start = _Senders(_is_same_start)
         self._by_number = _Senders(operator.eq)
         self._recent: list[Status] = []
-        self._recent_uptimes: list[int] = []
 
     def take(self, status: Status, now: float, *, commanded: bool, sender: int = 0) -> None:
         """
@@ -305,17 +302,14 @@ class AddressConflict:
         :param commanded: whether a command of ours may have changed the light.
         """
         uptime = status.uptime_ms
-        # The uptimes are kept apart, so that eight old statuses need not be read for each.
-        equal = self._recent_uptimes.count(uptime)
-        has_clock = equal < len(self._recent)
-        if has_clock and equal and status in self._recent:
+        has_clock = any(one.uptime_ms != uptime for one in self._recent)
+        if has_clock and status in self._recent:
             # The same frame by another route, on which its sequence number may lag far behind.
             return
         if has_clock or not self._recent:
             self._by_start.take(now * 1000.0 - uptime, now)
         self._by_number.take(sender, now)
         self._recent = [*self._recent[1 - MAX_RECENT:], status]
-        self._recent_uptimes = [*self._recent_uptimes[1 - MAX_RECENT:], uptime]
         if not commanded:
             repeated = self._take_state(status)
             self.can_follow = repeated or not self._evidence
@@ -360,6 +354,51 @@ def _same_state(one: Status, other: Status) -> bool:
 def _shown(status: Status) -> tuple[object, ...]:
     return (status.enabled, status.mode, status.brightness, status.strobe_period,
             status.strobe_duty_cycle)
+
+
+@dataclass
+class NewestStatus:
+    """
+    The newest status of a light, for all that need it.
+
+    :param report: None before the first.
+    :param at: when it came, s.
+    :param measures_temperature: whether a temperature other than 0 was ever reported.
+    """
+
+    report: StatusReport[Status] | None = None
+    at: float = -math.inf
+    measures_temperature: bool = False
+
+    def take(self, report: StatusReport[Status], now: float) -> None:
+        """Take a status."""
+        self.report, self.at = report, now
+        # Lights that do not measure send 0 (ArduSub), and a sensor rarely reads exactly 0.
+        self.measures_temperature |= bool(report.status.temperature)
+
+    @property
+    def status(self) -> Status | None:
+        """Return the status, None before the first."""
+        return self.report.status if self.report else None
+
+    @property
+    def is_shared(self) -> bool:
+        """Whether several lights send from the address."""
+        return self.report is not None and self.report.shared_address
+
+    @property
+    def strobe_range(self) -> StrobeRange:
+        """Return the strobe periods that the light reports to be possible."""
+        return self.report.status.strobe_range if self.report else StrobeRange()
+
+    @property
+    def temperature(self) -> float | None:
+        """Return the temperature, degC; None where it is not measured, or the sensor fails."""
+        status = self.status
+        if (status is None or not self.measures_temperature
+                or status.error_flags & mavlink.ILLUMINATOR_ERROR_FLAGS_THERMISTOR_FAILURE):
+            return None
+        return status.temperature
 
 
 class StatusTracker:

@@ -405,6 +405,17 @@ def test_an_off_whose_undoing_failed_is_not_undone_after_a_restart() -> None:
     assert light.fields['enable'] == 0
 
 
+def test_an_off_that_cannot_be_undone_three_times_is_left_and_reported() -> None:
+    light, pair = reasserting()
+    assert pair.enable(True).success
+    light.results[ON_OFF] = mavlink.MAV_RESULT_FAILED
+    light.fields['enable'] = 0
+    pair.run(30.0)
+
+    assert [(one.change, one.undone) for one in pair.recorder.others
+            if isinstance(one, ChangedByOther)] == [('off', False)]
+
+
 # Lights for which brightness is the switch
 
 @pytest.mark.parametrize('by_request', [True, False])

@@ -30,7 +30,7 @@ from illuminator_ros.illuminator.status_tracker import (
 import pytest
 from support.fake_light import status_message
 
-RUNNING, RESTARTED, LATE, NO_CLOCK = Uptime
+RUNNING, RESTARTED, LATE = Uptime
 HOUR_MS, DAY_MS = 3_600_000, 86_400_000
 Fields = dict[str, Any]
 OFF: Fields = {'enable': 0}
@@ -81,8 +81,8 @@ def meanings(*statuses: tuple[int, float]) -> list[Uptime]:
     (DAY_MS, HOUR_MS, 2 * 3600.0, RESTARTED),
     # A light without a clock.
     (0, 0, 1.0, RUNNING),
-    (0, 0, 2.0, NO_CLOCK),
-    (7, 7, 10.0, NO_CLOCK),
+    (0, 0, 2.0, RUNNING),
+    (7, 7, 10.0, RUNNING),
 ])
 def test_an_uptime_shows_a_restart_a_late_frame_or_no_clock(
     last_ms: int, new_ms: int, elapsed: float, meaning: Uptime,
