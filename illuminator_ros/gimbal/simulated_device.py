@@ -159,49 +159,52 @@ class SimulatedMount:
     :param device_id: gimbal_device_id of its messages, 0 for a component of its own.
     """
 
-    def __init__(self, properties: MountProperties, device_id: int, now: float) -> None:
+    def __init__(
+        self, properties: MountProperties, behaviour: GimbalBehaviour, device_id: int, now: float,
+    ) -> None:
         self.motion = GimbalMotion(properties, now)
         self._properties = properties
         self._device_id = device_id
         self._booted_at = now
         self._first_flags = self.motion.flags
         self._informed = self._reported = 0
+        self.behave(behaviour, now)
 
     def uptime_ms(self, now: float) -> int:
         """Return the time since the start, ms, wrapping as the field does."""
         return time_boot_ms(now - self._booted_at)
 
     def behave(self, behaviour: GimbalBehaviour, now: float) -> None:
-        """Apply the faults of the axes."""
+        """Behave differently from now on."""
+        self._behaviour = behaviour
         self.motion.advance(now)
         self.motion.fail(behaviour.frozen_axis, limited=behaviour.limits_range)
 
-    def obey(self, demand: Setpoint, behaviour: GimbalBehaviour, now: float) -> None:
+    def obey(self, demand: Setpoint, now: float) -> None:
         """Take a setpoint, see :meth:`GimbalMotion.obey`."""
         stop = demand.has_rates_only and not any(
             rate for rate in demand.rates if math.isfinite(rate))
-        if not behaviour.ignores_changes and (behaviour.stops or not stop):
+        if not self._behaviour.ignores_changes and (self._behaviour.stops or not stop):
             self.motion.obey(demand, now)
 
-    def flags(self, behaviour: GimbalBehaviour) -> int:
+    @property
+    def flags(self) -> int:
         """Return the flags of the setpoint as they are reported."""
-        return self._first_flags if behaviour.frozen_flags else self.motion.flags
+        return self._first_flags if self._behaviour.frozen_flags else self.motion.flags
 
-    def status(
-        self, behaviour: GimbalBehaviour, now: float, failures: int = 0,
-    ) -> GimbalDeviceAttitudeStatus | None:
+    def status(self, now: float, failures: int = 0) -> GimbalDeviceAttitudeStatus | None:
         """
         Return the status of this moment, None if it sends none.
 
         :param failures: GIMBAL_DEVICE_ERROR_FLAGS besides the flags of the axes.
         """
+        behaviour, motion = self._behaviour, self.motion
         if not behaviour.reports:
             return None
-        motion = self.motion
         motion.advance(now)
         known = motion.heading_known(now)
         frame = motion.frame if known and behaviour.reports_earth else YawFrame.VEHICLE
-        flags = self.flags(behaviour)
+        flags = self.flags
         if behaviour.names_frame:
             flags |= frame.flag
         elif known:
@@ -225,20 +228,18 @@ class SimulatedMount:
             failures | behaviour.false_flags, motion.vehicle.yaw if known else math.nan, turning,
             self._device_id)
 
-    def limits(self, behaviour: GimbalBehaviour) -> Mapping[str, float]:
+    def limits(self) -> Mapping[str, float]:
         """Return the fields roll_min to yaw_max of an INFORMATION message."""
         fields = range_fields(self._properties.ranges)
-        if behaviour.limits_in_degrees:
+        if self._behaviour.limits_in_degrees:
             fields = {name: math.degrees(value) for name, value in fields.items()}
         self._informed += 1
-        return fields if behaviour.static_information else {
+        return fields if self._behaviour.static_information else {
             **fields, 'pitch_max': fields['pitch_max'] + 0.01 * self._informed}
 
-    def information(
-        self, behaviour: GimbalBehaviour, now: float,
-    ) -> gimbal.GimbalDeviceInformation | None:
+    def information(self, now: float) -> gimbal.GimbalDeviceInformation | None:
         """Return the INFORMATION of a device, None if it sends none."""
-        if not behaviour.identifies:
+        if not self._behaviour.identifies:
             return None
         properties, capabilities = self._properties, self._properties.capabilities
         vendor, model, custom = (
@@ -249,7 +250,7 @@ class SimulatedMount:
         return gimbal.GimbalDeviceInformation(
             self.uptime_ms(now), vendor, model, custom, version, version,
             properties.address.system << 8 | properties.address.component,
-            capabilities & 0xFFFF, 0, **self.limits(behaviour),
+            capabilities & 0xFFFF, 0, **self.limits(),
             gimbal_device_id=self._device_id, cap_flags2=capabilities)
 
     def describe(self, now: float, *notes: str) -> simulated.Snapshot:
@@ -300,8 +301,7 @@ class SimulatedGimbal(simulated.SimulatedDevice):
 
     def restart(self, now: float) -> None:
         """See :meth:`SimulatedDevice.restart`; it forgets its manager."""
-        self.mount = SimulatedMount(self.properties, 0, now)
-        self.mount.behave(self.behaviour, now)
+        self.mount = SimulatedMount(self.properties, self.behaviour, 0, now)
         self.manager = self.properties.manager
         self._announced_at = now
 
@@ -319,10 +319,9 @@ class SimulatedGimbal(simulated.SimulatedDevice):
         if message_id == GimbalDeviceAttitudeStatus.id:
             self._expire(now)
             return self.mount.status(
-                self.behaviour, now, 0 if self.manager
-                else mavlink.GIMBAL_DEVICE_ERROR_FLAGS_NO_MANAGER)
+                now, 0 if self.manager else mavlink.GIMBAL_DEVICE_ERROR_FLAGS_NO_MANAGER)
         if message_id == gimbal.GimbalDeviceInformation.id:
-            return self.mount.information(self.behaviour, now)
+            return self.mount.information(now)
         return None
 
     def receive(self, source: Address, message: Message, now: float) -> Iterable[Message]:
@@ -366,7 +365,7 @@ class SimulatedGimbal(simulated.SimulatedDevice):
         except ValueError:
             return
         if demand.frame is YawFrame.VEHICLE or self.mount.motion.heading_known(now):
-            self.mount.obey(demand, self.behaviour, now)
+            self.mount.obey(demand, now)
 
     def snapshot(self, now: float) -> simulated.Snapshot:
         """See :meth:`SimulatedDevice.snapshot`."""

@@ -24,6 +24,7 @@ up to :data:`NUDGE_LIMIT`.
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
+import contextlib
 from dataclasses import dataclass
 from functools import partial
 import math
@@ -193,8 +194,8 @@ class SimulatedManager(simulated.SimulatedDevice):
         self.primary = self.secondary = NO_COMPONENT
         self._roi: GeoPoint | None = None
         self._base = UNSET_VECTOR
-        self.mount = SimulatedMount(self.properties, self.properties.device_id, now)
-        self.mount.behave(self.behaviour, now)
+        self.mount = SimulatedMount(
+            self.properties, self.behaviour, self.properties.device_id, now)
         self.mount.motion.take_heading(
             0.0, 0.0, math.radians(self.properties.heading), 0.0, now, math.inf)
 
@@ -212,7 +213,7 @@ class SimulatedManager(simulated.SimulatedDevice):
         """See :meth:`SimulatedDevice.message`."""
         behaviour, mount, device_id = self.behaviour, self.mount, self.properties.device_id
         if message_id == gimbal.GimbalManagerStatus.id and behaviour.reports:
-            flags = mount.flags(behaviour) if behaviour.shows_flags else LEVEL
+            flags = mount.flags if behaviour.shows_flags else LEVEL
             control = (NO_COMPONENT, NO_COMPONENT) if behaviour.frozen_control else (
                 self.primary, self.secondary)
             return gimbal.GimbalManagerStatus(
@@ -220,11 +221,11 @@ class SimulatedManager(simulated.SimulatedDevice):
         if message_id == gimbal.GimbalManagerInformation.id and behaviour.identifies:
             return gimbal.GimbalManagerInformation(
                 mount.uptime_ms(now), int(self.properties.capabilities), device_id,
-                **mount.limits(behaviour))
+                **mount.limits())
         if message_id == GimbalDeviceAttitudeStatus.id:
-            return mount.status(behaviour, now)
+            return mount.status(now)
         if message_id == gimbal.GimbalDeviceInformation.id:
-            return mount.information(behaviour, now)
+            return mount.information(now)
         return None
 
     # Setpoints
@@ -235,9 +236,10 @@ class SimulatedManager(simulated.SimulatedDevice):
             if source.system == self.properties.address.system:
                 self._take_vehicle(message, now)
         elif isinstance(message, AnySetpoint) and self._is_for_device(message.gimbal_device_id):
-            demand = self._read(message)
-            if demand is not None and self._may_control(source):
-                self._obey(source, demand, now)
+            with contextlib.suppress(ValueError):
+                demand = self._read(message)
+                if self._may_control(source):
+                    self._obey(source, demand, now)
         return ()
 
     def _take_vehicle(self, message: Attitude | GlobalPositionInt, now: float) -> None:
@@ -261,21 +263,18 @@ class SimulatedManager(simulated.SimulatedDevice):
                   | mavlink.GIMBAL_DEVICE_FLAGS_YAW_IN_VEHICLE_FRAME)
         return flags & ~frames if self.behaviour.frame_is_lock else flags
 
-    def _read(self, message: AnySetpoint) -> Setpoint | None:
-        """Return the demand of a message, None if it is ignored."""
+    def _read(self, message: AnySetpoint) -> Setpoint:
+        """Return the demand of a message; ValueError if it is ignored."""
         behaviour = self.behaviour
+        demand = read_setpoint(
+            replaced(message, flags=self._flags(message.flags)), self.properties.ranges)
+        has_both = all(map(math.isfinite, (*demand.angles, *demand.rates[1:])))
         if (isinstance(message, gimbal.GimbalManagerSetPitchyaw) and not behaviour.takes_pitchyaw
                 or isinstance(message, gimbal.GimbalManagerSetManualControl)
-                and not behaviour.takes_manual):
-            return None
-        try:
-            demand = read_setpoint(replaced(message, flags=self._flags(message.flags)),
-                                   self.properties.ranges)
-        except ValueError:
-            return None
-        has_both = all(map(math.isfinite, (*demand.angles, *demand.rates[1:])))
-        ignored = has_both and not behaviour.angles_with_rates or self._lacks_an_axis(demand)
-        return None if ignored else demand
+                and not behaviour.takes_manual
+                or has_both and not behaviour.angles_with_rates or self._lacks_an_axis(demand)):
+            raise ValueError('the profile ignores it')
+        return demand
 
     def _lacks_an_axis(self, demand: Setpoint) -> bool:
         """Return whether a demand has the angle of only one axis, and the profile ignores it."""
@@ -295,7 +294,7 @@ class SimulatedManager(simulated.SimulatedDevice):
         else:
             self._base = demand.angles
         self._roi = None
-        self.mount.obey(demand, self.behaviour, now)
+        self.mount.obey(demand, now)
 
     # Commands
 
@@ -381,13 +380,12 @@ class SimulatedManager(simulated.SimulatedDevice):
     def _clear_roi(self, now: float) -> None:
         # "After this command the gimbal manager should ... assume a neutral position."
         self._roi = None
-        self.mount.obey(Setpoint(mavlink.GIMBAL_DEVICE_FLAGS_NEUTRAL | LEVEL), self.behaviour, now)
+        self.mount.obey(Setpoint(mavlink.GIMBAL_DEVICE_FLAGS_NEUTRAL | LEVEL), now)
 
     def _point_at_roi(self, now: float) -> None:
         if self._roi is not None and (angles := direction(self._position, self._roi)):
-            self.mount.obey(Setpoint(LEVEL | mavlink.GIMBAL_DEVICE_FLAGS_YAW_LOCK, YawFrame.EARTH,
-                                   (0.0, *angles)),
-                            self.behaviour, now)
+            self.mount.obey(Setpoint(
+                LEVEL | mavlink.GIMBAL_DEVICE_FLAGS_YAW_LOCK, YawFrame.EARTH, (0.0, *angles)), now)
 
     def snapshot(self, now: float) -> simulated.Snapshot:
         """See :meth:`SimulatedDevice.snapshot`."""
