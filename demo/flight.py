@@ -26,8 +26,6 @@ The exit status is 0 if the images agree with the truth, otherwise 1.
 from __future__ import annotations
 
 import argparse
-from collections.abc import Iterator
-import contextlib
 import csv
 import os
 from pathlib import Path
@@ -39,8 +37,7 @@ import tempfile
 import threading
 import time
 
-ROOT = Path(__file__).resolve().parent.parent
-sys.path.insert(0, str(ROOT))
+sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
 
 from flight_model import (  # noqa: E402
     ATTITUDE_RATE,
@@ -58,23 +55,20 @@ from flight_model import (  # noqa: E402
 )
 from illuminator_ros.cli.simulator.components import SettingError  # noqa: E402
 from illuminator_ros.cli.simulator.csv_file import CsvFile  # noqa: E402
-from illuminator_ros.mavlink.dialect import mavlink  # noqa: E402
 from illuminator_ros.mavlink.link import Link  # noqa: E402
-from illuminator_ros.mavlink.messages import Address  # noqa: E402
 from illuminator_ros.mavlink.url import parse_url  # noqa: E402
 from illuminator_ros.payload.messages import GeoPoint  # noqa: E402
 from illuminator_ros.payload.rotation import enu_flu, flip, Quaternion  # noqa: E402
 from illuminator_ros.payload.simulated import SimulatedComponents  # noqa: E402
 from illuminator_ros.rededge.simulated import (  # noqa: E402
     COLUMNS,
-    DEFAULT_SYSTEM_ID,
     RedEdgeProperties,
     SimulatedRedEdge,
 )
+from programs import END_TIMEOUT, running  # noqa: E402
 
 # s to start a program, and s from its start to the take-off, real time.
 START_TIMEOUT, LEAD_TIME = 20.0, 0.5
-END_TIMEOUT = 5.0
 # s of flight time after which the node refuses a fix, and an attitude.
 POSITION_TIMEOUT, ATTITUDE_TIMEOUT = 1.0, 0.5
 # s that a message may take from the node to the camera, real time; and the share of images in
@@ -149,10 +143,9 @@ class SimulatedCamera:
     """
 
     def __init__(self, path: Path, images: Path, speed: float) -> None:
-        address = Address(DEFAULT_SYSTEM_ID, mavlink.MAV_COMP_ID_CAMERA)
         self._url = f'pty://{path}'
         self._device = SimulatedRedEdge(RedEdgeProperties(
-            address, validity=VALIDITY / speed, own_gps=GeoPoint(LATITUDE, LONGITUDE, 0.0)))
+            validity=VALIDITY / speed, own_gps=GeoPoint(LATITUDE, LONGITUDE, 0.0)))
         self._device.records.subscribe(CsvFile(str(images), tuple(COLUMNS)).append)
         self._device.set_clock(time.time(), time.monotonic())
         self._endpoint = SimulatedComponents(
@@ -171,24 +164,6 @@ class SimulatedCamera:
         link.call(lambda now: self._device.set_interval(interval, now))
         # The interval begins with the next poll.
         link.call(lambda now: None)
-
-
-@contextlib.contextmanager
-def running(log: Path, *command: str) -> Iterator[subprocess.Popen[str]]:
-    """Run a Python program, and end it as Ctrl-C would; its errors go to a log."""
-    with log.open('w') as errors:
-        process = subprocess.Popen(
-            [sys.executable, *command], cwd=ROOT, text=True, stdin=subprocess.DEVNULL,
-            stdout=subprocess.PIPE, stderr=errors)
-    try:
-        yield process
-    finally:
-        process.send_signal(signal.SIGINT)
-        try:
-            process.wait(END_TIMEOUT)
-        except subprocess.TimeoutExpired:
-            process.kill()
-            process.wait()
 
 
 def wait_until(begin: float, seconds: float) -> None:
@@ -218,7 +193,7 @@ def fly(flight: Flight, images: Path, directory: Path) -> Comparison:
         with running(directory / 'node.log', *node):
             if not camera.heard.wait(START_TIMEOUT):
                 raise TimeoutError('the camera does not receive from the node rededge')
-            with running(directory / 'robot.log', *robot) as process:
+            with running(directory / 'robot.log', *robot, is_read=True) as process:
                 assert process.stdout is not None
                 if not (line := process.stdout.readline()):
                     raise TimeoutError('the robot has not started')

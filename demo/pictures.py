@@ -32,7 +32,6 @@ import os
 from pathlib import Path
 import random
 import re
-import socket
 import subprocess
 import sys
 import tempfile
@@ -45,7 +44,6 @@ sys.path.insert(0, str(ROOT))
 os.environ.setdefault('ROS_DOMAIN_ID', str(random.randrange(1, 101)))
 os.environ.setdefault('ROS_AUTOMATIC_DISCOVERY_RANGE', 'LOCALHOST')
 
-from flight import running  # noqa: E402
 from flight_model import Flight, METRES_PER_DEGREE  # noqa: E402
 from illuminator_ros.cli.monitor.app import MonitorApp  # noqa: E402
 from illuminator_ros.cli.monitor.ros_graph import Graph  # noqa: E402
@@ -56,6 +54,7 @@ from illuminator_ros.ros.qos import STATE_QOS  # noqa: E402
 import matplotlib  # noqa: E402
 from matplotlib import pyplot  # noqa: E402
 from mpl_toolkits.mplot3d.art3d import Poly3DCollection  # noqa: E402
+from programs import free_port, running  # noqa: E402
 import rclpy  # noqa: E402
 from visualization_msgs.msg import Marker  # noqa: E402
 
@@ -70,13 +69,6 @@ KEYS = {'light': (['home'], ['space enter', '-', '-']),
 FLIGHT_SECONDS, FLIGHT_SPEED = 36.0, 10.0
 # Degrees that these keys turn the gimbal down.
 DOWN = 30.0
-
-
-def free_port() -> int:
-    """Return a free UDP port."""
-    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as bound:
-        bound.bind(('127.0.0.1', 0))
-        return int(bound.getsockname()[1])
 
 
 @contextlib.contextmanager

@@ -21,21 +21,22 @@ Foxglove and PlotJuggler open the file without ROS. Needs ``pip install mcap``.
 from __future__ import annotations
 
 import argparse
+import contextlib
 from importlib import import_module
 import os
 from pathlib import Path
-import subprocess
 import sys
+import tempfile
 import threading
 import time
 
 from ament_index_python import get_package_share_directory
 from mcap.writer import Writer
+from programs import free_port, running
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
-from ros_client import RosClient, TimedOut
-from run import end, free_port, ROOT
+from ros_client import Failed, RosClient
 from std_srvs.srv import Trigger
 
 # The wheels of ROS, which stand in for an installation, have the definitions here.
@@ -125,17 +126,17 @@ def operate(ros: RosClient, seconds: float) -> None:
     """
     Use the devices, so that their topics have something to show.
 
-    :raises TimedOut: if one does not do what it should.
+    :raises Failed: if one does not do what it should.
     """
     ros.wait('light', lambda: ros.topic('connected'), 20.0)
     ros.wait('attitude of the gimbal', ros.angles, 20.0)
     ros.enable(True)
-    ros.set_atomically(strobe_period=1.0, strobe_duty_cycle=50.0)
+    ros.set(strobe_period=1.0, strobe_duty_cycle=50.0)
     ros.take_control()
     start = time.monotonic()
     while (passed := time.monotonic() - start) < seconds:
         ros.turn(30.0 + 15.0 * passed / seconds, 40.0 * passed / seconds - 20.0)
-        ros.set('brightness', round(100.0 - 60.0 * passed / seconds))
+        ros.set(brightness=round(100.0 - 60.0 * passed / seconds))
         ros.call(Trigger, '/rededge/capture', Trigger.Request())
         time.sleep(0.2)
     ros.enable(False)
@@ -156,23 +157,21 @@ def main() -> int:
          '-p', 'payloads:=[illuminator, gimbal]', '-p', 'beam_range:=20.0',
          '-p', 'mounted_on:=1', '-p', 'frame_id:=base_link'],
         ['rededge', f'udpout://{camera}'])
-    processes = [subprocess.Popen(
-        [sys.executable, '-m', f'illuminator_ros.{name}', *rest], cwd=ROOT,
-        stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL) for name, *rest in commands]
-    ros = RosClient()
-    recorder = Recorder(arguments.file)
-    try:
-        operate(ros, arguments.seconds)
-        failure = '' if recorder.topics else 'no topic was found'
-    except TimedOut as error:
-        failure = str(error)
-    finally:
-        recorder.close()
-        ros.close()
-        # The nodes first, since they give the gimbal back.
-        statuses = [*end(processes[2:]), *end(processes[:2])]
+    failure = ''
+    with tempfile.TemporaryDirectory() as logs, contextlib.ExitStack() as stack:
+        # The nodes end first, since they give the gimbal back.
+        processes = [stack.enter_context(running(
+            Path(logs, str(number)), '-m', f'illuminator_ros.{name}', *rest))
+            for number, (name, *rest) in enumerate(commands)]
+        ros = stack.enter_context(contextlib.closing(RosClient()))
+        recorder = stack.enter_context(contextlib.closing(Recorder(arguments.file)))
+        try:
+            operate(ros, arguments.seconds)
+        except Failed as error:
+            failure = str(error)
+    failure = failure or ('' if recorder.topics else 'no topic was found')
     print(failure or f'{arguments.file}: {os.path.getsize(arguments.file) / 1000:.0f} kB')
-    return 1 if failure or any(statuses) else 0
+    return 1 if failure or any(one.returncode for one in processes) else 0
 
 
 if __name__ == '__main__':

@@ -24,8 +24,7 @@ from typing import Any, TypeVar
 
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from geometry_msgs.msg import Vector3Stamped
-from rcl_interfaces.msg import SetParametersResult
-from rcl_interfaces.srv import GetParameters, SetParameters, SetParametersAtomically
+from rcl_interfaces.srv import GetParameters, SetParametersAtomically
 import rclpy
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.parameter import Parameter
@@ -38,8 +37,8 @@ Result = TypeVar('Result')
 STATE_QOS = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 
 
-class TimedOut(Exception):
-    """An event did not happen in time; the text names it."""
+class Failed(Exception):
+    """An event did not happen in time, or a request was not granted; the text says which."""
 
 
 class RosClient:
@@ -51,13 +50,10 @@ class RosClient:
         self._changed = threading.Condition()
         self._topics: dict[str, bool | float] = {}
         self._lamp: DiagnosticStatus | None = None
-        for topic in ('connected', 'enabled'):
+        for topic, type_ in (('connected', Bool), ('enabled', Bool), ('brightness', Float32),
+                             ('strobe_period', Float32)):
             self._node.create_subscription(
-                Bool, f'/illuminator/{topic}', functools.partial(self._received, topic),
-                STATE_QOS)
-        for topic in ('brightness', 'strobe_period'):
-            self._node.create_subscription(
-                Float32, f'/illuminator/{topic}', functools.partial(self._received, topic),
+                type_, f'/illuminator/{topic}', functools.partial(self._received, topic),
                 STATE_QOS)
         self._node.create_subscription(DiagnosticArray, '/diagnostics', self._diagnosed, 10)
         self._angles: tuple[float, float] | None = None
@@ -91,12 +87,12 @@ class RosClient:
         """
         Return the result of a condition on topics and diagnostics once it holds.
 
-        :raises TimedOut: if it does not hold within ``timeout`` s.
+        :raises Failed: if it does not hold within ``timeout`` s.
         """
         with self._changed:
             result = self._changed.wait_for(condition, timeout)
         if not result:
-            raise TimedOut(f'no {event} within {timeout:g} s')
+            raise Failed(f'no {event} within {timeout:g} s')
         return result
 
     def topic(self, name: str) -> bool | float | None:
@@ -111,37 +107,49 @@ class RosClient:
         """
         Call a service.
 
-        :raises TimedOut: if it is not there or does not answer.
+        :raises Failed: if it is not there or does not answer.
         """
         client = self._node.create_client(type_, service)
         try:
             if not client.wait_for_service(timeout):
-                raise TimedOut(f'no service {service} within {timeout:g} s')
+                raise Failed(f'no service {service} within {timeout:g} s')
             answered = threading.Event()
             future = client.call_async(request)
             future.add_done_callback(lambda _: answered.set())
             if not answered.wait(timeout):
-                raise TimedOut(f'no answer of {service} within {timeout:g} s')
+                raise Failed(f'no answer of {service} within {timeout:g} s')
             return future.result()
         finally:
             self._node.destroy_client(client)
 
-    def enable(self, on: bool) -> SetBool.Response:
-        """Call ``~/enable``."""
-        return self.call(SetBool, '/illuminator/enable', SetBool.Request(data=on))
+    def request(self, type_: type[Any], service: str, request: object) -> str:
+        """
+        Call a service that says whether it succeeded, and return its message.
 
-    def set(self, name: str, value: float) -> SetParametersResult:  # noqa: A003
-        """Set one parameter, as ``ros2 param set`` does."""
-        parameters = [Parameter(name, value=value).to_parameter_msg()]
-        return self.call(SetParameters, '/illuminator/set_parameters',
-                         SetParameters.Request(parameters=parameters)).results[0]
+        :raises Failed: if it did not; see also :meth:`call`.
+        """
+        answer = self.call(type_, service, request)
+        if not answer.success:
+            raise Failed(answer.message)
+        return str(answer.message)
 
-    def set_atomically(self, **values: float) -> SetParametersResult:
-        """Set several parameters in one call."""
+    def enable(self, on: bool) -> str:
+        """Call ``~/enable``, and return its message."""
+        return self.request(SetBool, '/illuminator/enable', SetBool.Request(data=on))
+
+    def set(self, **values: float) -> None:  # noqa: A003
+        """
+        Set parameters in one call.
+
+        :raises Failed: if they are refused, with the reason.
+        """
         parameters = [Parameter(name, value=value).to_parameter_msg()
                       for name, value in values.items()]
-        return self.call(SetParametersAtomically, '/illuminator/set_parameters_atomically',
-                         SetParametersAtomically.Request(parameters=parameters)).result
+        result = self.call(
+            SetParametersAtomically, '/illuminator/set_parameters_atomically',
+            SetParametersAtomically.Request(parameters=parameters)).result
+        if not result.successful:
+            raise Failed(result.reason)
 
     def get(self, name: str) -> float:
         """Return the value of a floating-point parameter."""
@@ -149,9 +157,9 @@ class RosClient:
                              GetParameters.Request(names=[name]))
         return float(response.values[0].double_value)
 
-    def take_control(self) -> Trigger.Response:
-        """Call ``take_control`` of the gimbal."""
-        return self.call(Trigger, '/gimbal/take_control', Trigger.Request())
+    def take_control(self) -> str:
+        """Call ``take_control`` of the gimbal, and return its message."""
+        return self.request(Trigger, '/gimbal/take_control', Trigger.Request())
 
     def angles(self) -> tuple[float, float] | None:
         """Return the last pitch and yaw of the gimbal, degrees, None before the first."""
