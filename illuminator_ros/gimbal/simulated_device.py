@@ -274,7 +274,7 @@ def _turn(device: Any, words: list[str], now: float) -> simulated.Effect:
 
 COMMANDS: tuple[simulated.ConsoleCommand[Any, simulated.Effect], ...] = (
     simulated.ConsoleCommand('turn PITCH YAW', 'turn it by hand, degrees, relative to horizon '
-                             'and vehicle', _turn, (2,)),
+                             'and vehicle', _turn),
 )
 
 

@@ -33,12 +33,7 @@ from . import messages as gimbal
 from .axes import LEVEL, Range
 from .manager_setpoint import AnySetpoint, direction, read_roi, read_setpoint, Refused, Setpoint
 from .messages import DEVICE_ID_PARAM, NO_COMPONENT
-from .simulated_device import (
-    COMMANDS,
-    GimbalBehaviour,
-    MountProperties,
-    SimulatedMount,
-)
+from .simulated_device import COMMANDS, GimbalBehaviour, MountProperties, SimulatedMount
 from ..mavlink.dialect import mavlink, replaced
 from ..mavlink.messages import Address, AnyCommand, Message, params_of
 from ..payload import simulated

@@ -27,12 +27,7 @@ import math
 
 from . import model
 from .messages import IlluminatorStatus, STATUS_ID
-from .simulated_properties import (
-    FAULTS,
-    IlluminatorBehaviour,
-    IlluminatorProperties,
-    PROFILES,
-)
+from .simulated_properties import FAULTS, IlluminatorBehaviour, IlluminatorProperties, PROFILES
 from .thermal import ThermalModel, ThermalProperties
 from ..mavlink import messages as mav
 from ..mavlink.dialect import mavlink
@@ -71,15 +66,14 @@ COMMANDS: tuple[ConsoleCommand[SimulatedIlluminator, Effect], ...] = (
     ConsoleCommand('off', 'switch off, likewise',
                    lambda light, words, now: light.press(now, enabled=False)),
     ConsoleCommand('brightness PERCENT', 'set it, likewise',
-                   lambda light, words, now: light.press(now, brightness=_number(words[0])), (1,)),
+                   lambda light, words, now: light.press(now, brightness=_number(words[0]))),
     ConsoleCommand('mode MODE', 'internal_control or external_sync, likewise',
-                   lambda light, words, now: light.press(now, mode=words[0]), (1,)),
-    ConsoleCommand('strobe S [PERCENT]', 'period and duty cycle, likewise; 0 ends it', _strobe,
-                   (1, 2)),
+                   lambda light, words, now: light.press(now, mode=words[0])),
+    ConsoleCommand('strobe S [PERCENT]', 'period and duty cycle, likewise; 0 ends it', _strobe),
     ConsoleCommand('ambient DEG_C', 'change the ambient temperature', lambda light, words, now:
-                   partial(light.set_ambient, _celsius(words[0]), now), (1,)),
+                   partial(light.set_ambient, _celsius(words[0]), now)),
     ConsoleCommand('temperature DEG_C', "change the light's own temperature", lambda light, words,
-                   now: partial(light.heat_to, _celsius(words[0]), now), (1,)),
+                   now: partial(light.heat_to, _celsius(words[0]), now)),
 )
 
 
@@ -162,12 +156,12 @@ class SimulatedIlluminator(SimulatedDevice):
                 return text.ljust(size, behaviour.padding).encode()[:size]
             return text.encode()[:size - behaviour.terminates]
 
+        serial_number = properties.serial_number or 'SIM-{}-{}'.format(*properties.address)
         return mav.ComponentInformationBasic(
             self.uptime_ms(now) if behaviour.has_clock else 0, 0, 0,
             string(properties.vendor, 32), string(properties.model, 32),
             string(properties.software_version, 24), string(properties.hardware_version, 24),
-            string(properties.serial_number or f'SIM-{"-".join(map(str, properties.address))}',
-                   32))
+            string(serial_number, 32))
 
     def execute(self, source: mav.Address, command: AnyCommand, now: float) -> Reply:
         """See :meth:`SimulatedDevice.execute`."""

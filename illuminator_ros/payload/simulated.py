@@ -83,21 +83,24 @@ class ConsoleCommand(Generic[T_contra, R_co]):
     """
     A command of the console, with a result for each component that it is given to.
 
-    :param usage: the command and its arguments.
+    :param usage: the command and its arguments; those in brackets may be left out.
     :param do: called with the component or its device, the arguments and the time; ValueError
         if an argument is wrong.
-    :param counts: how many arguments it takes.
     """
 
     usage: str
     help: str  # noqa: A003
     do: Callable[[T_contra, list[str], float], R_co]
-    counts: tuple[int, ...] = (0,)
 
     @property
     def name(self) -> str:
         """Return the word that a line begins with."""
         return self.usage.partition(' ')[0]
+
+    def takes(self, count: int) -> bool:
+        """Return whether it takes so many arguments."""
+        arguments = self.usage.split()[1:]
+        return sum(one[0] != '[' for one in arguments) <= count <= len(arguments)
 
 
 @dataclass(frozen=True)

@@ -304,13 +304,13 @@ def _capture(camera: SimulatedRedEdge, words: list[str], now: float) -> simulate
 
 COMMANDS: tuple[simulated.ConsoleCommand[SimulatedRedEdge, simulated.Effect], ...] = (
     simulated.ConsoleCommand('capture [panel]', 'take an image, as by a button on the camera',
-                             _capture, (0, 1)),
+                             _capture),
     simulated.ConsoleCommand(
         'interval S', 'take an image every S seconds; 0 ends it', lambda camera, words, now:
-        partial(camera.set_interval, _interval(words[0]), now), (1,)),
+        partial(camera.set_interval, _interval(words[0]), now)),
     simulated.ConsoleCommand(
         'own-gps PLACE', 'LAT,LON,ALT of its own GPS, or none', lambda camera, words, now:
-        partial(camera.set_own_gps, read_place(words[0])), (1,)),
+        partial(camera.set_own_gps, read_place(words[0]))),
 )
 
 

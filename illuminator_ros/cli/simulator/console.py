@@ -49,8 +49,8 @@ def _faults(component: Component, words: list[str], now: float) -> str:
 COMMANDS: Sequence[ConsoleCommand[Component, str | None]] = (
     ConsoleCommand('reboot', 'restart, as after a power cycle',
                    lambda component, words, now: component.restart(now)),
-    ConsoleCommand('fault NAME[=VALUE]', 'start a fault', _fault, (1,)),
-    ConsoleCommand('clear [NAME]', 'end one fault, or all', _clear, (0, 1)),
+    ConsoleCommand('fault NAME[=VALUE]', 'start a fault', _fault),
+    ConsoleCommand('clear [NAME]', 'end one fault, or all', _clear),
     ConsoleCommand('faults', 'show the present faults', _faults),
     ConsoleCommand('status', 'show the state of each component',
                    lambda component, words, now: component.snapshot(now).text),
@@ -104,7 +104,7 @@ def execute(line: str, components: Sequence[Component], now: float) -> str:
     if not targets:
         return f'no command or component {name!r}; help lists the commands'
     _, command = targets[0]
-    if len(rest) not in command.counts:
+    if not command.takes(len(rest)):
         return f'usage: {command.usage}'
     try:
         answers = [_execute(*one, rest, now) for one in targets]
