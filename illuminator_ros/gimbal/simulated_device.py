@@ -37,7 +37,7 @@ from .. import __version__
 from ..mavlink.dialect import flag_names, mavlink
 from ..mavlink.messages import Address, Message, time_boot_ms
 from ..payload import simulated
-from ..payload.faults import Behaviour, Fault, FaultTable, FaultValue, faulty, FLAGS
+from ..payload.faults import Behaviour, fault, FaultTable, FaultValue, FLAGS
 from ..payload.messages import GimbalDeviceAttitudeStatus
 from ..payload.mount_attitude import AXES, yaw_frame, YawFrame
 from ..payload.rotation import Quaternion
@@ -78,33 +78,28 @@ class GimbalBehaviour(Behaviour):
     heartbeat_type: int = mavlink.MAV_TYPE_GIMBAL
     reports_earth: bool = True
     reports_failures: bool = True
-    enforces_control: bool = faulty(True, Fault(
-        'obeys-others', 'obeys components that do not control it', False))
-    reports: bool = faulty(True, Fault('no-status', 'sends no status', False))
-    frozen_flags: bool = faulty(False, Fault('stale-flags', 'reports the flags of its start'))
-    frozen_axis: str = faulty('', Fault(
-        'frozen-axis', 'an axis does not move', 'pitch', FaultValue('AXIS', one_of(AXES), str)))
-    jump: float = faulty(0.0, Fault(
-        'jumps', 'every tenth reported attitude is wrong by DEG', 20.0,
-        FaultValue('DEG', number(1, 180))))
-    names_frame: bool = faulty(True, Fault(
-        'no-frame', 'does not name the yaw frame of its attitude', False))
-    false_flags: int = faulty(0, Fault(
-        'flags', 'reports failure flags without a reason',
-        mavlink.GIMBAL_DEVICE_ERROR_FLAGS_MOTOR_ERROR, FLAGS))
-    identifies: bool = faulty(True, Fault('no-identity', 'sends no INFORMATION message', False))
-    static_information: bool = faulty(True, Fault(
-        'changing-identity', 'changes the limits that it reports', False))
-    limits_range: bool = faulty(True, Fault(
-        'no-limits', 'turns beyond the range that it reports', False))
-    limits_in_degrees: bool = faulty(False, Fault('degrees', 'reports its ranges in degrees'))
-    stops: bool = faulty(True, Fault(
-        'runaway', 'goes on turning when the rate is set to 0', False))
-    accepts_earth_always: bool = faulty(False, Fault(
-        'false-north',
-        'claims to accept yaw relative to north without a heading from the vehicle'))
-    takes_manager_set: bool = faulty(False, Fault(
-        'manager-set', 'obeys the messages to gimbal managers'))
+    enforces_control: bool = fault(True, 'obeys-others', 'obeys components that do not control it')
+    reports: bool = fault(True, 'no-status', 'sends no status')
+    frozen_flags: bool = fault(False, 'stale-flags', 'reports the flags of its start')
+    frozen_axis: str = fault(
+        '', 'frozen-axis', 'an axis does not move', 'pitch', FaultValue('AXIS', one_of(AXES), str))
+    jump: float = fault(
+        0.0, 'jumps', 'every tenth reported attitude is wrong by DEG', 20.0,
+        FaultValue('DEG', number(1, 180)))
+    names_frame: bool = fault(True, 'no-frame', 'does not name the yaw frame of its attitude')
+    false_flags: int = fault(
+        0, 'flags', 'reports failure flags without a reason',
+        mavlink.GIMBAL_DEVICE_ERROR_FLAGS_MOTOR_ERROR, FLAGS)
+    identifies: bool = fault(True, 'no-identity', 'sends no INFORMATION message')
+    static_information: bool = fault(
+        True, 'changing-identity', 'changes the limits that it reports')
+    limits_range: bool = fault(True, 'no-limits', 'turns beyond the range that it reports')
+    limits_in_degrees: bool = fault(False, 'degrees', 'reports its ranges in degrees')
+    stops: bool = fault(True, 'runaway', 'goes on turning when the rate is set to 0')
+    accepts_earth_always: bool = fault(
+        False, 'false-north',
+        'claims to accept yaw relative to north without a heading from the vehicle')
+    takes_manager_set: bool = fault(False, 'manager-set', 'obeys the messages to gimbal managers')
 
 
 # No command changes a device, so the faults in the results of such commands are left out.

@@ -37,7 +37,7 @@ from .simulated_device import COMMANDS, GimbalBehaviour, MountProperties, Simula
 from ..mavlink.dialect import mavlink, replaced
 from ..mavlink.messages import Address, AnyCommand, Message, params_of
 from ..payload import simulated
-from ..payload.faults import Behaviour, Fault, FaultTable, faulty
+from ..payload.faults import Behaviour, fault, FaultTable
 from ..payload.messages import (
     Attitude,
     GeoPoint,
@@ -80,8 +80,7 @@ class ManagerBehaviour(GimbalBehaviour):
     """
 
     enforces_roi: bool = True
-    frozen_control: bool = faulty(False, Fault(
-        'stale-control', 'reports the control of its start'))
+    frozen_control: bool = fault(False, 'stale-control', 'reports the control of its start')
     has_secondary: bool = True
     own_is_manager: bool = False
     releases_pairs: bool = True

@@ -25,7 +25,7 @@ from .thermal import ThermalProperties
 from .. import __version__
 from ..mavlink import messages
 from ..mavlink.dialect import mavlink
-from ..payload.faults import Behaviour, Fault, FaultTable, faulty, FLAGS
+from ..payload.faults import Behaviour, fault, FaultTable, FLAGS
 from ..payload.simulated import Profile, Properties
 from ..payload.simulated_settings import integer, number, one_of, setting, text
 
@@ -54,24 +54,22 @@ class IlluminatorBehaviour(Behaviour):
     measures: bool = True
     terminates: bool = True
     brightness_is_switch: bool = False
-    thermistor_failed: bool = faulty(False, Fault(
-        'thermistor', 'its temperature sensor fails: THERMISTOR_FAILURE, and temp_c stays at 0'))
-    has_clock: bool = faulty(True, Fault('no-clock', 'reports an uptime of 0', False))
-    identifies: bool = faulty(True, Fault(
-        'no-identity', 'sends no COMPONENT_INFORMATION_BASIC', False))
-    padding: str = faulty('', Fault(
-        'no-terminator', 'fills its strings with blanks, to the last byte', ' '))
-    accepts_nan: bool = faulty(False, Fault('nan', 'accepts NaN'))
-    accepts_out_of_range: bool = faulty(False, Fault(
-        'anything', 'accepts values out of range'))
-    toggles: bool = faulty(False, Fault(
-        'toggle', 'is switched off by switching it on again'))
-    false_flags: int = faulty(0, Fault(
-        'flags', 'reports error flags without a reason',
-        mavlink.ILLUMINATOR_ERROR_FLAGS_OVER_TEMPERATURE_SHUTDOWN, FLAGS))
-    inverted_flags: bool = faulty(False, Fault(
-        'cold-throttling',
-        'reports THERMAL_THROTTLING while it is on and cool, not while it is hot'))
+    thermistor_failed: bool = fault(
+        False, 'thermistor',
+        'its temperature sensor fails: THERMISTOR_FAILURE, and temp_c stays at 0')
+    has_clock: bool = fault(True, 'no-clock', 'reports an uptime of 0')
+    identifies: bool = fault(True, 'no-identity', 'sends no COMPONENT_INFORMATION_BASIC')
+    padding: str = fault(
+        '', 'no-terminator', 'fills its strings with blanks, to the last byte', ' ')
+    accepts_nan: bool = fault(False, 'nan', 'accepts NaN')
+    accepts_out_of_range: bool = fault(False, 'anything', 'accepts values out of range')
+    toggles: bool = fault(False, 'toggle', 'is switched off by switching it on again')
+    false_flags: int = fault(
+        0, 'flags', 'reports error flags without a reason',
+        mavlink.ILLUMINATOR_ERROR_FLAGS_OVER_TEMPERATURE_SHUTDOWN, FLAGS)
+    inverted_flags: bool = fault(
+        False, 'cold-throttling',
+        'reports THERMAL_THROTTLING while it is on and cool, not while it is hot')
 
 
 FAULTS = FaultTable.of(IlluminatorBehaviour)

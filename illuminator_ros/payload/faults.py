@@ -15,7 +15,7 @@
 """
 The faults of a simulated component, and the behaviour that each changes.
 
-A field of the behaviour declares its faults. ``--fault``, the YAML file and the console take their
+A field of the behaviour declares its fault. ``--fault``, the YAML file and the console take their
 names, ``--help`` and doc/simulator.md show their descriptions.
 """
 
@@ -79,7 +79,7 @@ class Fault:
 
     name: str
     description: str
-    default: object = True
+    default: object
     value: FaultValue | None = None
     field: str = ''
 
@@ -98,13 +98,18 @@ class Fault:
         return '' if self.value is None or value == math.inf else self.value.text(value)
 
 
-def faulty(normal: T, *faults: Fault) -> T:
+def fault(
+    normal: T, name: str, description: str, default: object = None,
+    value: FaultValue | None = None,
+) -> T:
     """
-    Return a field of a behaviour, and the faults that set it.
+    Return a field of a behaviour, and the fault that sets it; see :class:`Fault`.
 
-    :param normal: its value without a fault.
+    :param normal: its value without the fault.
+    :param default: None for the contrary of the normal value.
     """
-    return field(default=normal, metadata={'faults': faults})
+    return field(default=normal, metadata={'fault': Fault(
+        name, description, not normal if default is None else default, value)})
 
 
 @dataclass(frozen=True)
@@ -156,51 +161,44 @@ class Behaviour:
     answers_commands: bool = True
     acks_target: bool = True
     apply_after: float = 0.0
-    silence: float = faulty(0.0, Fault(
-        'silence', 'neither receives nor sends for S seconds', math.inf, SECONDS))
-    reboot_interval: float = faulty(0.0, Fault(
-        'reboot', 'restarts every S seconds; on the console, without S, once', 10.0, SECONDS))
-    refuse: int | None = faulty(None, Fault(
-        'refuse', 'answers changes with RESULT, such as failed', mavlink.MAV_RESULT_DENIED,
-        RESULT))
-    progress: float = faulty(0.0, Fault(
-        'progress', 'reports IN_PROGRESS for S seconds before each change', 2.5, SECONDS))
-    rejections: int = faulty(0, Fault('busy', 'rejects N changes temporarily', 3, COUNT))
-    slow: float = faulty(0.0, Fault('slow', 'answers S seconds late', 1.5, SECONDS))
-    drop: float = faulty(0.0, Fault('drop', 'loses a share of its messages', 0.3, SHARE))
-    duplicate: float = faulty(0.0, Fault(
-        'duplicate', 'sends a share of its messages twice', 0.3, SHARE))
-    delay: float = faulty(0.0, Fault(
-        'delay', 'delays and reorders its messages by up to S seconds', 2.0, SECONDS))
-    corrupt: float = faulty(0.0, Fault(
-        'corrupt', 'sends a share of its messages with a wrong checksum', 0.3, SHARE))
-    ignores_changes: bool = faulty(False, Fault(
-        'lie', 'accepts changes and does not apply them'))
-    heartbeat_interval: float = faulty(1.0, Fault(
-        'heartbeat', 'sends a heartbeat every S seconds', 4.0, SECONDS))
-    heartbeat_type: int = faulty(0, Fault(
-        'type', 'sends a heartbeat of MAV_TYPE N', mavlink.MAV_TYPE_ONBOARD_CONTROLLER, UINT8))
-    heartbeat_autopilot: int = faulty(mavlink.MAV_AUTOPILOT_INVALID, Fault(
-        'autopilot', 'sends a heartbeat with MAV_AUTOPILOT N', 3, UINT8))
-    answers_command_int: bool = faulty(True, Fault(
-        'no-int', 'does not answer COMMAND_INT', False))
-    answers_broadcast: bool = faulty(True, Fault(
-        'no-broadcast', 'does not answer messages to all components', False))
-    filters_target: bool = faulty(True, Fault(
-        'any-target', 'obeys commands to other addresses', False))
-    endless_stream: bool = faulty(False, Fault('no-stop', 'does not stop its status stream'))
-    fixed_rate: bool = faulty(False, Fault(
-        'fixed-rate', 'ignores the interval that it is given'))
-    applies_rejected: bool = faulty(False, Fault(
-        'disobey', 'applies the commands that it rejects'))
-    accepts_unknown: bool = faulty(False, Fault(
-        'unknown', 'accepts unknown commands, and requests for unknown messages'))
-    on_request: bool = faulty(True, Fault(
-        'no-request', 'does not send its status on request', False))
-    resumes: bool = faulty(True, Fault(
-        'no-resume', 'does not start its status stream again', False))
-    acks_wrong_target: bool = faulty(False, Fault(
-        'misaddress', 'sends acknowledgements to another component'))
+    silence: float = fault(
+        0.0, 'silence', 'neither receives nor sends for S seconds', math.inf, SECONDS)
+    reboot_interval: float = fault(
+        0.0, 'reboot', 'restarts every S seconds; on the console, without S, once', 10.0, SECONDS)
+    refuse: int | None = fault(
+        None, 'refuse', 'answers changes with RESULT, such as failed', mavlink.MAV_RESULT_DENIED,
+        RESULT)
+    progress: float = fault(
+        0.0, 'progress', 'reports IN_PROGRESS for S seconds before each change', 2.5, SECONDS)
+    rejections: int = fault(0, 'busy', 'rejects N changes temporarily', 3, COUNT)
+    slow: float = fault(0.0, 'slow', 'answers S seconds late', 1.5, SECONDS)
+    drop: float = fault(0.0, 'drop', 'loses a share of its messages', 0.3, SHARE)
+    duplicate: float = fault(0.0, 'duplicate', 'sends a share of its messages twice', 0.3, SHARE)
+    delay: float = fault(
+        0.0, 'delay', 'delays and reorders its messages by up to S seconds', 2.0, SECONDS)
+    corrupt: float = fault(
+        0.0, 'corrupt', 'sends a share of its messages with a wrong checksum', 0.3, SHARE)
+    ignores_changes: bool = fault(False, 'lie', 'accepts changes and does not apply them')
+    heartbeat_interval: float = fault(
+        1.0, 'heartbeat', 'sends a heartbeat every S seconds', 4.0, SECONDS)
+    heartbeat_type: int = fault(
+        0, 'type', 'sends a heartbeat of MAV_TYPE N', mavlink.MAV_TYPE_ONBOARD_CONTROLLER, UINT8)
+    heartbeat_autopilot: int = fault(
+        mavlink.MAV_AUTOPILOT_INVALID, 'autopilot', 'sends a heartbeat with MAV_AUTOPILOT N', 3,
+        UINT8)
+    answers_command_int: bool = fault(True, 'no-int', 'does not answer COMMAND_INT')
+    answers_broadcast: bool = fault(
+        True, 'no-broadcast', 'does not answer messages to all components')
+    filters_target: bool = fault(True, 'any-target', 'obeys commands to other addresses')
+    endless_stream: bool = fault(False, 'no-stop', 'does not stop its status stream')
+    fixed_rate: bool = fault(False, 'fixed-rate', 'ignores the interval that it is given')
+    applies_rejected: bool = fault(False, 'disobey', 'applies the commands that it rejects')
+    accepts_unknown: bool = fault(
+        False, 'unknown', 'accepts unknown commands, and requests for unknown messages')
+    on_request: bool = fault(True, 'no-request', 'does not send its status on request')
+    resumes: bool = fault(True, 'no-resume', 'does not start its status stream again')
+    acks_wrong_target: bool = fault(
+        False, 'misaddress', 'sends acknowledgements to another component')
 
 
 B = TypeVar('B', bound=Behaviour)
@@ -218,14 +216,14 @@ class FaultTable(dict[str, Fault]):
         """
         Return the faults that the fields of a behaviour declare.
 
-        A field that a class declares again, with another default, keeps its faults.
+        A field that a class declares again, with another default, keeps its fault.
 
         :param lacks: the names of faults that the payload does not have.
         """
         classes = [one for one in reversed(behaviour.__mro__) if issubclass(one, Behaviour)]
         return cls({fault.name: replace(fault, field=one.name) for base in classes
-                    for one in fields(base) for fault in one.metadata.get('faults', ())
-                    if fault.name not in lacks})
+                    for one in fields(base) if (fault := one.metadata.get('fault'))
+                    and fault.name not in lacks})
 
     def find(self, name: str) -> Fault:
         """Return a fault; FaultError if there is none of this name."""
@@ -266,10 +264,8 @@ class FaultTable(dict[str, Fault]):
 
     def active(self, behaviour: B, normal: B) -> list[str]:
         """Return the names of the faults of a behaviour."""
-        # Two faults without values may set one field.
         return [name for name, fault in self.items()
-                if (value := getattr(behaviour, fault.field)) != getattr(normal, fault.field)
-                and (fault.value or value == fault.default)]
+                if getattr(behaviour, fault.field) != getattr(normal, fault.field)]
 
     def as_typed(self, behaviour: B, normal: B) -> list[str]:
         """Return the faults of a behaviour as :meth:`add` takes them, with values."""

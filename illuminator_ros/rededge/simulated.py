@@ -32,7 +32,7 @@ from . import messages as rededge
 from ..mavlink.dialect import mavlink, raw, replaced
 from ..mavlink.messages import Address, Heartbeat, Message, target_of
 from ..payload import simulated
-from ..payload.faults import Behaviour, Fault, FaultTable, faulty, SECONDS
+from ..payload.faults import Behaviour, fault, FaultTable, SECONDS
 from ..payload.messages import Attitude, GeoPoint, GlobalPositionInt, is_finite, SystemTime
 from ..payload.rotation import Quaternion
 from ..payload.simulated_settings import geo_point, number, setting, Values
@@ -75,7 +75,9 @@ class RedEdgeBehaviour(Behaviour):
     :param feedback_delay: s from an image to its CAMERA_FEEDBACK.
     :param triggers: whether it sends CAMERA_STATUS.
     :param counts: whether it counts its images.
-    :param shots: the values of ``shot`` for which it takes an image.
+    :param captures: whether it takes images on DIGICAM_CONTROL.
+    :param captures_panel: whether it takes images of the panel.
+    :param takes_any_shot: whether it takes images for values of ``shot`` that do not exist.
     :param ping_component: offset of the component id that answers PING.
     :param ping_sequence: offset of the sequence number in the answer.
     :param ping_target: whether the answer is addressed to the sender.
@@ -86,30 +88,24 @@ class RedEdgeBehaviour(Behaviour):
     heartbeat_base_mode: int = 2
     heartbeat_custom_mode: int = 3
     answers_commands: bool = False
-    adopts_system_id: bool = faulty(True, Fault(
-        'fixed-system', 'keeps its system ID, and takes messages for that only', False))
-    ping_component: int = faulty(0, Fault(
-        'other-ping', 'lets another component answer PING', 1))
-    ping_sequence: int = faulty(0, Fault(
-        'ping-sequence', 'answers PING with another sequence number', 1))
-    ping_target: bool = faulty(True, Fault(
-        'ping-target', 'answers PING without a target', False))
-    triggers: bool = faulty(True, Fault('no-status', 'sends no CAMERA_STATUS', False))
-    feedback: bool = faulty(True, Fault('no-feedback', 'sends no CAMERA_FEEDBACK', False))
-    feedback_delay: float = faulty(FEEDBACK_DELAY, Fault(
-        'late', 'sends CAMERA_FEEDBACK S seconds after the image', 15.0, SECONDS))
-    counts: bool = faulty(True, Fault('same-index', 'does not count its images', False))
-    shots: tuple[int, ...] = faulty(
-        tuple(rededge.Shot),
-        Fault('no-captures', 'takes no image on DIGICAM_CONTROL', ()),
-        Fault('no-panel', 'takes no image of the panel', (rededge.Shot.SURVEY,)),
-        Fault('any-shot', 'takes an image for each value of shot', tuple(range(256))))
-    injectable: bool = faulty(True, Fault(
-        'no-injection', 'ignores injected position, time and attitude', False))
-    expires: bool = faulty(True, Fault('stale', 'uses injected state for ever', False))
-    extension: bool = faulty(False, Fault(
-        'extension',
-        'sends CAMERA_FEEDBACK with its extension field, which MAVLink 1 does not have'))
+    adopts_system_id: bool = fault(
+        True, 'fixed-system', 'keeps its system ID, and takes messages for that only')
+    ping_component: int = fault(0, 'other-ping', 'lets another component answer PING', 1)
+    ping_sequence: int = fault(0, 'ping-sequence', 'answers PING with another sequence number', 1)
+    ping_target: bool = fault(True, 'ping-target', 'answers PING without a target')
+    triggers: bool = fault(True, 'no-status', 'sends no CAMERA_STATUS')
+    feedback: bool = fault(True, 'no-feedback', 'sends no CAMERA_FEEDBACK')
+    feedback_delay: float = fault(
+        FEEDBACK_DELAY, 'late', 'sends CAMERA_FEEDBACK S seconds after the image', 15.0, SECONDS)
+    counts: bool = fault(True, 'same-index', 'does not count its images')
+    captures: bool = fault(True, 'no-captures', 'takes no image on DIGICAM_CONTROL')
+    captures_panel: bool = fault(True, 'no-panel', 'takes no image of the panel')
+    takes_any_shot: bool = fault(False, 'any-shot', 'takes an image for each value of shot')
+    injectable: bool = fault(True, 'no-injection', 'ignores injected position, time and attitude')
+    expires: bool = fault(True, 'stale', 'uses injected state for ever')
+    extension: bool = fault(
+        False, 'extension',
+        'sends CAMERA_FEEDBACK with its extension field, which MAVLink 1 does not have')
 
 
 # It has no commands, and no streams.
@@ -404,10 +400,12 @@ class SimulatedRedEdge(simulated.SimulatedDevice):
         self, source: Address, control: rededge.DigicamControl, now: float,
     ) -> Iterable[Message]:
         behaviour = self.behaviour
-        if control.shot not in behaviour.shots or self.properties.firmware < rededge.CAPTURES:
+        is_panel = control.shot == rededge.Shot.PANEL
+        taken = (behaviour.captures_panel if is_panel else
+                 control.shot == rededge.Shot.SURVEY or behaviour.takes_any_shot)
+        if not (taken and behaviour.captures and self.properties.firmware >= rededge.CAPTURES):
             return
         self._index = (self._index + behaviour.counts) & 0xFFFF
-        is_panel = control.shot == rededge.Shot.PANEL
         image = self.capture(
             rededge.Shot.PANEL if is_panel else rededge.Shot.SURVEY, 'mavlink', now)
         if behaviour.feedback:
