@@ -18,7 +18,7 @@ from __future__ import annotations
 
 from collections import deque
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 import math
 
 from . import messages as rededge
@@ -39,7 +39,7 @@ OLDER_INDICES = 32
 MAX_LATE = 32
 
 
-@dataclass(frozen=True)
+@dataclass
 class _Capture:
     sent_at: float
     done: Done
@@ -136,9 +136,9 @@ class Captures:
             # The image may be the late answer to an earlier request.
             late_until = self._late.popleft()
             if self._capture is not None:
-                self._capture = replace(self._capture, late_until=late_until)
+                self._capture.late_until = late_until
         elif self._capture is not None and self._capture.index is None:
-            self._capture = replace(self._capture, index=index)
+            self._capture.index = index
             self._triggered = index, self._capture.due + LATE_ANSWER
 
     def _end(self, success: bool, text: str) -> None:

@@ -25,7 +25,7 @@ import random
 from . import messages as rededge
 from .captures import Captures
 from .feeder import Feeder
-from .input_states import FeederSettings
+from .input_states import Settings
 from .pings import Done, Pings
 from ..mavlink.command_sender import CommandSender, format_seconds
 from ..mavlink.component import Payload
@@ -64,18 +64,6 @@ class ImageTaken:
 
 
 CameraEvent = CameraConnected | CameraLost | ImageTaken
-
-
-@dataclass(frozen=True)
-class Settings:
-    """
-    The settings of the client.
-
-    :param heartbeat_timeout: silence after which the camera is lost, s.
-    """
-
-    feeder: FeederSettings = FeederSettings()
-    heartbeat_timeout: float = 3.5
 
 
 @dataclass(frozen=True)
@@ -133,7 +121,7 @@ class RedEdgeClient(Payload):
     ) -> None:
         self.settings = settings
         self.events: Listeners[CameraEvent] = Listeners()
-        self.feeder = Feeder(settings.feeder, commands.send, lambda: self.target)
+        self.feeder = Feeder(settings, commands.send, lambda: self.target)
         self._commands = commands
         self._pings = Pings(commands.address, commands.send,
                             random.getrandbits(32) if sequence is None else sequence)

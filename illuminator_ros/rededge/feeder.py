@@ -29,12 +29,12 @@ from typing import NamedTuple
 from . import conversions
 from .conversions import FIRST_UTC, LAST_UTC, Position
 from .input_states import (
-    FeederSettings,
     Input,
     InputSnapshot,
     InputState,
     InputStates,
     PositionSource,
+    Settings,
     Stamp,
     TIME_REFERENCE_LIFETIME,
 )
@@ -86,7 +86,7 @@ class Feeder:
     """
 
     def __init__(
-        self, settings: FeederSettings, send: Callable[[Message], None],
+        self, settings: Settings, send: Callable[[Message], None],
         target: Callable[[], Address],
     ) -> None:
         self._settings = settings

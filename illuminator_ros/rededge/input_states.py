@@ -65,15 +65,16 @@ class PositionSource(Enum):
 
 
 @dataclass(frozen=True)
-class FeederSettings:
+class Settings:
     """
-    The settings of the inputs.
+    The settings of the client of a camera.
 
     :param geoid_separation: height of mean sea level above the ellipsoid, m.
     :param mount_frame: the axes of the camera's frame in ``~/mount``.
     :param attitude_rate: the highest rate of attitudes, Hz.
     :param position_timeout: age, s, at which a fix, a velocity or satellites are stale.
     :param attitude_timeout: likewise for an attitude or a mount.
+    :param heartbeat_timeout: silence after which the camera is lost, s.
     """
 
     position_source: PositionSource = PositionSource.RAW
@@ -83,6 +84,7 @@ class FeederSettings:
     position_timeout: float = 1.0
     attitude_timeout: float = 0.5
     send_gps_status: bool = False
+    heartbeat_timeout: float = 3.5
 
     def timeout(self, name: Input) -> float:
         """Return the age at which an input is stale, s."""
@@ -157,7 +159,7 @@ class _Tracker:
 class InputStates:
     """The states of all inputs."""
 
-    def __init__(self, settings: FeederSettings) -> None:
+    def __init__(self, settings: Settings) -> None:
         self._trackers = {name: _Tracker(settings.timeout(name)) for name in Input}
 
     @contextlib.contextmanager

@@ -18,13 +18,12 @@ from __future__ import annotations
 
 from collections import deque
 from collections.abc import Callable
-from dataclasses import dataclass, field
 import math
 from typing import NamedTuple
 
 from . import conversions
 from .conversions import MountParent
-from .input_states import FeederSettings, Input, InputStates, Stamp, UNKNOWN
+from .input_states import Input, InputStates, Settings, Stamp, UNKNOWN
 from ..mavlink.messages import Address, Message, time_boot_ms
 from ..payload.rotation import Quaternion, Vector
 
@@ -40,27 +39,25 @@ class _Sample(NamedTuple):
     rates: Vector
 
 
-@dataclass
-class _History:
-    """Rotations of one input in the order of their stamps; a pair may be ``timeout`` s apart."""
+def _interpolated(samples: deque[_Sample], time: int, longest: float) -> _Sample | None:
+    """
+    Return the rotation at a time; None if it is not known.
 
-    timeout: float
-    samples: deque[_Sample] = field(default_factory=lambda: deque(maxlen=MAX_SAMPLES))
-
-    def at(self, time: int) -> _Sample | None:
-        """Return the rotation at a time, interpolated; None if it is not known."""
-        newer: _Sample | None = None
-        for sample in reversed(self.samples):
-            if sample.time <= time:
-                if newer is None or sample.time == time:
-                    return sample if sample.time == time else None
-                if newer.time - sample.time > self.timeout * 1e9:
-                    return None
-                share = (time - sample.time) / (newer.time - sample.time)
-                return _Sample(time, conversions.interpolate(
-                    sample.rotation, newer.rotation, share), newer.rates)
-            newer = sample
-        return None
+    :param samples: of one input, in the order of their stamps.
+    :param longest: the longest time between two samples, s.
+    """
+    newer: _Sample | None = None
+    for sample in reversed(samples):
+        if sample.time <= time:
+            if newer is None or sample.time == time:
+                return sample if sample.time == time else None
+            if newer.time - sample.time > longest * 1e9:
+                return None
+            share = (time - sample.time) / (newer.time - sample.time)
+            return _Sample(time, conversions.interpolate(
+                sample.rotation, newer.rotation, share), newer.rates)
+        newer = sample
+    return None
 
 
 class OrientationFeeder:
@@ -74,15 +71,16 @@ class OrientationFeeder:
     """
 
     def __init__(
-        self, settings: FeederSettings, send: Callable[[Message], None],
+        self, settings: Settings, send: Callable[[Message], None],
         target: Callable[[], Address], inputs: InputStates,
     ) -> None:
         self._settings = settings
         self._send = send
         self._target = target
         self._inputs = inputs
-        self._histories = {name: _History(settings.attitude_timeout)
-                           for name in (Input.IMU, Input.ATTITUDE, Input.MOUNT)}
+        self._samples: dict[Input, deque[_Sample]] = {
+            name: deque(maxlen=MAX_SAMPLES)
+            for name in (Input.IMU, Input.ATTITUDE, Input.MOUNT)}
         self._mount_parent = MountParent.VEHICLE
         self.fixed_mount: Vector | None = (0.0, 0.0, 0.0)
         self._fixed_since = -math.inf
@@ -123,14 +121,14 @@ class OrientationFeeder:
             parent = MountParent.of(frame_id)
             if parent is not self._mount_parent:
                 self._mount_parent = parent
-                self._histories[Input.MOUNT].samples.clear()
+                self._samples[Input.MOUNT].clear()
             self._add(Input.MOUNT, orientation, UNKNOWN, stamp)
         self._send_pair(now)
 
     def _add(self, name: Input, rotation: Quaternion, rates: Vector, stamp: Stamp) -> None:
         """Add a rotation of any norm, or raise ValueError."""
         self._inputs.check(name, stamp)
-        self._histories[name].samples.append(_Sample(stamp.time, rotation.normalized(), rates))
+        self._samples[name].append(_Sample(stamp.time, rotation.normalized(), rates))
 
     @property
     def mount_is_fixed(self) -> bool:
@@ -153,19 +151,20 @@ class OrientationFeeder:
 
     def _send_pair(self, now: float) -> None:
         """Send the newest known attitude and mount of one instant, back to back."""
-        is_fresh, mounts = self._inputs.is_fresh, self._histories[Input.MOUNT]
+        is_fresh, mounts = self._inputs.is_fresh, self._samples[Input.MOUNT]
         name = Input.IMU if is_fresh(Input.IMU, now) else Input.ATTITUDE
-        history = self._histories[name]
-        if now < self._pair_due or not (is_fresh(name, now) and history.samples):
+        attitudes = self._samples[name]
+        if now < self._pair_due or not (is_fresh(name, now) and attitudes):
             return
-        time, angles = history.samples[-1].time, self.fixed_mount
+        time, angles = attitudes[-1].time, self.fixed_mount
         if angles is None:
-            if not (is_fresh(Input.MOUNT, now) and mounts.samples):
+            if not (is_fresh(Input.MOUNT, now) and mounts):
                 return
-            time = min(time, mounts.samples[-1].time)
+            time = min(time, mounts[-1].time)
         elif now < self._fixed_since:
             return
-        mount, sample = mounts.at(time), history.at(time)
+        longest = self._settings.attitude_timeout
+        mount, sample = (_interpolated(one, time, longest) for one in (mounts, attitudes))
         if sample is None or time <= self._pair_time:
             return
         if angles is None:
@@ -192,8 +191,8 @@ class OrientationFeeder:
     def clock_jumped(self) -> None:
         """Forget everything that depends on ROS time."""
         self._pair_time = 0
-        for history in self._histories.values():
-            history.samples.clear()
+        for samples in self._samples.values():
+            samples.clear()
 
     def poll(self, now: float) -> None:
         """See :meth:`Payload.poll`."""

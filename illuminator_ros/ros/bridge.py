@@ -25,6 +25,7 @@ import math
 import queue
 import threading
 import time
+from typing import NamedTuple
 
 from rclpy.node import Node
 
@@ -67,6 +68,14 @@ START_RETRY = 0.5
 GRAPH_INTERVAL = 5.0
 
 
+class _Served(NamedTuple):
+    """A payload with its own node and the log of that."""
+
+    node: Node
+    log: NodeLog
+    payload: ServedPayload
+
+
 class Bridge:
     """
     Connects the nodes of payloads with one link.
@@ -90,14 +99,14 @@ class Bridge:
         self.log = NodeLog(node.get_logger())
         frame_log = self._frame_log = LogForwarder(self.log)
         kinds = [_load(name, types) for name in declare_payloads(node, payload)]
-        self._own_nodes = [node, *(
+        nodes = [node, *(
             PayloadNode(kind.node_name, namespace=node.get_namespace(), context=node.context,
                         cli_args=without_node_name(arguments), use_global_arguments=False)
             for kind in kinds[1:])]
-        _refuse_same_names(self._own_nodes)
+        _refuse_same_names(nodes)
         parameters = _link_parameters(node, kinds, url)
         values = [declare_given(own, kind.parameters)
-                  for own, kind in zip(self._own_nodes, kinds, strict=True)]
+                  for own, kind in zip(nodes, kinds, strict=True)]
         commands = CommandSender(
             parameters.address, parameters.command_timeout, parameters.command_retries)
         clients = [kind.make_client(commands, value)
@@ -127,17 +136,16 @@ class Bridge:
             node, self.link, self._component, urls=tuple(parameters.urls),
             period=parameters.diagnostics_period)
         self._executor = NodeExecutor(node.context, self.log)
-        self._logs = [self.log, *(NodeLog(own.get_logger()) for own in self._own_nodes[1:])]
-        self._payloads: list[ServedPayload] = []
-        for own, log, kind, client, value in zip(
-                self._own_nodes, self._logs, kinds, clients, values, strict=True):
-            self._payloads.append(kind.serve(client, Host(
+        self._served: list[_Served] = []
+        for own, kind, client, value in zip(nodes, kinds, clients, values, strict=True):
+            log = self.log if own is node else NodeLog(own.get_logger())
+            self._served.append(_Served(own, log, kind.serve(client, Host(
                 own, self.link, log, frame_log, self._nodes, self._diagnostics, value,
-                self._wake.set)))
+                self._wake.set))))
             self._executor.add_node(own)
         specs = itertools.chain(LINK_PARAMETERS, *(kind.parameters for kind in kinds))
         for warning in ignored_parameters(
-                arguments, self._own_nodes, {spec.name for spec in specs if spec.restricts},
+                arguments, nodes, {spec.name for spec in specs if spec.restricts},
                 self._of_further_node):
             self.log.warning(warning)
         # A period is a whole number of ticks, otherwise some periods would be a tick too long.
@@ -147,12 +155,12 @@ class Bridge:
     @property
     def nodes(self) -> list[Node]:
         """Return all nodes of the process."""
-        return [*self._own_nodes, *self._nodes.nodes]
+        return [*(one.node for one in self._served), *self._nodes.nodes]
 
     def _of_further_node(self, name: str) -> Set[str] | None:
         """Return the parameters of a node that is made later; None if none may have the name."""
-        return next((names for payload in self._payloads
-                     if (names := payload.further_parameters(name)) is not None), None)
+        return next((names for one in self._served
+                     if (names := one.payload.further_parameters(name)) is not None), None)
 
     def run(self) -> None:
         """Serve until :meth:`end` is called or the context is shut down."""
@@ -168,8 +176,8 @@ class Bridge:
         if self._housekeeping.ident is not None:
             self._housekeeping.join(max(deadline - time.monotonic(), 0.0))
         self._nodes.join(deadline)
-        for payload in self._payloads:
-            payload.close()
+        for one in self._served:
+            one.payload.close()
         self._leave_graph()
 
     def end(self) -> None:
@@ -225,8 +233,8 @@ class Bridge:
 
         def start(now: float) -> None:
             steps: list[Callable[[float], None]] = [self._component.close]
-            steps += (functools.partial(payload.shut_down, report=reporter(log))
-                      for log, payload in zip(self._logs, self._payloads, strict=True))
+            steps += (functools.partial(one.payload.shut_down, report=reporter(one.log))
+                      for one in self._served)
             for step in steps:
                 # The failure of one payload must not leave the devices of another one on.
                 try:
@@ -261,8 +269,8 @@ class Bridge:
                 more = self._nodes.work()
                 self.link.call(self._poll)
                 self._diagnostics.poll(self._tick / 2)
-                for log in self._logs:
-                    log.flush()
+                for one in self._served:
+                    one.log.flush()
                 # A service of rclpy sets the levels of loggers.
                 self._frame_log.adjust()
                 if self.link.clock() >= graph_due:
@@ -286,8 +294,8 @@ class Bridge:
             [f'{SIGNING_NEEDED}: set signing_mode and signing_key_file'] if needs_signing else [],
             'signing')
         self.log.write_conditions(self._diagnostics.loops(now), 'loop')
-        for payload in self._payloads:
-            payload.poll(now)
+        for one in self._served:
+            one.payload.poll(now)
 
     def _link_event(self, event: LinkEvent) -> None:
         self.log.write(logging.INFO if event.is_open else logging.WARNING, str(event),

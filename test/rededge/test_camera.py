@@ -28,9 +28,8 @@ from illuminator_ros.rededge.client import (
     CameraLost,
     ImageTaken,
     RedEdgeClient,
-    Settings,
 )
-from illuminator_ros.rededge.input_states import Input, Stamp
+from illuminator_ros.rededge.input_states import Input, Settings, Stamp
 import pytest
 
 OWN, NEW, ADOPTED = Address(1, 191), Address(255, 100), Address(1, 100)

@@ -28,10 +28,10 @@ from illuminator_ros.payload.rotation import Quaternion, Vector
 from illuminator_ros.rededge.conversions import mount_angles, MountFrame, Position
 from illuminator_ros.rededge.feeder import Feeder
 from illuminator_ros.rededge.input_states import (
-    FeederSettings,
     Input,
     InputState,
     PositionSource,
+    Settings,
     Stamp,
 )
 from illuminator_ros.rededge.messages import GpsRawInt, GpsStatus, MountStatus
@@ -55,7 +55,7 @@ class Rig:
         self.clock = EPOCH - self.now
         self.simulated = False
         self.sent: list[Message] = []
-        self.feeder = Feeder(replace(FeederSettings(), **settings), self.sent.append,
+        self.feeder = Feeder(replace(Settings(), **settings), self.sent.append,
                              lambda: CAMERA)
 
     def stamp(self, age: float = 0.0) -> Stamp:

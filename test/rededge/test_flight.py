@@ -28,12 +28,12 @@ from illuminator_ros.mavlink.messages import Address
 from illuminator_ros.payload.messages import GeoPoint
 from illuminator_ros.payload.rotation import enu_flu, flip, Quaternion
 from illuminator_ros.payload.simulated import SimulatedComponents
-from illuminator_ros.rededge.client import RedEdgeClient, Settings
+from illuminator_ros.rededge.client import RedEdgeClient
 from illuminator_ros.rededge.conversions import Position
 from illuminator_ros.rededge.input_states import (
-    FeederSettings,
     Input,
     PositionSource,
+    Settings,
     Stamp,
     UNKNOWN,
 )
@@ -75,10 +75,10 @@ class PullableLink(VirtualLink):
 class Rig:
     """The client of a camera, and the camera, during a flight at its real speed."""
 
-    def __init__(self, flight: Flight, settings: FeederSettings) -> None:
+    def __init__(self, flight: Flight, settings: Settings) -> None:
         self.flight = flight
         commands = CommandSender(Address(1, 191))
-        self.client = RedEdgeClient(commands, Settings(settings))
+        self.client = RedEdgeClient(commands, settings)
         self.camera = SimulatedRedEdge(RedEdgeProperties(
             interval=IMAGE_INTERVAL, own_gps=GeoPoint(0.0, 0.0, 0.0)))
         cameras = SimulatedComponents([self.camera], START)
@@ -134,7 +134,7 @@ class Rig:
 @pytest.mark.parametrize('source', PositionSource)
 def test_images_of_a_flight_have_the_true_position_and_attitude(source: PositionSource) -> None:
     flight = Flight(60.0, 1.0)
-    result = Rig(flight, FeederSettings(source, GEOID, attitude_rate=ATTITUDE_RATE)).fly()
+    result = Rig(flight, Settings(source, GEOID, attitude_rate=ATTITUDE_RATE)).fly()
 
     assert result.failures == []
     assert max(abs(flight.truth(time / 10).vehicle.euler()[0]) for time in range(600)) > 0.69
@@ -142,7 +142,7 @@ def test_images_of_a_flight_have_the_true_position_and_attitude(source: Position
 
 def test_comparison_finds_wrong_positions_wrong_angles_and_old_data() -> None:
     flight = Flight(36.0, 1.0)
-    rig = Rig(flight, FeederSettings(geoid_separation=GEOID))
+    rig = Rig(flight, Settings(geoid_separation=GEOID))
     assert rig.fly().failures == []
     images = [Image.read(row, UTC, 1.0) for row in rig.rows]
     turned = Quaternion.from_euler(0.0, 0.002, 0.0)
@@ -159,5 +159,5 @@ def test_comparison_finds_wrong_positions_wrong_angles_and_old_data() -> None:
     assert 'instead of 72' in failures(images[5:])
     assert 'did not fall back' in failures(
         [replace(one, position_age=1.0) if one.position_age is None else one for one in images])
-    wrong = Rig(flight, FeederSettings(geoid_separation=GEOID - 0.6)).fly()
+    wrong = Rig(flight, Settings(geoid_separation=GEOID - 0.6)).fly()
     assert wrong.failures[0].startswith('a position is wrong by 0.')

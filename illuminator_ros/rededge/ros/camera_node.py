@@ -36,14 +36,13 @@ from ..client import (
     CameraLost,
     ImageTaken,
     RedEdgeClient,
-    Settings,
 )
 from ..conversions import fixed_mount, image_attitude, image_position, MountFrame, MountParent
 from ..input_states import (
-    FeederSettings,
     Input,
     InputState,
     PositionSource,
+    Settings,
     Stamp,
 )
 from ..messages import CameraFeedback, Shot
@@ -224,7 +223,7 @@ class CameraNode(ServedPayload):
             self._frame_due = math.inf
             self._transforms.fix(
                 MountParent.VEHICLE.value, self._host.values['frame_id'],
-                fixed_mount(orientation.fixed_mount, self._client.settings.feeder.mount_frame))
+                fixed_mount(orientation.fixed_mount, self._client.settings.mount_frame))
 
     def _log_inputs(self, now: float) -> None:
         """Log each input whose state has changed."""
@@ -253,7 +252,7 @@ class CameraNode(ServedPayload):
 
     def _publish(self, feedback: CameraFeedback) -> None:
         """Publish the metadata of an image, stamped with its own time."""
-        settings = self._client.settings.feeder
+        settings = self._client.settings
         present = Stamp(self._clock.now().nanoseconds, 0.0, self._clock.ros_time_is_active)
         seconds, nanoseconds = divmod(
             self._client.feeder.ros_time(feedback.time_usec * 1000, present), 1_000_000_000)
@@ -287,11 +286,9 @@ def _make_client(commands: CommandSender, values: Values) -> RedEdgeClient:
     if commands.address.component == mavlink.MAV_COMP_ID_CAMERA:
         raise ParameterError(f'component_id: {mavlink.MAV_COMP_ID_CAMERA} is the id of the camera')
     return RedEdgeClient(commands, Settings(
-        FeederSettings(
-            PositionSource(values['position_source']), values['geoid_separation'],
-            MountFrame(values['mount_frame']), values['attitude_rate'],
-            values['position_timeout'], values['attitude_timeout'], values['send_gps_status']),
-        values['heartbeat_timeout']))
+        PositionSource(values['position_source']), values['geoid_separation'],
+        MountFrame(values['mount_frame']), values['attitude_rate'], values['position_timeout'],
+        values['attitude_timeout'], values['send_gps_status'], values['heartbeat_timeout']))
 
 
 REDEDGE = RosPayload(
