@@ -255,7 +255,8 @@ def ros_tables() -> Tables:
             ['any other', 'WARN', 'unknown flags, in hexadecimal']],
         ('monitor', 'key'): [[names(keys), text] for keys, text, _, _ in app.COMMON_KEYS],
         **{('monitor', f'key for a {view.kind}'): [
-            [names(key.keys), key.text] for key in view.keys] for view in views},
+            [names(key.keys), key.text] for key in (*view.keys, *view.steering)]
+           for view in views},
     }
 
 

@@ -28,13 +28,12 @@ from typing import NamedTuple, TYPE_CHECKING
 
 from .entry_point import (
     CANNOT_CREATE,
-    log_directory_refusal,
-    one_line,
-    parameter_file_refusal,
+    own_arguments,
     print_output,
+    Refusal,
+    refusing,
     run_program,
-    start_failure,
-    wrong_arguments,
+    start_ros,
 )
 from .payloads import DEFAULT_PAYLOAD, PAYLOADS
 from .termination import Termination
@@ -67,12 +66,11 @@ class Executable(NamedTuple):
 
     def show(self, text: str) -> int:
         """Print a text, and return the exit status."""
-        return 0 if print_output(self.refuse, text, end='') else 1
+        return 0 if print_output(self.complain, text, end='') else 1
 
-    def refuse(self, reason: str) -> int:
-        """Print the reason why it cannot start, in one line, and return the exit status."""
-        print(f'{self.name}: {one_line(reason)}', file=sys.stderr)
-        return 2
+    def complain(self, reason: str) -> None:
+        """Print why something failed."""
+        print(f'{self.name}: {reason}', file=sys.stderr)
 
 
 def usage(executable: Executable) -> str:
@@ -151,25 +149,17 @@ gimbal_manager = partial(main, payload='gimbal_manager')
 
 
 def _run(arguments: list[str], termination: Termination, executable: Executable) -> int:
-    own = list(arguments)
-    if refusal := parameter_file_refusal(arguments):
-        return executable.refuse(refusal)
-    if '--ros-args' in arguments:
-        # Slow to import, like everything that is imported inside a function here.
-        from rclpy.utilities import remove_ros_args
-        try:
-            own = remove_ros_args([executable.name, *arguments])[1:]
-        except Exception as error:
-            return executable.refuse(f'{wrong_arguments(executable.name)}: {error}')
+    own = own_arguments(executable.name, arguments)
     if '-h' in own or '--help' in own:
         return executable.show(usage(executable))
     if '--version' in own:
+        # Slow to import, like everything that is imported inside a function here.
         from .. import __version__
         return executable.show(f'{__version__}\n')
     # A parameter without -p has the form of a URL with an unknown scheme.
     url = own.pop(0) if own and not own[0].startswith('-') and ':=' not in own[0] else ''
     if own:
-        return executable.refuse(
+        raise Refusal(
             f'unknown argument {own[0]!r}; parameters follow --ros-args -p, see '
             f'{executable.name} --help')
     arguments = [argument for argument in arguments if argument != url]
@@ -182,7 +172,6 @@ def _serve(
     import gc
 
     import rclpy
-    from rclpy.signals import SignalHandlerOptions
 
     from ..ros.payload_node import PayloadNode
 
@@ -191,32 +180,22 @@ def _serve(
     termination.queue_output(2)
     # From here on the process must leave the ROS graph in order, so a signal acts later.
     termination.calls(lambda: None)
-    if refusal := log_directory_refusal():
-        return executable.refuse(refusal)
     _use_profile()
     # rcutils colours its lines on a terminal only, and stderr is the pipe of a queue here.
     if termination.is_terminal:
         os.environ.setdefault('RCUTILS_COLORIZED_OUTPUT', '1')
-    failed = wrong_arguments(executable.name)
-    try:
-        rclpy.init(
-            args=[executable.name, *arguments], signal_handler_options=SignalHandlerOptions.NO)
-        failed = CANNOT_CREATE
+    start_ros(executable.name, arguments)
+    # For example, two topics may have the same name.
+    with refusing(CANNOT_CREATE):
         node = PayloadNode(executable.payload, enable_logger_service=True)
         # Other participants discover the node while these modules are imported.
         from ..ros.bridge import Bridge
         from ..ros.parameters import ParameterError
         executable.load()
-    except Exception as error:
-        # rclpy has an exception for each kind of wrong argument.
-        return executable.refuse(start_failure(error, failed))
-    try:
-        bridge = Bridge(node, arguments, executable.payloads, executable.payload, url)
-    except ParameterError as error:
-        return executable.refuse(f'parameter {error}')
-    except Exception as error:
-        # For example, two topics may have the same name.
-        return executable.refuse(start_failure(error, failed))
+        try:
+            bridge = Bridge(node, arguments, executable.payloads, executable.payload, url)
+        except ParameterError as error:
+            raise Refusal(f'parameter {error}') from None
     # The existing objects stay: a garbage collection that visits them would only delay answers.
     gc.freeze()
     termination.calls(bridge.end, bridge.report_late)

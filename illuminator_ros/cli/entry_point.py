@@ -16,7 +16,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
+import contextlib
 import io
 import os
 import re
@@ -38,6 +39,10 @@ _REMEDIES = {
 
 # The beginning of an error, once the arguments have been parsed.
 CANNOT_CREATE = 'cannot create the node'
+
+
+class Refusal(Exception):
+    """Why a program cannot start, for people."""
 
 
 def run_program(
@@ -68,9 +73,12 @@ def escape_output() -> None:
 
 
 def explained(name: str, run: Callable[[], int]) -> int:
-    """Run a program and return its exit status; name the package that is missing."""
+    """Run a program and return its exit status; name the package that is missing, or a refusal."""
     try:
         return run()
+    except Refusal as refusal:
+        print(f'{name}: {one_line(refusal)}', file=sys.stderr)
+        return 2
     except ModuleNotFoundError as error:
         package = (error.name or '').partition('.')[0]
         if package not in _REMEDIES:
@@ -107,23 +115,59 @@ def discard_output() -> None:
         os.dup2(nowhere.fileno(), sys.stdout.fileno())
 
 
-def wrong_arguments(name: str) -> str:
-    """Return a prefix for an error of rcl, which does not explain the syntax of arguments."""
-    return f'wrong ROS arguments, see {name} --help'
-
-
-def start_failure(error: Exception, failed: str) -> str:
+@contextlib.contextmanager
+def refusing(failed: str) -> Iterator[None]:
     """
-    Return why ROS cannot be started.
+    Raise a :class:`Refusal` where ROS cannot be started.
 
     :param failed: the beginning where the system does not lack anything.
     """
-    if isinstance(error, ModuleNotFoundError):
-        raise error
-    # The middleware has no special exception for a lack of descriptors or threads.
-    if isinstance(error, OSError | ImportError) or type(error) is RuntimeError:
-        failed = 'cannot start'
-    return f'{failed}: {error}'
+    try:
+        yield
+    except (ModuleNotFoundError, Refusal):
+        raise
+    except Exception as error:
+        # The middleware has no special exception for a lack of descriptors or threads, and rclpy
+        # has one for each kind of wrong argument.
+        if isinstance(error, OSError | ImportError) or type(error) is RuntimeError:
+            failed = 'cannot start'
+        raise Refusal(f'{failed}: {error}') from None
+
+
+def _wrong_arguments(name: str) -> str:
+    # rcl does not explain the syntax of arguments.
+    return f'wrong ROS arguments, see {name} --help'
+
+
+def own_arguments(name: str, arguments: Sequence[str]) -> list[str]:
+    """
+    Return the arguments that are not for ROS.
+
+    :raises Refusal: if those for ROS are wrong.
+    """
+    # rcl reads the files as soon as it parses the arguments.
+    if refusal := parameter_file_refusal(arguments):
+        raise Refusal(refusal)
+    if '--ros-args' not in arguments:
+        return list(arguments)
+    # Slow to import.
+    from rclpy.utilities import remove_ros_args
+    with refusing(_wrong_arguments(name)):
+        return list(remove_ros_args([name, *arguments])[1:])
+
+
+def start_ros(name: str, arguments: Sequence[str]) -> None:
+    """
+    Start ROS, without its handlers of signals.
+
+    :raises Refusal: if it cannot be started.
+    """
+    import rclpy
+    from rclpy.signals import SignalHandlerOptions
+    if refusal := log_directory_refusal():
+        raise Refusal(refusal)
+    with refusing(_wrong_arguments(name)):
+        rclpy.init(args=[name, *arguments], signal_handler_options=SignalHandlerOptions.NO)
 
 
 def log_directory_refusal() -> str:

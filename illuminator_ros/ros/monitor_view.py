@@ -31,8 +31,8 @@ from std_srvs.srv import Trigger
 # s without topics and diagnostics of a device until its values are out of date: bridges request a
 # status after 2.5 s, and publish diagnostics once a second.
 SILENCE = 6.0
-# s between two values of a trend, and their number.
-TREND_STEP, TREND_SIZE = 2.0, 60
+# The number of values of a trend.
+TREND_SIZE = 60
 UNKNOWN = '-'
 LEVELS = (('OK', 'green'), ('WARN', 'yellow'), ('ERROR', 'bold red'), ('STALE', 'dim'))
 # The states of any device with their styles, and those with values that may be out of date.
@@ -101,7 +101,7 @@ class Device:
     :param now: when the values were taken, s.
     :param source: of commands, which the operator has chosen; '' for the plain interface.
     :ivar heard_at: when the device was last heard, s.
-    :ivar values: by topic.
+    :ivar values: by topic; None is a number that cannot be.
     :ivar changed_at: when each topic changed, s, absent before its first change.
     :ivar wanted: values that were requested, and until when they count as such, s.
     :ivar action: the last request, its outcome, the answer, and when that was noted, s.
@@ -112,7 +112,7 @@ class Device:
     now: float
     source: str = ''
     heard_at: float = -math.inf
-    gone_at: float | None = None
+    is_gone: bool = False
     values: dict[str, Any] = field(default_factory=dict)
     changed_at: dict[str, float] = field(default_factory=dict)
     wanted: dict[str, tuple[Any, float]] = field(default_factory=dict)
@@ -123,7 +123,7 @@ class Device:
     @property
     def state(self) -> str:
         """Return its state in a word."""
-        if self.gone_at is not None:
+        if self.is_gone:
             return GONE
         if self.now - self.heard_at > SILENCE:
             return SILENT
@@ -133,6 +133,10 @@ class Device:
     def prefix(self) -> str:
         """Return the prefix of the names of commands: the operator's source, if it has sources."""
         return f'{self.source}/' if self.source and 'source' in self.values else ''
+
+    def note(self, text: str, outcome: tuple[str, str], answer: str = '') -> None:
+        """Note the outcome of a request."""
+        self.action = text, outcome, answer, self.now
 
     def wants(self, name: str, known: Any) -> Any:
         """Return a value that was requested lately, else the known one."""
@@ -146,10 +150,9 @@ class Device:
     def number(self, kind: str, key: str) -> float | None:
         """Return a finite number of the diagnostics, None if there is none."""
         try:
-            value = float(self.diagnosed(kind, key))
+            return finite(float(self.diagnosed(kind, key)))
         except ValueError:
             return None
-        return value if math.isfinite(value) else None
 
     def since(self, topic: str) -> str:
         """Return for how long a topic has had its value, '' if that is not known."""
@@ -173,7 +176,6 @@ class Key(NamedTuple):
     :param request: returns the request for a device and the text that was typed, or why there is
         none, for people.
     :param prompt: what the operator types first, '' for nothing.
-    :param is_steering: whether the keys act only after the operator has begun to steer.
     """
 
     keys: tuple[str, ...]
@@ -181,11 +183,6 @@ class Key(NamedTuple):
     label: str
     request: Callable[[Device, str], Request | str]
     prompt: str = ''
-    is_steering: bool = False
-
-
-def _ok(device: Device) -> str:
-    return 'ok' if device.values else NOT_KNOWN
 
 
 @dataclass(frozen=True)
@@ -197,6 +194,7 @@ class View:
     :param topics: by name; a node that publishes those of ``signature`` is such a device.
     :param columns: the most important first: a narrow screen cuts off the others.
     :param details: returns the lines below the list.
+    :param steering: keys that act only after the operator has begun to steer.
     :param states: the words of :meth:`state` with their styles, in the order of the counts.
     :param state: returns the state of a connected device.
     :param trend: the topic whose last values are kept.
@@ -209,52 +207,58 @@ class View:
     columns: Sequence[Column]
     details: Callable[[Device], Iterable[Line]]
     keys: Sequence[Key]
+    steering: Sequence[Key] = ()
     states: Mapping[str, str] = field(default_factory=lambda: {'ok': 'green'})
-    state: Callable[[Device], str] = _ok
+    state: Callable[[Device], str] = lambda device: 'ok' if device.values else NOT_KNOWN
     trend: str = ''
     off: Callable[[Device], Request] | None = None
 
 
-def trigger(text: str, name: str, question: str = '') -> Request:
+def trigger(name: str, question: str = '') -> Request:
     """Return a request to a service of std_srvs/Trigger."""
-    return Request(text, name, Trigger, Trigger.Request(), question=question)
+    return Request(name.replace('_', ' '), name, Trigger, Trigger.Request(), question=question)
+
+
+def trigger_key(key: str, text: str, label: str, name: str) -> Key:
+    """Return a key that calls a service of std_srvs/Trigger."""
+    return Key((key,), text, label, lambda device, typed: trigger(name))
 
 
 def release_source(device: Device, typed: str) -> Request | str:
     """Give a device back to the other sources of commands."""
-    if 'source' not in device.values:
-        return 'it has no sources of commands'
-    return trigger('give back', f'{device.source or "default"}/release')
+    return ('it has no sources of commands' if 'source' not in device.values else
+            trigger(f'{device.source or "default"}/release'))
 
 
 RELEASE_SOURCE = Key(('u',), 'give it back to other sources of commands', 'give back',
                      release_source)
 
 
+def finite(number: float) -> float | None:
+    """Return a number, None for one that no quantity of a device can be."""
+    return number if abs(number) < 1e9 else None
+
+
 def bar(value: float, width: int) -> str:
     """Return a bar for a share, %."""
-    # In this order 0 replaces NaN.
-    filled = max(round(min(max(0.0, value / 100), 1.0) * width), int(value > 0))
+    filled = max(round(min(max(value / 100, 0.0), 1.0) * width), int(value > 0))
     return '█' * filled + '░' * (width - filled)
 
 
 def sparkline(values: Iterable[float | None], smallest_span: float) -> str:
     """Return a character for each value, a space for None."""
-    # Published values are not checked, and their difference must be finite.
-    drawn = [None if value is None or value != value else min(max(value, -1e6), 1e6)
-             for value in values]
-    known = [value for value in drawn if value is not None] or [0.0]
+    known = [value for value in values if value is not None] or [0.0]
     low, span = min(known), max(known) - min(known)
     low, span = low - max(smallest_span - span, 0) / 2, max(span, smallest_span)
     return ''.join(' ' if value is None else '▁▂▃▄▅▆▇█'[min(int((value - low) / span * 8), 7)]
-                   for value in drawn)
+                   for value in values)
 
 
-def dial(value: float, low: float, high: float, width: int) -> str:
+def dial(value: float | None, low: float, high: float, width: int) -> str:
     """Return a scale from ``low`` to ``high`` with a mark at a value, and one at 0."""
     marks = ['─'] * width
     for at, mark in ((0.0, '┼'), (value, '█')):
-        if low != high and math.isfinite(at):
+        if low != high and at is not None:
             marks[round(min(max((at - low) / (high - low), 0.0), 1.0) * (width - 1))] = mark
     return ''.join(marks)
 

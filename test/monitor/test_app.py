@@ -61,7 +61,7 @@ def test_screen_shows_each_kind_with_its_states_values_and_findings() -> None:
 
 def test_state_is_a_word_and_not_only_a_colour() -> None:
     gone = light('/gone')
-    gone.gone_at = NOW
+    gone.is_gone = True
 
     async def test(screen: Screen) -> None:
         assert '3 lights: 1 off, 1 LOST, 1 gone' in screen.text
@@ -204,7 +204,7 @@ def test_light_is_switched_on_and_off_by_clicks_on_labels() -> None:
 @pytest.mark.parametrize('before', [[], ['?'], ['space'], ['end', 'p', '4', '7'], ['end', 'm']])
 def test_all_off_acts_at_once_whatever_is_shown(before: list[str]) -> None:
     gone = light('/gone')
-    gone.gone_at = NOW
+    gone.is_gone = True
 
     async def test(screen: Screen) -> None:
         await screen.press(*before, 'a')
@@ -247,7 +247,7 @@ def test_help_lists_each_key_and_any_key_goes_back() -> None:
         await screen.press('?')
         views = (screen.graph.devices[0].view, screen.graph.devices[1].view)
         for keys in (*(one[0] for one in COMMON_KEYS),
-                     *(key.keys for view in views for key in view.keys)):
+                     *(key.keys for view in views for key in (*view.keys, *view.steering))):
             assert '  '.join(keys) in '\n'.join(screen.lines)
         await screen.press('space')
         assert '/bow' in screen.text
@@ -264,17 +264,10 @@ def test_each_key_to_quit_ends_the_monitor_even_from_the_help(key: str) -> None:
     show(test, light())
 
 
-def test_monitor_ends_when_its_terminal_is_closed() -> None:
-    async def test(screen: Screen) -> None:
-        assert screen.app._exit
-
-    show(test, light(), is_alive=lambda: False)
-
-
 def test_labels_of_keys_are_not_keys_of_others() -> None:
     # A common key that a device has, too, would never reach the device.
     for one in (light(), gimbal(), camera()):
-        own = {key for entry in one.view.keys if not entry.is_steering for key in entry.keys}
+        own = {key for entry in one.view.keys for key in entry.keys}
         assert own & ACTIONS.keys() == set()
 
 

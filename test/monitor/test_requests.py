@@ -20,32 +20,45 @@ from typing import Any, cast
 from illuminator_ros.cli.monitor.ros_graph import (
     ANSWER_LIMIT,
     DISCOVERY_LIMIT,
+    GraphDevice,
     OFF_INTERVAL,
-    Requests,
     WANTED_LIFETIME,
 )
 from illuminator_ros.ros.monitor_view import Device, Request
 import pytest
 from rclpy.node import Node
+from rclpy.task import Future
 from std_srvs.srv import SetBool
 from support.monitor import gimbal, light
 
 
 class Endpoint:
-    """A client of a service and a publisher at once, with what was sent."""
+    """What the endpoints of a node share; what was sent."""
 
-    def __init__(self) -> None:
+    def __init__(self, type_: Any = None) -> None:
+        self.srv_type = type_
+        self.handle = self
         self.ready = True
         self.sent: list[Any] = []
+
+
+class Client(Endpoint):
+    """A client of a service."""
+
+    def __init__(self, type_: Any) -> None:
+        super().__init__(type_)
+        self.futures: dict[int, Future] = {}
         self.answers: list[tuple[Any, Any]] = []
-        self.handle = self
 
     def service_is_ready(self) -> bool:
         return self.ready
 
-    def send_request(self, request: Any) -> int:
+    def call_async(self, request: Any) -> Future:
         self.sent.append(request)
-        return len(self.sent)
+        return self.futures.setdefault(len(self.sent), Future())
+
+    def get_pending_request(self, number: int) -> Future:
+        return self.futures[number]
 
     def take_response(self, type_: Any) -> tuple[Any, Any]:
         return self.answers.pop(0) if self.answers else (None, None)
@@ -62,27 +75,36 @@ class Topic(Endpoint):
 
 
 class Bench:
-    """The requests to a light that is off and steady, at 40 %."""
+    """A device, by default a light that is off and steady, at 40 %."""
 
     def __init__(self, of: Device | None = None) -> None:
-        self.now = 0.0
-        self.device = of or light()
-        self.endpoints: dict[str, Endpoint] = {}
-        self.requests = Requests(cast(Node, self), self.device, lambda: self.now)
+        self.endpoints: dict[str, Any] = {}
+        of = of or light()
+        self.device = GraphDevice(cast(Node, self), of.name, of.view, 0.0)
+        self.device.values = of.values
 
-    def create_client(self, type_: Any, name: str) -> Endpoint:
-        return self.endpoints.setdefault(name, Endpoint())
+    def create_subscription(self, *arguments: Any) -> None:
+        """Do nothing: the values are known."""
 
-    def create_publisher(self, type_: Any, name: str, depth: int) -> Endpoint:
-        return self.endpoints.setdefault(name, Topic())
+    def create_client(self, type_: Any, name: str) -> Client:
+        made: Client = self.endpoints.setdefault(name, Client(type_))
+        return made
+
+    def create_publisher(self, type_: Any, name: str, depth: int) -> Topic:
+        made: Topic = self.endpoints.setdefault(name, Topic())
+        return made
+
+    def poll(self, now: float = 0.0) -> None:
+        """Let time pass, up to a time, s."""
+        self.device.poll_answers(now)
 
     def press(self, *keys: str, typed: str = '') -> None:
         for key in keys:
-            [found] = [one for one in self.device.view.keys if key in one.keys]
-            self.device.now = self.now
+            [found] = [one for one in (*self.device.view.keys, *self.device.view.steering)
+                       if key in one.keys]
             request = found.request(self.device, typed)
             assert isinstance(request, Request)
-            self.requests.submit(request)
+            self.device.submit(request)
 
     def sets(self) -> list[dict[str, float]]:
         """Return the parameters of each set that was sent."""
@@ -100,7 +122,7 @@ class Bench:
         answer = (SetBool.Response(success=success, message=text) if service == 'enable' else
                   SimpleNamespace(result=SimpleNamespace(successful=success, reason=text)))
         self.endpoints[f'/bow/{service}'].answers.append((header, answer))
-        self.requests.poll()
+        self.poll(self.device.now)
 
     def outcome(self) -> tuple[str, str, str]:
         """Return text, outcome and answer of the last request."""
@@ -149,6 +171,15 @@ def test_strobe_and_switch_do_not_wait_for_a_set_of_the_brightness(bench: Bench)
     assert bench.device.wants('enabled', None) is True
 
 
+def test_answers_in_another_order_reach_their_requests(bench: Bench) -> None:
+    bench.press('-', 's')
+
+    bench.answer(SET, 2)
+    assert bench.outcome() == ('strobe 1 s, 50 %', 'done', 'fine')
+    bench.answer(SET, 1)
+    assert bench.outcome() == ('brightness 30 %', 'done', 'fine')
+
+
 def test_newest_switch_is_sent_after_the_one_before(bench: Bench) -> None:
     bench.device.values['enabled'] = True
     bench.press('space', 'space')
@@ -181,7 +212,7 @@ def test_off_does_not_wait_for_an_on_whose_answer_is_then_ignored(bench: Bench) 
 
 def test_off_is_sent_again_at_an_interval_while_it_is_unanswered(bench: Bench) -> None:
     for number in range(11):
-        bench.now = OFF_INTERVAL / 5 * number
+        bench.poll(OFF_INTERVAL / 5 * number)
         bench.press('0')
 
     assert bench.switches() == [False] * 3
@@ -201,11 +232,9 @@ def test_off_that_waits_is_sent_whatever_became_of_the_one_before(
 def test_unanswered_request_is_given_up_and_its_late_answer_is_ignored(bench: Bench) -> None:
     bench.press('space')
 
-    bench.now = ANSWER_LIMIT - 0.1
-    bench.requests.poll()
+    bench.poll(ANSWER_LIMIT - 0.1)
     assert bench.outcome()[1] == '...'
-    bench.now = ANSWER_LIMIT
-    bench.requests.poll()
+    bench.poll(ANSWER_LIMIT)
     assert bench.outcome() == ('on', 'FAILED', 'no answer for 8 s')
 
     bench.press('space')
@@ -214,14 +243,13 @@ def test_unanswered_request_is_given_up_and_its_late_answer_is_ignored(bench: Be
 
 
 def test_on_is_not_sent_to_a_service_that_appears_late(bench: Bench) -> None:
-    bench.endpoints['/bow/enable'] = Endpoint()
+    bench.endpoints['/bow/enable'] = Client(SetBool)
     bench.endpoints['/bow/enable'].ready = False
     bench.press('space')
 
-    bench.now = DISCOVERY_LIMIT
-    bench.requests.poll()
+    bench.poll(DISCOVERY_LIMIT)
     bench.endpoints['/bow/enable'].ready = True
-    bench.requests.poll()
+    bench.poll(DISCOVERY_LIMIT)
 
     assert bench.switches() == []
     assert bench.outcome() == ('on', 'FAILED', 'nothing takes /bow/enable')
@@ -235,7 +263,7 @@ def test_message_on_a_topic_waits_for_a_subscriber_and_has_no_answer() -> None:
     assert topic.sent == []
 
     topic.ready = True
-    bench.requests.poll()
+    bench.poll()
     bench.press('up')
 
     assert [round(message.vector.y, 3) for message in topic.sent] == [0.413, 0.325]
@@ -251,12 +279,11 @@ def test_steps_of_several_axes_before_the_subscriber_is_known_reach_it_together(
     bench.press('p', typed='47.3 8.5 480')
 
     angles.ready = place.ready = True
-    bench.requests.poll()
+    bench.poll()
 
     # The yaw of the last one, with the pitch of both steps; the place was sent once.
-    assert [(round(message.vector.y, 3), round(message.vector.z, 3)) for message in angles.sent
-            ][1:] == [(0.325, -0.163)]
+    last = angles.sent[-1].vector
+    assert (round(last.y, 3), round(last.z, 3)) == (0.325, -0.163)
     assert len(place.sent) == 1
-    bench.now = WANTED_LIFETIME
-    bench.device.now = bench.now
+    bench.poll(WANTED_LIFETIME)
     assert bench.device.wants('pitch', 0.5) == 0.5

@@ -59,9 +59,12 @@ class Watching:
     def names(self) -> list[str]:
         """Return the names of the devices, after a poll."""
         self.graph.poll()
+        self.graph.poll_answers()
         return [device.name for device in self.graph.devices]
 
-    def wait(self, condition: Callable[[Device], Any], name: str = '/illuminator') -> Device:
+    def wait(
+        self, condition: Callable[[Device], Any], name: str = '/illuminator',
+    ) -> ros_graph.GraphDevice:
         """Wait until a device is known and the condition holds; return it."""
         eventually(lambda: name in self.names)
         [found] = [device for device in self.graph.devices if device.name == name]
@@ -74,7 +77,7 @@ class Watching:
         [found] = [one for one in device.view.keys if key in one.keys]
         request = found.request(device, '')
         assert not isinstance(request, str), request
-        self.graph.submit(device, request)
+        device.submit(request)
         self.wait(lambda device: device.action and device.action[1][0] != '...', name)
         assert device.action is not None
         return f'{device.action[1][0]}: {device.action[2]}'

@@ -25,7 +25,7 @@ from illuminator_ros.cli.monitor.ros_graph import Graph
 from illuminator_ros.gimbal.ros.monitor_view import VIEW as GIMBAL
 from illuminator_ros.illuminator.ros.monitor_view import VIEW as LIGHT
 from illuminator_ros.rededge.ros.monitor_view import VIEW as CAMERA
-from illuminator_ros.ros.monitor_view import Device, Diagnosis, FAILED, Request, View
+from illuminator_ros.ros.monitor_view import Device, Diagnosis, Request, View
 from textual.pilot import Pilot
 from textual.widgets import Static
 
@@ -39,9 +39,19 @@ PRESENT: dict[str, dict[str, Any]] = {
     'camera': {'connected': True, 'image/index': 7}}
 
 
-def device(view: View, name: str, **values: Any) -> Device:
+class FakeDevice(Device):
+    """A device that records the requests to it."""
+
+    sent: list[tuple[str, Request]]
+
+    def submit(self, request: Request) -> None:
+        """Record a request."""
+        self.sent.append((self.name, request))
+
+
+def device(view: View, name: str, **values: Any) -> FakeDevice:
     """Return a device that has just published all its values, changed by those given."""
-    made = Device(name, view, NOW, heard_at=NOW)
+    made = FakeDevice(name, view, NOW, heard_at=NOW)
     made.values = PRESENT.get(view.kind, {}) | values
     made.trend.extend([30.0, 35.0, None, 41.5] if view.trend else [])
     made.diagnoses['link'] = Diagnosis(0, 'open', {
@@ -49,7 +59,7 @@ def device(view: View, name: str, **values: Any) -> Device:
     return made
 
 
-def light(name: str = '/bow', **values: Any) -> Device:
+def light(name: str = '/bow', **values: Any) -> FakeDevice:
     """Return a light that is off and steady, at 40 %."""
     made = device(LIGHT, name, **values)
     made.diagnoses['lamp'] = Diagnosis(1, 'dimmed because it is hot', {
@@ -58,12 +68,12 @@ def light(name: str = '/bow', **values: Any) -> Device:
     return made
 
 
-def gimbal(name: str = '/gimbal', **values: Any) -> Device:
+def gimbal(name: str = '/gimbal', **values: Any) -> FakeDevice:
     """Return a gimbal that the operator controls."""
     return device(GIMBAL, name, **values)
 
 
-def camera(name: str = '/camera', fix: Any = (0, 47.3, 8.5, 480.0)) -> Device:
+def camera(name: str = '/camera', fix: Any = (0, 47.3, 8.5, 480.0)) -> FakeDevice:
     """Return a camera, with the position of its last image, which lacks an attitude."""
     made = device(CAMERA, name, **{'image/fix': fix})
     made.diagnoses['camera'] = Diagnosis(1, 'nothing received on ~/imu', {
@@ -75,7 +85,7 @@ def camera(name: str = '/camera', fix: Any = (0, 47.3, 8.5, 480.0)) -> Device:
 class FakeGraph:
     """A graph with given devices, whose time the test sets."""
 
-    def __init__(self, *devices: Device) -> None:
+    def __init__(self, *devices: FakeDevice) -> None:
         self.now = NOW
         self.devices = list(devices)
         self.requests: list[tuple[str, Request]] = []
@@ -84,14 +94,6 @@ class FakeGraph:
     def clock(self) -> float:
         """Return the time, s."""
         return self.now
-
-    def submit(self, device: Device, request: Request) -> None:
-        """Record a request."""
-        self.requests.append((device.name, request))
-
-    def refuse(self, device: Device, text: str, reason: str) -> None:
-        """Note why a request is not sent."""
-        device.action = text, FAILED, reason, self.now
 
     # Those of the monitor itself.
     all_off = Graph.all_off
@@ -104,6 +106,7 @@ class FakeGraph:
         """Take the time."""
         for one in self.devices:
             one.now = self.now
+            one.sent = self.requests
 
     def poll_answers(self) -> None:
         """Do nothing."""
@@ -160,8 +163,8 @@ class Screen:
 
 
 def show(
-    test: Callable[[Screen], Awaitable[None]], *devices: Device, size: tuple[int, int] = (132, 40),
-    **how: Any,
+    test: Callable[[Screen], Awaitable[None]], *devices: FakeDevice,
+    size: tuple[int, int] = (132, 40), **how: Any,
 ) -> FakeGraph:
     """Show devices while a test runs; return the graph."""
     graph = FakeGraph(*devices)

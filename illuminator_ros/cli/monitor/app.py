@@ -16,10 +16,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 import functools
 import os
-from typing import ClassVar
+from typing import ClassVar, NamedTuple
 
 from textual import events
 from textual.app import App, ComposeResult
@@ -29,9 +29,9 @@ from textual.driver import Driver
 from textual.style import Style
 from textual.widgets import Static
 
-from .ros_graph import Graph
+from .ros_graph import Graph, GraphDevice
 from .table import by_kind, columns, counts, findings, last
-from ...ros.monitor_view import age, Cell, Device, LEVELS, Line, Request, STALE_STATES
+from ...ros.monitor_view import age, Cell, Device, FAILED, Key, LEVELS, Line, Request, STALE_STATES
 
 # s between updates of the screen, and between looks for answers to requests.
 INTERVAL, ANSWER_INTERVAL = 0.25, 0.05
@@ -56,14 +56,23 @@ ACTIONS = {key: action for keys, _, _, action in COMMON_KEYS for key in keys}
 ASCII = str.maketrans('█░─┼…←→↑↓▁▂▃▄▅▆▇', '#--|~<>^v_.-=+*%')
 
 
-class MonitorApp(App[None], inherit_bindings=False):
+class Question(NamedTuple):
     """
-    The monitor on a terminal or in a browser.
+    A question to the operator.
 
-    :param stop: stops the process until a shell continues it; called while the terminal has its
-        former state.
-    :param is_alive: returns False if the terminal is closed.
+    :param answer: returns the request for the typed text, or why there is none, for people.
+    :param typed: the text, None where the operator types nothing.
+    :param deadline: when it is dropped, s.
     """
+
+    text: str
+    answer: Callable[[str], Request | str]
+    typed: str | None
+    deadline: float
+
+
+class MonitorApp(App[None], inherit_bindings=False):
+    """The monitor on a terminal or in a browser."""
 
     CSS_PATH = 'monitor.tcss'
     ENABLE_COMMAND_PALETTE = ALLOW_SELECT = False
@@ -71,22 +80,16 @@ class MonitorApp(App[None], inherit_bindings=False):
     BINDINGS: ClassVar[list[BindingType]] = [
         Binding(key, f'press("{key}")', priority=True) for key in ('ctrl+c', 'escape', 'tab')]
 
-    def __init__(
-        self, graph: Graph, *, ascii_only: bool = False, stop: Callable[[], None] = lambda: None,
-        is_alive: Callable[[], bool] = lambda: True, driver_class: type[Driver] | None = None,
-    ) -> None:
+    def __init__(self, graph: Graph, *, ascii_only: bool = False,
+                 driver_class: type[Driver] | None = None) -> None:
         # Without colours textual draws shades of grey, unless colours are those of the terminal.
         super().__init__(driver_class, ansi_color=True if 'NO_COLOR' in os.environ else None)
         self._graph = graph
         self._ascii_only = ascii_only
-        self._stop = stop
-        self._is_alive = is_alive
-        self._selected: Device | None = None
+        self._selected: GraphDevice | None = None
         self._mode = NORMAL
-        # The text, the request for the typed text, whether text is typed, and the deadline, s.
-        self._question: tuple[str, Callable[[str], Request | str], bool, float] | None = None
-        self._typed = ''
-        self._lines: list[Device | Cell] = []
+        self._question: Question | None = None
+        self._lines: list[GraphDevice | Cell] = []
         # Held here, since a poll may come before they are on the screen.
         self._parts = {name: Static(id=name) for name in ('devices', 'details', 'bar')}
         self._shown: dict[str, Content] = {}
@@ -103,11 +106,8 @@ class MonitorApp(App[None], inherit_bindings=False):
 
     def poll(self) -> None:
         """Take new values, and draw them."""
-        if not self._is_alive():
-            self.exit()
-            return
         self._graph.poll()
-        if self._question is not None and self._graph.clock() > self._question[3]:
+        if self._question is not None and self._graph.clock() > self._question.deadline:
             self._question = None
         self.draw()
 
@@ -118,7 +118,7 @@ class MonitorApp(App[None], inherit_bindings=False):
 
     def on_paste(self, event: events.Paste) -> None:
         """Take text while the operator types."""
-        self._typed = (self._typed + event.text)[:MAX_TYPED]
+        self._type(event.text)
         self.draw()
 
     def on_click(self, event: events.Click) -> None:
@@ -146,36 +146,32 @@ class MonitorApp(App[None], inherit_bindings=False):
             # The help names this key, and it acts there and while the operator types, too.
             self._graph.all_off()
         elif question is not None and device is not None:
-            asked, answer, takes_text, _ = question
+            asked, answer, typed, _ = question
             if key == 'enter':
-                self._request(device, asked, answer(self._typed), is_confirmed=True)
+                self._request(device, asked, answer(typed or ''), is_confirmed=True)
             elif key != 'escape':
-                self._ask(asked, answer, takes_text)
-                self._typed = self._typed[:-1] if key == 'backspace' else (
-                    self._typed + (' ' if key == 'space' else key * (len(key) == 1)))[:MAX_TYPED]
+                self._ask(asked, answer, typed)
+                self._type(' ' if key == 'space' else key)
         elif action == 'help' and mode != HELP:
             self._mode = HELP
-        elif action == 'stop' and self._driver is not None and self._driver.can_suspend:
-            with self.suspend():
-                self._stop()
+        elif action == 'stop':
+            self.action_suspend_process()
         elif mode != HELP and device is not None:
-            self._press(device, key, action, is_steering=mode == STEERING)
+            self._press(device, key, action, device.view.steering if mode == STEERING else ())
         self.draw()
 
-    def _press(self, device: Device, key: str, action: str | None, is_steering: bool) -> None:
-        keys = device.view.keys
-        steering = [one for one in keys if one.is_steering]
-        chosen = next((one for one in steering * is_steering + [
-            one for one in keys if not one.is_steering] if key in one.keys), None)
+    def _press(
+        self, device: GraphDevice, key: str, action: str | None, steering: Sequence[Key],
+    ) -> None:
+        chosen = next((one for one in (*steering, *device.view.keys) if key in one.keys), None)
+        if chosen in steering or action == 'steer' and device.view.steering:
+            self._mode = STEERING
         if chosen is not None:
-            self._mode, self._typed = STEERING if chosen.is_steering else NORMAL, ''
             make = functools.partial(chosen.request, device)
             if chosen.prompt:
-                self._ask(chosen.prompt, make, takes_text=True)
+                self._ask(chosen.prompt, make, '')
             else:
                 self._request(device, chosen.label, make(''))
-        elif action == 'steer' and steering:
-            self._mode = STEERING
         elif action == 'clear':
             self._graph.clear_gone()
         elif action == 'move':
@@ -183,20 +179,28 @@ class MonitorApp(App[None], inherit_bindings=False):
             at = min(max(devices.index(device) + MOVES[key], 0), len(devices) - 1)
             self._select(devices[at])
 
-    def _ask(self, question: str, make: Callable[[str], Request | str], takes_text: bool) -> None:
-        self._question = question, make, takes_text, self._graph.clock() + QUESTION_LIFETIME
-
     def _request(
-        self, device: Device, label: str, request: Request | str, is_confirmed: bool = False,
+        self, device: GraphDevice, label: str, request: Request | str, is_confirmed: bool = False,
     ) -> None:
         if isinstance(request, str):
-            self._graph.refuse(device, label, request)
+            device.note(label, FAILED, request)
         elif request.question and not is_confirmed:
-            self._ask(request.question, lambda _: request, takes_text=False)
+            self._ask(request.question, lambda _: request)
         else:
-            self._graph.submit(device, request)
+            device.submit(request)
 
-    def _select(self, device: Device | None) -> None:
+    def _ask(
+        self, text: str, answer: Callable[[str], Request | str], typed: str | None = None,
+    ) -> None:
+        self._question = Question(text, answer, typed, self._graph.clock() + QUESTION_LIFETIME)
+
+    def _type(self, key: str) -> None:
+        if self._question is not None and self._question.typed is not None:
+            typed = self._question.typed
+            typed = typed[:-1] if key == 'backspace' else typed + key
+            self._question = self._question._replace(typed=typed[:MAX_TYPED])
+
+    def _select(self, device: GraphDevice | None) -> None:
         if device is not self._selected:
             # The question belongs to the other device.
             self._selected, self._question = device, None
@@ -214,7 +218,7 @@ class MonitorApp(App[None], inherit_bindings=False):
         self._show('details', Content('\n').join(
             Content.assemble((f'{label:8}', 'bold'), *cells) for label, cells in (
                 () if self._selected is None or self._mode == HELP else
-                _details(self._selected, self._graph.clock()))))
+                _details(self._selected))))
         self._show('bar', Content('  ').join(self._labels()))
 
     def _show(self, name: str, content: Content) -> None:
@@ -227,7 +231,7 @@ class MonitorApp(App[None], inherit_bindings=False):
 
     def _list(self) -> Content:
         width, height = self._parts['devices'].size
-        lines: list[Device | Cell] = []
+        lines: list[GraphDevice | Cell] = []
         name_width = max((len(one.name) for one in self._graph.devices), default=0)
         name_width = max(min(name_width, width // 3), 14)
         for some in by_kind(self._graph.devices):
@@ -238,12 +242,12 @@ class MonitorApp(App[None], inherit_bindings=False):
         first = max(0, min(at - height // 2, len(lines) - height))
         self._lines = lines[first:first + height] or [NO_DEVICES]
         return Content('\n').join(
-            self._row(one, name_width) if isinstance(one, Device) else _content(one)
+            self._row(one, name_width) if isinstance(one, Device) else Content.assemble(one)
             for one in self._lines)
 
-    def _row(self, device: Device, name_width: int) -> Content:
+    def _row(self, device: GraphDevice, name_width: int) -> Content:
         row = Content(' ').join([
-            *(_content(one.cell(device)).truncate(one.width, ellipsis=True, pad=True)
+            *(Content.assemble(one.cell(device)).truncate(one.width, ellipsis=True, pad=True)
               for one in columns(device.view, name_width)),
             Content.assemble(*(last(device) or [findings(device)]))])
         styles = ['dim'] * (device.state in STALE_STATES) + ['reverse'] * (
@@ -251,43 +255,42 @@ class MonitorApp(App[None], inherit_bindings=False):
         return row.stylize(' '.join(styles))
 
     def _labels(self) -> Iterable[Content]:
-        keys = () if self._selected is None else self._selected.view.keys
+        view = None if self._selected is None else self._selected.view
         if self._question is not None:
-            yield _content((self._question[0], 'bold yellow'))
-            yield _content((f'{self._typed}_' if self._question[2] else '', 'reverse'))
+            yield Content.styled(self._question.text, 'bold yellow')
+            if self._question.typed is not None:
+                yield Content.styled(f'{self._question.typed}_', 'reverse')
             yield from (_label('enter', 'yes'), _label('escape', 'no'))
         elif self._mode == HELP:
             yield _label('escape', 'or any other key goes back')
         else:
-            yield from (_label(one.keys[0], one.label) for one in keys
-                        if one.label and one.is_steering is (self._mode == STEERING))
-            if any(one.is_steering for one in keys):
-                yield _label('m', 'move') if self._mode == NORMAL else _label('escape', 'ends')
+            if view is not None:
+                keys = view.steering if self._mode == STEERING else view.keys
+                yield from (_label(one.keys[0], one.label) for one in keys if one.label)
+                if view.steering:
+                    yield _label('m', 'move') if self._mode == NORMAL else _label('escape', 'ends')
             yield from (_label(names[0], label) for names, _, label, _ in COMMON_KEYS if label)
 
     def _help(self) -> Content:
         views = {device.view.kind: device.view for device in self._graph.devices}
         lines = [*((keys, text) for keys, text, _, _ in COMMON_KEYS), *(
-            (key.keys, f'{kind}: {key.text}') for kind, one in views.items() for key in one.keys)]
+            (key.keys, f'{kind}: {key.text}') for kind, one in views.items()
+            for key in (*one.keys, *one.steering))]
         return Content('\n').join(Content.assemble(
             (f'{"  ".join(keys):22}', 'bold'), f' {text}') for keys, text in lines)
 
 
-def _details(device: Device, now: float) -> Iterable[Line]:
+def _details(device: GraphDevice) -> Iterable[Line]:
     yield device.name, []
     if device.action is not None:
-        yield 'last', [*last(device), (f' ({age(now - device.action[3])} ago)', 'dim')]
+        yield 'last', [*last(device), (f' ({age(device.now - device.action[3])} ago)', 'dim')]
     for kind, one in device.diagnoses.items():
         held = device.number(kind, 'held_s')
         yield kind, [LEVELS[one.level], f': {one.message}', '' if held is None else (
             f'; held by {device.diagnosed(kind, "holder")} for {age(held)}')]
     yield from device.view.details(device)
-    if now - device.heard_at > 2:
-        yield 'silent', [f'nothing heard for {age(now - device.heard_at)}']
-
-
-def _content(cell: Cell) -> Content:
-    return Content(cell) if isinstance(cell, str) else Content.styled(*cell)
+    if device.now - device.heard_at > 2:
+        yield 'silent', [f'nothing heard for {age(device.now - device.heard_at)}']
 
 
 def _label(key: str, text: str) -> Content:

@@ -22,13 +22,13 @@ message, 9,000 a second of 100 lights.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Generator, Iterable, Iterator, Sequence
 import contextlib
 import math
 import time
-from typing import Any, TypeVar
+from typing import Any
 
-from diagnostic_msgs.msg import DiagnosticArray
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from rclpy.exceptions import NameValidationException
 from rclpy.node import Node
 from rclpy.qos import QoSProfile, ReliabilityPolicy
@@ -40,22 +40,21 @@ from ...ros.graph import type_name
 from ...ros.monitor_view import Device, Request, View
 from ...ros.qos import STATE_QOS
 
-T = TypeVar('T')
 # Every node can publish topics like those of a device, and more diagnostics than it has.
 MAX_DEVICES, MAX_DIAGNOSES = 256, 10
 # Messages of /diagnostics that one poll takes, values of a diagnosis, bytes of any message.
 MAX_DIAGNOSTICS, MAX_VALUES, MAX_BYTES = 256, 200, 65536
-# One poll of this number queries the graph.
-QUERY_POLLS = 2
+MAX_TEXT = 1000
+# One poll of this number queries the graph, and one of this number adds to the trends.
+QUERY_POLLS, TREND_POLLS = 2, 8
 # s for the discovery of a service or subscriber, and for an answer: longer than a bridge takes,
 # whatever its device does.
 DISCOVERY_LIMIT, ANSWER_LIMIT = 2.0, 8.0
-# s after an unanswered OFF in which a further OFF waits for its answer.
+# s after an OFF in which a further OFF waits for its answer.
 OFF_INTERVAL = 0.5
 # s in which a value that was requested with success counts as requested: diagnostics show it
 # only once a second.
 WANTED_LIFETIME = 2.0
-MAX_TEXT = 1000
 SAMPLE_QOS = QoSProfile(depth=1, reliability=ReliabilityPolicy.RELIABLE)
 DIAGNOSTICS_QOS = QoSProfile(depth=MAX_DIAGNOSTICS, reliability=ReliabilityPolicy.RELIABLE)
 
@@ -81,111 +80,132 @@ def devices_among(
     return found
 
 
-def printable(value: Any) -> Any:
-    """Return a value whose texts are short, without characters that control a terminal."""
+def sane(value: Any) -> Any:
+    """
+    Return a value that can be shown and sent as JSON.
+
+    Texts are short and without characters that control a terminal, a number that cannot be is
+    None.
+    """
     if isinstance(value, str):
         return ''.join(c if c.isprintable() else ' ' for c in value[:MAX_TEXT])
-    return tuple(map(printable, value)) if isinstance(value, tuple) else value
+    if isinstance(value, tuple):
+        return tuple(map(sane, value))
+    return shared.finite(value) if isinstance(value, float) else value
 
 
-class _Pending:
-    """A request, its number once it is sent, and when its next step must have happened."""
-
-    def __init__(self, request: Request, now: float) -> None:
-        self.request = request
-        self.sequence: int | None = None
-        self.sent_at = now
-        self.deadline = now + DISCOVERY_LIMIT
-
-
-class Requests:
+class GraphDevice(Device):
     """
-    The requests to one device.
+    A device in the ROS graph.
 
-    For each topic, and for the same values of a service, there is one request at a time. The
-    newest of those that come meanwhile waits, so that a key held down does not cause a hundred
-    commands; a failure drops it, since it would hide the reason. An OFF does not wait for an ON,
-    and waits for another OFF only :data:`OFF_INTERVAL`: the bridge may have been restarted.
+    Its requests have lanes, one for each topic or service and the values that it sets. A lane
+    carries one request at a time. The newest of those that come meanwhile waits, so that a key
+    held down does not cause a hundred commands; a failure drops it, since it would hide the
+    reason. An OFF does not wait for an ON, and waits for another OFF only :data:`OFF_INTERVAL`:
+    the bridge may have been restarted.
     """
 
-    def __init__(self, node: Node, device: Device, clock: Callable[[], float]) -> None:
+    def __init__(self, node: Node, name: str, view: View, now: float, source: str = '') -> None:
+        super().__init__(name, view, now, source, heard_at=now)
         self._node = node
-        self._device = device
-        self._clock = clock
+        self._subscriptions = {topic: node.create_subscription(
+            one.type, f'{name}/{topic}', _taken_by_poll,
+            STATE_QOS if one.is_state else SAMPLE_QOS) for topic, one in view.topics.items()}
         # Clients and publishers, untyped: each has a type of its own.
         self._endpoints: dict[str, Any] = {}
-        self._pending: dict[tuple[str, ...], _Pending] = {}
+        self._lanes: dict[tuple[str, ...], Iterator[None]] = {}
         self._waiting: dict[tuple[str, ...], Request] = {}
+        self._off_at = -math.inf
 
-    def prepare(self, request: Request) -> Any:
+    def take(self, now: float) -> None:
+        """Take the newest values."""
+        self.now = now
+        for topic, subscription in self._subscriptions.items():
+            for message in _taken(subscription):
+                self.heard_at = now
+                spec, known = self.view.topics[topic], self.values.get(topic)
+                self.values[topic] = value = sane(spec.read(message))
+                if not spec.is_state or known is not None and known != value:
+                    self.changed_at[topic] = now
+        if self.view.off is not None:
+            # The discovery of its service takes a while.
+            self._endpoint(self.view.off(self))
+
+    def diagnose(self, status: DiagnosticStatus, values: dict[str, str]) -> None:
+        """Take a status of the diagnostics."""
+        self.heard_at = self.now
+        # The name of the status has the node's name without its namespace.
+        kind = sane(status.name.rpartition(': ')[2])
+        if kind in self.diagnoses or len(self.diagnoses) < MAX_DIAGNOSES:
+            self.diagnoses[kind] = shared.Diagnosis(
+                min(status.level[0], 3), sane(status.message), values)
+
+    def submit(self, request: Request) -> None:
+        """Send a request, or let it wait for the one before."""
+        lane = request.name, *request.values
+        self.wanted |= {name: (value, math.inf) for name, value in request.values.items()}
+        self._waiting[lane] = request
+        if lane not in self._lanes or (
+                request.is_off and self.now >= self._off_at + OFF_INTERVAL):
+            self._lanes[lane] = self._run(lane)
+            self.poll_answers(self.now)
+
+    def poll_answers(self, now: float) -> None:
+        """Take answers, send what can be sent, and give up requests without an answer."""
+        self.now = now
+        for lane, steps in list(self._lanes.items()):
+            # A step yields None.
+            if next(steps, 'ended'):
+                del self._lanes[lane]
+
+    def destroy(self) -> None:
+        """Leave the graph."""
+        for one in (*self._subscriptions.values(), *self._endpoints.values()):
+            one.destroy()
+
+    def _endpoint(self, request: Request) -> Any:
         """Return the client or publisher of a request; its discovery begins with the first."""
         if request.name not in self._endpoints:
-            name = f'{self._device.name}/{request.name}'
+            name = f'{self.name}/{request.name}'
             self._endpoints[request.name] = (
                 self._node.create_client(request.type, name) if hasattr(request.type, 'Request')
                 else self._node.create_publisher(request.type, name, 10))
         return self._endpoints[request.name]
 
-    def submit(self, request: Request) -> None:
-        """Send a request, or let it wait for the pending one."""
-        is_service = hasattr(request.type, 'Request')
-        lane, now = (request.name, *(request.values if is_service else ())), self._clock()
-        self._device.wanted |= {
-            name: (value, math.inf) for name, value in request.values.items()}
-        one = self._pending.get(lane)
-        if one is None or request.is_off and (
-                not one.request.is_off or now >= one.sent_at + OFF_INTERVAL):
-            self._waiting.pop(lane, None)
-            self._pending[lane] = _Pending(request, now)
-            self.note(request.text, shared.PENDING, '')
-            self.poll()
-        else:
-            self._waiting[lane] = request
-
-    def poll(self) -> None:
-        """Take answers, send what can be sent, and give up requests without an answer."""
-        for lane, one in list(self._pending.items()):
-            request, endpoint = one.request, self.prepare(one.request)
-            if self._pending.get(lane) is not one:
-                # The end of another one has sent it.
+    def _run(self, lane: tuple[str, ...]) -> Iterator[None]:
+        """Send the request that waits, then that which came meanwhile; a step for each poll."""
+        while (request := self._waiting.pop(lane, None)) is not None:
+            self._off_at = self.now if request.is_off else -math.inf
+            self.note(request.text, shared.PENDING)
+            is_done, answer = yield from self._exchange(request)
+            self.note(request.text, shared.DONE if is_done else shared.FAILED, sane(answer))
+            if lane in self._waiting and (is_done or self._waiting[lane].is_off):
                 continue
-            if one.sequence is not None:
-                while self._pending.get(lane) is one and (
-                        taken := endpoint.handle.take_response(request.type.Response))[0]:
-                    header, answer = taken
-                    if header.request_id.sequence_number == one.sequence:
-                        self._end(lane, *(
-                            (answer.result.successful, answer.result.reason)
-                            if hasattr(answer, 'result') else (answer.success, answer.message)))
-            elif not hasattr(endpoint, 'publish'):
-                if endpoint.service_is_ready():
-                    one.sequence = endpoint.handle.send_request(request.message)
-                    one.deadline = self._clock() + ANSWER_LIMIT
-            elif endpoint.get_subscription_count():
-                endpoint.publish(request.message)
-                self._end(lane, True, 'sent, which has no answer')
-            if self._pending.get(lane) is one and self._clock() >= one.deadline:
-                self._end(lane, False, f'nothing takes {self._device.name}/{request.name}'
-                          if one.sequence is None else f'no answer for {ANSWER_LIMIT:g} s')
+            self._waiting.pop(lane, None)
+            until = self.now + WANTED_LIFETIME if is_done else -math.inf
+            self.wanted |= {name: (value, until) for name, value in request.values.items()}
 
-    def note(self, text: str, outcome: tuple[str, str], answer: str) -> None:
-        """Note the outcome of a request."""
-        self._device.action = text, outcome, printable(answer), self._clock()
-
-    def destroy(self) -> None:
-        """Drop all requests."""
-        for endpoint in self._endpoints.values():
-            endpoint.destroy()
-
-    def _end(self, lane: tuple[str, ...], success: bool, answer: str) -> None:
-        request = self._pending.pop(lane).request
-        self.note(request.text, shared.DONE if success else shared.FAILED, answer)
-        waiting = self._waiting.pop(lane, None)
-        if waiting is not None and (success or waiting.is_off):
-            self.submit(waiting)
-            return
-        until = self._clock() + WANTED_LIFETIME if success else -math.inf
-        self._device.wanted |= {name: (value, until) for name, value in request.values.items()}
+    def _exchange(self, request: Request) -> Generator[None, None, tuple[bool, str]]:
+        """Send a request; return whether it succeeded, and the answer."""
+        endpoint, until = self._endpoint(request), self.now + DISCOVERY_LIMIT
+        is_ready = getattr(endpoint, 'service_is_ready', None) or endpoint.get_subscription_count
+        while not is_ready():
+            if self.now >= until:
+                return False, f'nothing takes {self.name}/{request.name}'
+            yield
+        if hasattr(endpoint, 'publish'):
+            endpoint.publish(request.message)
+            return True, 'sent, which has no answer'
+        future, until = endpoint.call_async(request.message), self.now + ANSWER_LIMIT
+        while not future.done():
+            if self.now >= until:
+                return False, f'no answer for {ANSWER_LIMIT:g} s'
+            yield
+            _deliver_answers(endpoint)
+        answer = future.result()
+        if hasattr(answer, 'result'):
+            return answer.result.successful, answer.result.reason
+        return answer.success, answer.message
 
 
 class Graph:
@@ -203,129 +223,77 @@ class Graph:
     ) -> None:
         self._node = node
         self._views = views
-        self.clock = clock
         self._source = source
-        self.devices: list[Device] = []
-        self._topics: dict[str, dict[str, Subscription]] = {}
-        self._requests: dict[str, Requests] = {}
-        # The last message of each state, to leave out what has not changed.
-        self._last: dict[Subscription, bytes] = {}
+        self.clock = clock
+        self.devices: list[GraphDevice] = []
         self._diagnostics = node.create_subscription(
             DiagnosticArray, '/diagnostics', _taken_by_poll, DIAGNOSTICS_QOS)
         self._polls = 0
-        self._trend_at = clock()
-
-    def submit(self, device: Device, request: Request) -> None:
-        """Send a request to a device."""
-        self._requests[device.name].submit(request)
-
-    def refuse(self, device: Device, text: str, reason: str) -> None:
-        """Note why a request to a device is not sent."""
-        self._requests[device.name].note(text, shared.FAILED, reason)
 
     def all_off(self) -> None:
         """Switch off every device that can be switched off, unless it is gone."""
         for device in self.devices:
-            if device.view.off is not None and device.gone_at is None:
-                self.submit(device, device.view.off(device))
+            if device.view.off is not None and not device.is_gone:
+                device.submit(device.view.off(device))
 
     def clear_gone(self) -> None:
         """Remove the devices that are gone."""
-        for name in [device.name for device in self.devices if device.gone_at is not None]:
-            self._requests.pop(name).destroy()
-            for subscription in self._topics.pop(name).values():
-                self._last.pop(subscription, None)
-                self._node.destroy_subscription(subscription)
-        self.devices = [device for device in self.devices if device.name in self._requests]
+        for device in self.devices:
+            if device.is_gone:
+                device.destroy()
+        self.devices = [device for device in self.devices if not device.is_gone]
 
     def poll_answers(self) -> None:
         """Take the answers to requests."""
-        for requests in self._requests.values():
-            requests.poll()
+        for device in self.devices:
+            device.poll_answers(self.clock())
 
     def poll(self) -> None:
         """Find new and gone devices, and take the newest values."""
         now = self.clock()
         if not self._polls % QUERY_POLLS:
             self._query(now)
-        self._polls += 1
-        self.poll_answers()
-        samples, self._trend_at = ((True, now + shared.TREND_STEP) if now >= self._trend_at
-                                   else (False, self._trend_at))
         for device in self.devices:
-            device.now = now
-            for topic, subscription in self._topics[device.name].items():
-                self._take(device, topic, subscription)
-            if samples:
-                value = device.values.get(device.view.trend)
-                device.trend.append(value if device.state in device.view.states else None)
-        by_name = {one.name: one for one in self.devices}
-        for _ in range(MAX_DIAGNOSTICS):
-            if (data := _newest(self._diagnostics)) is None:
-                break
-            for status in getattr(_decoded(data, DiagnosticArray), 'status', ()):
-                values = {printable(pair.key): printable(pair.value)
-                          for pair in status.values[:MAX_VALUES]}
-                # The name of the status has the node's name without its namespace.
+            device.take(now)
+            if not self._polls % TREND_POLLS:
+                device.trend.append(device.values.get(device.view.trend)
+                                    if device.state in device.view.states else None)
+        self._polls += 1
+        by_name = {device.name: device for device in self.devices}
+        for array in _taken(self._diagnostics, MAX_DIAGNOSTICS):
+            for status in array.status:
+                values = {sane(one.key): sane(one.value) for one in status.values[:MAX_VALUES]}
                 if known := by_name.get(values.get('node', '')):
-                    known.heard_at = now
-                    kind = printable(status.name.rpartition(': ')[2])
-                    if kind in known.diagnoses or len(known.diagnoses) < MAX_DIAGNOSES:
-                        known.diagnoses[kind] = shared.Diagnosis(
-                            min(status.level[0], 3), printable(status.message), values)
+                    known.diagnose(status, values)
 
     def _query(self, now: float) -> None:
         found = devices_among(self._node.get_topic_names_and_types(), self._views,
                               self._node.count_publishers)
         for device in self.devices:
-            is_present = found.pop(device.name, None) is device.view
-            device.gone_at = None if is_present else device.gone_at or now
+            device.is_gone = found.pop(device.name, None) is not device.view
         for name in sorted(found)[:MAX_DEVICES - len(self.devices)]:
             # The graph also has names that other middleware has made.
             with contextlib.suppress(NameValidationException):
-                self._topics[name] = {
-                    topic: self._node.create_subscription(
-                        one.type, f'{name}/{topic}', _taken_by_poll,
-                        STATE_QOS if one.is_state else SAMPLE_QOS)
-                    for topic, one in found[name].topics.items()}
-                device = Device(name, found[name], now, self._source, now)
-                self._requests[name] = Requests(self._node, device, self.clock)
-                self.devices.append(device)
+                self.devices.append(GraphDevice(self._node, name, found[name], now, self._source))
         self.devices.sort(key=lambda device: (self._views.index(device.view), device.name))
-        for device in self.devices:
-            if device.view.off is not None:
-                self._requests[device.name].prepare(device.view.off(device))
 
-    def _take(self, device: Device, topic: str, subscription: Subscription) -> None:
-        data, spec = _newest(subscription), device.view.topics[topic]
-        if not data:
+
+def _taken(subscription: Subscription, limit: int = 1) -> Iterator[Any]:
+    """Return messages that have come, without those that are too large or broken."""
+    for _ in range(limit):
+        if (taken := subscription.handle.take_message(subscription.msg_type, True)) is None:
             return
-        device.heard_at = device.now
-        if spec.is_state:
-            if self._last.get(subscription) == data:
-                return
-            self._last[subscription] = data
-        if (message := _decoded(data, spec.type)) is not None:
-            if not spec.is_state or topic in device.values:
-                device.changed_at[topic] = device.now
-            device.values[topic] = printable(spec.read(message))
+        if len(taken[0]) <= MAX_BYTES:
+            with contextlib.suppress(Exception):
+                yield deserialize_message(taken[0], subscription.msg_type)
 
 
-def _newest(subscription: Subscription) -> bytes | None:
-    """Return a message, None if there is none, b'' if it is too large."""
-    taken = subscription.handle.take_message(subscription.msg_type, True)
-    if taken is None:
-        return None
-    assert isinstance(taken[0], bytes)
-    return taken[0] if len(taken[0]) <= MAX_BYTES else b''
-
-
-def _decoded(data: bytes, type_: type[T]) -> T | None:
-    """Return a message, None if it is broken."""
-    with contextlib.suppress(Exception):
-        message: T = deserialize_message(data, type_)
-        return message
-    return None
+def _deliver_answers(client: Any) -> None:
+    """Give each answer that has come to its request, as an executor does."""
+    while (taken := client.handle.take_response(client.srv_type.Response))[0] is not None:
+        # Two nodes of the same name both answer.
+        with contextlib.suppress(KeyError):
+            client.get_pending_request(taken[0].request_id.sequence_number).set_result(taken[1])
 
 
 def _taken_by_poll(message: object) -> None:

@@ -17,20 +17,19 @@
 from __future__ import annotations
 
 import argparse
-import asyncio
 from collections.abc import Mapping
 import functools
+import locale
 import os
 import sys
 import termios
 import threading
 import time
+from urllib.parse import urlsplit
 import uuid
 
 import rclpy
 from rclpy.node import Node
-from rclpy.signals import SignalHandlerOptions
-from rclpy.utilities import remove_ros_args
 
 from .ros_graph import Graph
 from .table import as_json, plain
@@ -65,21 +64,10 @@ def address(text: str) -> tuple[str, int]:
 
     :raises ValueError: if it is none.
     """
-    host, _, port = text.rpartition(':')
-    if not (host and port.isascii() and port.isdigit() and int(port) < 65536):
+    parts = urlsplit(f'//{text}')
+    if not parts.hostname or parts.port is None:
         raise ValueError('is not HOST:PORT')
-    return host.strip('[]'), int(port)
-
-
-def seconds(text: str) -> float:
-    """
-    Return a length of time, s.
-
-    :raises ValueError: if it is none.
-    """
-    if not 0.1 <= float(text) <= 3600:
-        raise ValueError(f'{text} is outside 0.1 to 3600')
-    return float(text)
+    return parts.hostname, parts.port
 
 
 def parser() -> argparse.ArgumentParser:
@@ -94,7 +82,7 @@ def parser() -> argparse.ArgumentParser:
                            'every address except loopback needs it')
     made.add_argument('--once', action='store_true', help='print one table and end')
     made.add_argument('--json', action='store_true', help='print all values as JSON and end')
-    made.add_argument('--wait', type=option(seconds), default=6.0, metavar='S',
+    made.add_argument('--wait', type=float, default=6.0, metavar='S',
                       help='longest search for devices before that table, s (default: 6)')
     made.add_argument('--ascii', action='store_true', help='draw with ASCII characters only')
     return made
@@ -110,38 +98,23 @@ def run(
 ) -> int:
     """Run the monitor; see the text of ``--help``."""
     arguments = sys.argv[1:] if args is None else args
-    failed = entry_point.wrong_arguments('monitor')
     # textual-serve runs this command line again, for each tab, with a driver of its own.
     is_tab = 'TEXTUAL_DRIVER' in os.environ
-    try:
-        # rcl reads the files as soon as it parses the arguments.
-        refusal = entry_point.parameter_file_refusal(arguments)
-        own = [] if refusal else remove_ros_args(['monitor', *arguments])[1:]
-        options = parser().parse_args(own)
-        if refusal := refusal or entry_point.log_directory_refusal():
-            complain(refusal)
-            return 2
-        if options.web and not is_tab:
-            from .web import serve
-            return serve(options.web, options.token, termination, complain)
-        termination.calls(lambda: None)
-        rclpy.init(args=['monitor', *arguments], signal_handler_options=SignalHandlerOptions.NO)
-        failed = entry_point.CANNOT_CREATE
-        # Several monitors may run, and they do not need /rosout.
+    options = parser().parse_args(entry_point.own_arguments('monitor', arguments))
+    if options.web and not is_tab:
+        from .web import serve
+        return serve(options.web, options.token, termination, complain)
+    # Several monitors may run, and they do not need /rosout.
+    entry_point.start_ros('monitor', arguments)
+    with entry_point.refusing(entry_point.CANNOT_CREATE):
         node = Node(f'illuminator_monitor_{uuid.uuid4().hex[:8]}', enable_rosout=False,
                     start_parameter_services=False)
-    except SystemExit as end:
-        return int(end.code or 0)
-    except Exception as error:
-        # rclpy has an exception for each kind of wrong argument.
-        complain(entry_point.one_line(entry_point.start_failure(error, failed)))
-        return 2
     views = [one.load('view') for one in payloads.values() if one.view]
     graph = Graph(node, views, options.source)
-    is_interactive = is_tab or os.environ.get('TERM', 'dumb') not in ('dumb', 'unknown') and all(
+    is_terminal = os.environ.get('TERM', 'dumb') not in ('dumb', 'unknown') and all(
         stream is not None and stream.isatty() for stream in (sys.stdin, sys.stdout))
     try:
-        if options.once or options.json or not is_interactive:
+        if options.once or options.json or not (is_tab or is_terminal):
             return _print_once(graph, options, termination)
         return _watch(graph, options.ascii, termination, is_tab)
     finally:
@@ -153,30 +126,19 @@ def _watch(graph: Graph, ascii_only: bool, termination: Termination, is_tab: boo
     """Show the devices until the end is requested."""
     from . import terminal
     from .app import MonitorApp
-    ascii_only = ascii_only or not sys.stdout.encoding.lower().startswith('utf')
-    make = functools.partial(MonitorApp, graph, ascii_only=ascii_only)
-    server, restore = os.getppid(), None
-    if is_tab:
-        app = make(is_alive=lambda: os.getppid() == server)
-    else:
+    # Python itself takes UTF-8 for the locale POSIX.
+    ascii_only = ascii_only or locale.nl_langinfo(locale.CODESET) != 'UTF-8'
+    app, restore = MonitorApp(graph, ascii_only=ascii_only), None
+    if not is_tab:
+        app = terminal.TerminalApp(graph, ascii_only=ascii_only,
+                                   driver_class=terminal.TerminalDriver)
         restore = functools.partial(termios.tcsetattr, 0, termios.TCSANOW, termios.tcgetattr(0))
-        app = make(stop=terminal.suspend, is_alive=terminal.is_open,
-                   driver_class=terminal.TerminalDriver)
-
-    async def show() -> None:
-        loop = asyncio.get_running_loop()
-        termination.calls(functools.partial(loop.call_soon_threadsafe, app.exit), last=restore)
-        await app.run_async()
-
-    try:
-        with terminal.quiet_errors():
-            asyncio.run(show())
-    except OSError:
-        if is_tab or terminal.is_open():
-            raise
-    if is_tab or terminal.is_open():
+    termination.calls(functools.partial(app.call_later, app.exit), last=restore)
+    with terminal.quiet_errors():
+        app.run()
+    if is_tab or os.isatty(0):
         return app.return_code or 0
-    # The interpreter would write the remaining output at its exit.
+    # The interpreter would write the remaining output to the closed terminal at its exit.
     entry_point.discard_output()
     return 0
 

@@ -20,10 +20,11 @@ from collections.abc import Iterable, Sequence
 import functools
 from itertools import groupby
 import json
-import math
-from typing import Any
+from typing import TypeVar
 
 from ...ros.monitor_view import Cell, Column, Device, LEVELS, measured, STATE_STYLES, UNKNOWN, View
+
+D = TypeVar('D', bound=Device)
 
 
 def state(device: Device) -> Cell:
@@ -54,7 +55,7 @@ def columns(view: View, name_width: int = 0) -> list[Column]:
         Column('RTT', 7, functools.partial(link, key='round_trip_p50_ms'))]
 
 
-def by_kind(devices: Iterable[Device]) -> list[list[Device]]:
+def by_kind(devices: Iterable[D]) -> list[list[D]]:
     """Return devices, which are sorted by kind, as a list for each kind."""
     return [list(some) for _, some in groupby(devices, key=lambda device: device.view.kind)]
 
@@ -90,15 +91,10 @@ def plain(devices: Sequence[Device]) -> list[str]:
 
 
 def as_json(devices: Sequence[Device]) -> str:
-    """Return all known values as JSON, with null for a number that is not finite."""
-    def finite(value: Any) -> Any:
-        if isinstance(value, tuple):
-            return [*map(finite, value)]
-        return None if isinstance(value, float) and not math.isfinite(value) else value
-
+    """Return all known values as JSON."""
     return json.dumps([{
         'name': device.name, 'kind': device.view.kind, 'state': device.state,
-        'values': {name: finite(value) for name, value in device.values.items()},
-        'diagnostics': {
+        'values': device.values, 'diagnostics': {
             kind: {'level': LEVELS[one.level][0], 'message': one.message, 'values': one.values}
-            for kind, one in device.diagnoses.items()}} for device in devices], indent=2)
+            for kind, one in device.diagnoses.items()}}
+        for device in devices], allow_nan=False, indent=2)

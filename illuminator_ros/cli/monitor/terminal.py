@@ -12,21 +12,21 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""The terminal: where the screen is written, stopping and continuing, errors of the middleware."""
+"""The monitor on a terminal: stopping and continuing, closing, errors of the middleware."""
 
 from __future__ import annotations
 
+import asyncio
 from collections.abc import Iterator
 import contextlib
-import errno
 import os
 import signal
 import sys
-import termios
-import threading
 from typing import Any
 
 from textual.drivers.linux_driver import LinuxDriver
+
+from .app import MonitorApp
 
 
 class TerminalDriver(LinuxDriver):
@@ -38,52 +38,33 @@ class TerminalDriver(LinuxDriver):
         self._file = sys.__stdout__
         # Textual would start again although it has not stopped.
         signal.signal(signal.SIGCONT, signal.SIG_DFL)
-        signal.signal(signal.SIGTSTP, self._take_stop)
-
-    def _take_stop(self, *_: object) -> None:
-        """Take a SIGTSTP; the process stops only in :func:`suspend`."""
-        request_stop()
-        self._app.call_later(self._app.run_action, 'press("ctrl+z")')
 
 
-def is_open() -> bool:
-    """Return whether the terminal at stdin has not been closed."""
-    try:
-        termios.tcgetattr(0)
-    except termios.error as error:
-        return bool(error.args[0] != errno.EIO)
-    return True
+class TerminalApp(MonitorApp):
+    """The monitor on the terminal at stdin."""
 
+    def on_mount(self) -> None:
+        """Take SIGTSTP."""
+        asyncio.get_running_loop().add_signal_handler(
+            signal.SIGTSTP, self.action_suspend_process)
 
-def request_stop() -> None:
-    """
-    Make this thread stop when it unblocks SIGTSTP, unless a SIGCONT comes before.
+    def poll(self) -> None:
+        """See :meth:`MonitorApp.poll`; end when the terminal has been closed."""
+        if os.isatty(0):
+            super().poll()
+        else:
+            self.exit()
 
-    The kernel discards a pending SIGTSTP when a SIGCONT comes. If the process stopped itself after
-    that SIGCONT, the shell would not send another one.
-    """
-    signal.pthread_sigmask(signal.SIG_BLOCK, [signal.SIGTSTP])
-    # Signal this thread: another thread would stop later, while this thread uses the terminal.
-    signal.pthread_kill(threading.get_ident(), signal.SIGTSTP)
-
-
-def suspend() -> None:
-    """
-    Stop until a shell continues the process in the foreground; without such a shell do nothing.
-
-    A SIGTSTP of :class:`TerminalDriver` waits, or else the whole job stops, including "ros2 run".
-    """
-    handler = signal.signal(signal.SIGTSTP, signal.SIG_DFL)
-    if signal.SIGTSTP not in signal.pthread_sigmask(signal.SIG_BLOCK, []):
-        # Before the rest of the job stops: the shell can continue the job from then on.
-        request_stop()
-        os.kill(0, signal.SIGTSTP)
-    signal.pthread_sigmask(signal.SIG_UNBLOCK, [signal.SIGTSTP])
-    signal.signal(signal.SIGTSTP, handler)
-    with contextlib.suppress(OSError):
-        # "bg" continues it without the terminal.
-        while os.tcgetpgrp(0) != os.getpgrp():
-            os.kill(os.getpid(), signal.SIGSTOP)
+    def action_suspend_process(self) -> None:
+        """Stop the job, with "ros2 run", until a shell continues it in the foreground."""
+        with self.suspend():
+            handler = signal.signal(signal.SIGTSTP, signal.SIG_DFL)
+            os.kill(0, signal.SIGTSTP)
+            signal.signal(signal.SIGTSTP, handler)
+            with contextlib.suppress(OSError):
+                # "bg" continues it without the terminal.
+                while os.tcgetpgrp(0) != os.getpgrp():
+                    os.kill(os.getpid(), signal.SIGSTOP)
 
 
 @contextlib.contextmanager
@@ -96,5 +77,7 @@ def quiet_errors() -> Iterator[None]:
     finally:
         os.dup2(kept, 2)
         os.lseek(file, 0, os.SEEK_SET)
-        while chunk := os.read(file, 1 << 16):
-            os.write(2, chunk)
+        # The terminal may have been closed.
+        with contextlib.suppress(OSError):
+            while chunk := os.read(file, 1 << 16):
+                os.write(2, chunk)

@@ -22,6 +22,7 @@ from __future__ import annotations
 
 import asyncio
 from collections.abc import Awaitable, Callable
+import functools
 import hmac
 import ipaddress
 from pathlib import Path
@@ -32,21 +33,21 @@ import sys
 from aiohttp import web
 from textual_serve.server import Server
 
-from ..entry_point import print_output
+from ..entry_point import print_output, Refusal
 from ..termination import Termination
 
 # Each tab is a process.
 MAX_TABS = 16
 # textual-serve's own page loads a font from another host, which a vehicle's network lacks.
 PAGE = Path(__file__).with_name('page.html')
-Complain = Callable[[str], None]
+Complain = Callable[[str], object]
 Handler = Callable[[web.Request], Awaitable[web.StreamResponse]]
 
 
 def is_loopback(host: str) -> bool:
     """Return whether a host is this machine only."""
     try:
-        return ipaddress.ip_address(host).is_loopback
+        return ipaddress.ip_address(host.strip('[]')).is_loopback
     except ValueError:
         return host == 'localhost'
 
@@ -66,13 +67,12 @@ class Gate:
         self._needs_token = needs_token
         self._is_local = is_local
         self._announce = announce
-        self._token = self._cookie = ''
+        self._token, self._cookie = '', secrets.token_urlsafe(32)
         self._tabs = 0
 
     def renew(self) -> None:
         """Announce a URL, with a new token if one is needed."""
         self._token = secrets.token_urlsafe(32)
-        self._cookie = self._cookie or secrets.token_urlsafe(32)
         self._announce(f'?token={self._token}' if self._needs_token else '')
 
     @web.middleware
@@ -81,7 +81,7 @@ class Gate:
         is_socket = request.path == '/ws'
         origin = request.headers.get('Origin', '' if is_socket else f'//{request.host}')
         if origin.partition('//')[2] != request.host or self._is_local and not is_loopback(
-                (request.url.host or '').strip('[]')):
+                request.url.host or ''):
             raise web.HTTPForbidden(text='not from this site')
         # A host has one set of cookies for all of its ports.
         name = f'illuminator_monitor_{request.url.port}'
@@ -110,39 +110,38 @@ async def _page(request: web.Request) -> web.StreamResponse:
     return web.FileResponse(PAGE)
 
 
+async def _serve(host: str, port: int, gate: Gate, termination: Termination) -> None:
+    ended = asyncio.Event()
+    termination.calls(functools.partial(
+        asyncio.get_running_loop().call_soon_threadsafe, ended.set))
+    # A tab ends with the server, even if that is killed.
+    server = Server(f'exec setpriv --pdeathsig TERM {shlex.join(sys.orig_argv)}')
+    app = web.Application(middlewares=[gate.check])
+    app.add_routes([web.get('/', _page), web.get('/ws', server.handle_websocket),
+                    web.static('/static', server.statics_path)])
+    runner = web.AppRunner(app, access_log=None)
+    await runner.setup()
+    await web.TCPSite(runner, host, port).start()
+    gate.renew()
+    await ended.wait()
+    await runner.cleanup()
+
+
 def serve(
     address: tuple[str, int], needs_token: bool, termination: Termination, complain: Complain,
 ) -> int:
-    """Serve browsers until a signal; return the exit status."""
+    """
+    Serve browsers until a signal; return the exit status.
+
+    :raises Refusal: if others could reach it without a token.
+    """
     host, port = address
     if not (needs_token or is_loopback(host)):
-        complain(f'{host} can be reached from other machines: add --token')
-        return 2
-
-    async def run() -> None:
-        ended, call = asyncio.Event(), asyncio.get_running_loop().call_soon_threadsafe
-        termination.calls(lambda: call(ended.set))
-        gate = Gate(needs_token, is_loopback(host), announce)
-        app = web.Application(middlewares=[gate.check])
-        # With "exec" a tab notices when the server is killed.
-        server = Server(f'exec {shlex.join(sys.orig_argv)}')
-        app.add_routes([web.get('/', _page), web.get('/ws', server.handle_websocket),
-                        web.static('/static', server.statics_path)])
-        runner = web.AppRunner(app, access_log=None)
-        await runner.setup()
-        await web.TCPSite(runner, host, port).start()
-        # Port 0 is any free one.
-        bound.append(runner.addresses[0][1])
-        gate.renew()
-        await ended.wait()
-        await runner.cleanup()
-
-    def announce(query: str) -> None:
-        print_output(complain, f'http://{f"[{host}]" if ":" in host else host}:{bound[0]}/{query}')
-
-    bound: list[int] = []
+        raise Refusal(f'{host} can be reached from other machines: add --token')
+    url = f'http://{f"[{host}]" if ":" in host else host}:{port}/'
+    gate = Gate(needs_token, is_loopback(host), lambda query: print_output(complain, url + query))
     try:
-        asyncio.run(run())
+        asyncio.run(_serve(host, port, gate, termination))
     except OSError as error:
         complain(f'cannot serve {host}:{port}: {error.strerror or error}')
         return 1

@@ -35,16 +35,17 @@ AXES = {'roll': (math.pi, 'right', 'left'), 'pitch': (math.pi / 2, 'down', 'up')
         'yaw': (math.pi, 'left', 'right')}
 
 
-def angle(device: Device, axis: str) -> float:
-    """Return the angle of an axis, rad, NaN if it is unknown."""
-    return float(device.values.get('angles', ('', *[math.nan] * 3))[1 + [*AXES].index(axis)])
+def angle(device: Device, axis: str) -> float | None:
+    """Return the angle of an axis, rad, None if it is unknown."""
+    known: float | None = device.values.get('angles', (None,) * 4)[1 + [*AXES].index(axis)]
+    return known
 
 
 def described(device: Device, axis: str) -> str:
     """Return the angle of an axis with its direction."""
-    degrees = round(math.degrees(angle(device, axis)), 1)
-    if not math.isfinite(degrees):
+    if (known := angle(device, axis)) is None:
         return UNKNOWN
+    degrees = round(math.degrees(known), 1)
     return f'{abs(degrees):.1f} {AXES[axis][1 + (degrees < 0)] if degrees else ""}'.rstrip()
 
 
@@ -57,7 +58,7 @@ def _refusal(device: Device) -> str:
 def nudge(device: Device, typed: str, axis: str, step: float) -> Request | str:
     """Turn one axis by a step, degrees, from its last target or its angle."""
     start = device.wants(axis, angle(device, axis))
-    if refusal := _refusal(device) or ('' if math.isfinite(start) else 'its angles are unknown'):
+    if refusal := _refusal(device) or ('its angles are unknown' if start is None else ''):
         return refusal
     aim, limit = start + math.radians(step), AXES[axis][0]
     # Yaw has no end: it goes on beyond half a turn.
@@ -74,8 +75,7 @@ def nudge(device: Device, typed: str, axis: str, step: float) -> Request | str:
 def point(device: Device, typed: str) -> Request | str:
     """Point at a place."""
     try:
-        place = [float(text) for text in typed.replace(',', ' ').split()]
-        latitude, longitude, altitude = place
+        latitude, longitude, altitude = map(float, typed.replace(',', ' ').split())
     except ValueError:
         return f'{typed!r} is not latitude, longitude and altitude'
     if not (abs(latitude) <= 90 and abs(longitude) <= 180 and math.isfinite(altitude)):
@@ -89,8 +89,13 @@ def take_control(device: Device, typed: str) -> Request:
     """Take primary control; ask first unless no component has it."""
     controller = device.values.get('controller', 'unknown')
     is_free = device.values.get('in_control') or controller.startswith('primary none')
-    return shared.trigger('take control', 'take_control', '' if is_free else (
+    return shared.trigger('take_control', '' if is_free else (
         f'take control of {device.name}? In control now: {controller}.'))
+
+
+def neutral(device: Device, typed: str) -> Request:
+    """Turn to the neutral position, wherever that is."""
+    return shared.trigger('neutral', f'turn {device.name} to its neutral position?')
 
 
 def _details(device: Device) -> Iterable[shared.Line]:
@@ -107,6 +112,11 @@ def _details(device: Device) -> Iterable[shared.Line]:
     since = device.since('controller') or (known is not None and shared.age(known))
     yield 'control', ['ours: ' if device.values.get('in_control') else '',
                       device.values.get('controller', 'unknown'), f' for {since}' * bool(since)]
+
+
+def _arrow(key: str, label: str, axis: str, step: float) -> Key:
+    return Key((key,), f'after m: {key} by {STEP:g} degrees', label,
+               functools.partial(nudge, axis=axis, step=step))
 
 
 VIEW = shared.View(
@@ -127,19 +137,13 @@ VIEW = shared.View(
     _details,
     (Key(('t',), 'take control, which asks first if another component has it', 'take control',
          take_control),
-     Key(('l',), 'release control', 'release',
-         lambda device, typed: shared.trigger('release control', 'release_control')),
-     *(Key((key,), f'after m: {key} by {STEP:g} degrees', label,
-           functools.partial(nudge, axis=axis, step=step), is_steering=True)
-       for key, label, axis, step in (
-           ('left', '←', 'yaw', STEP), ('right', '→', 'yaw', -STEP),
-           ('up', '↑', 'pitch', -STEP), ('down', '↓', 'pitch', STEP))),
-     Key(('n',), 'turn to the neutral position, which asks first', 'neutral',
-         lambda device, typed: shared.trigger(
-             'neutral', 'neutral', f'turn {device.name} to its neutral position?')),
+     shared.trigger_key('l', 'release control', 'release', 'release_control'),
+     Key(('n',), 'turn to the neutral position, which asks first', 'neutral', neutral),
      Key(('p',), 'point at a place', 'point', point,
          'latitude, longitude (degrees) and altitude (m above the ellipsoid)'),
      shared.RELEASE_SOURCE),
-    {'ours': 'bold green', 'ok': 'green'},
-    lambda device: 'ours' if device.values.get('in_control') else (
+    steering=(_arrow('left', '←', 'yaw', STEP), _arrow('right', '→', 'yaw', -STEP),
+              _arrow('up', '↑', 'pitch', -STEP), _arrow('down', '↓', 'pitch', STEP)),
+    states={'ours': 'bold green', 'ok': 'green'},
+    state=lambda device: 'ours' if device.values.get('in_control') else (
         'ok' if device.values else shared.NOT_KNOWN))

@@ -67,7 +67,7 @@ def dim(device: Device, typed: str, step: float) -> Request | str:
     if device.prefix:
         return Request(text, f'{device.prefix}cmd/brightness', Float32, Float32(data=target),
                        {'brightness': target})
-    return _set(text, '', brightness=target)
+    return _set(text, brightness=target)
 
 
 def strobe(device: Device, typed: str) -> Request | str:
@@ -75,19 +75,18 @@ def strobe(device: Device, typed: str) -> Request | str:
     if device.prefix:
         return f'the source {device.source} cannot: a strobe is set by parameters'
     if device.wants('strobe_period', device.values.get('strobe_period')):
-        return _set('no strobe', '', strobe_period=0.0)
+        return _set('no strobe', strobe_period=0.0)
     duty = round(device.values.get('strobe_duty_cycle') or STROBE_DUTY_CYCLE, 3)
     return _set(f'strobe {STROBE_PERIOD:g} s, {duty:g} %',
                 f'let {device.name} strobe? Flashing light can cause seizures.',
                 strobe_period=STROBE_PERIOD, strobe_duty_cycle=duty)
 
 
-def _set(text: str, question: str, **values: float) -> Request:
-    return Request(
-        text, 'set_parameters_atomically', SetParametersAtomically,
-        SetParametersAtomically.Request(parameters=[
-            Parameter(name, value=value).to_parameter_msg() for name, value in values.items()]),
-        values, question)
+def _set(text: str, question: str = '', **values: float) -> Request:
+    parameters = [Parameter(name, value=value).to_parameter_msg()
+                  for name, value in values.items()]
+    return Request(text, 'set_parameters_atomically', SetParametersAtomically,
+                   SetParametersAtomically.Request(parameters=parameters), values, question)
 
 
 def _strobe(device: Device) -> str:
@@ -99,16 +98,16 @@ def _strobe(device: Device) -> str:
 
 def _details(device: Device) -> Iterable[shared.Line]:
     values, lamp = device.values, functools.partial(device.diagnosed, 'lamp')
-    limit, shines, serial = agreed(device), values.get('brightness'), lamp('serial_number')
-    yield 'light', [
-        ('' if shines is None else shared.bar(shines, BAR_WIDTH) + ' ', 'yellow'),
-        ', '.join(filter(None, (
-            measured(shines, '%') + ('' if limit == shines else f' (agreed: {limit:g} %)'),
-            _strobe(device), values.get('mode'),
-            f'{lamp("vendor")} {lamp("model")}'.strip(), serial and f'no. {serial}',
-            f'up {shared.age(values["uptime"])}' if 'uptime' in values else '')))]
+    shines, limit, uptime = values.get('brightness'), agreed(device), values.get('uptime')
+    serial = lamp('serial_number')
+    facts = (
+        measured(shines, '%') + ('' if limit == shines else f' (agreed: {limit:g} %)'),
+        _strobe(device), values.get('mode'), f'{lamp("vendor")} {lamp("model")}'.strip(),
+        serial and f'no. {serial}', uptime and f'up {shared.age(uptime)}')
+    yield 'light', [(shared.bar(shines or 0.0, BAR_WIDTH), 'yellow'),
+                    f' {", ".join(filter(None, facts))}']
     if known := [value for value in device.trend if value is not None]:
-        yield 'temp', [measured(known[-1], 'C ', '.1f'),
+        yield 'temp', [measured(values.get('temperature'), 'C ', '.1f'),
                        (shared.sparkline(device.trend, SMALLEST_SPAN).lstrip(), 'cyan'),
                        f' {min(known):.1f} to {max(known):.1f} in 2 min']
 
@@ -132,10 +131,9 @@ VIEW = shared.View(
      Key(('.', '>'), 'brighter by 1 %', '', functools.partial(dim, step=FINE_STEP)),
      Key((',', '<'), 'darker by 1 %', '', functools.partial(dim, step=-FINE_STEP)),
      Key(('s',), 'strobe, which asks first, or no strobe', 'strobe', strobe),
-     Key(('r',), 'ask for identity and status again', 'refresh',
-         lambda device, typed: shared.trigger('refresh', 'refresh')),
+     shared.trigger_key('r', 'ask for identity and status again', 'refresh', 'refresh'),
      shared.RELEASE_SOURCE),
-    {'ON': 'bold green', 'off': ''},
-    lambda device: ('off', 'ON')[device.values['enabled']] if 'enabled' in device.values
-    else shared.NOT_KNOWN,
-    'temperature', switch_off)
+    states={'ON': 'bold green', 'off': ''},
+    state=lambda device: {True: 'ON', False: 'off', None: shared.NOT_KNOWN}[
+        device.values.get('enabled')],
+    trend='temperature', off=switch_off)

@@ -22,25 +22,18 @@ from sensor_msgs.msg import NavSatFix
 from std_msgs.msg import Bool, UInt32
 
 from ...ros import monitor_view as shared
-from ...ros.monitor_view import Column, Device, Key, Topic, UNKNOWN
+from ...ros.monitor_view import Column, Device, Topic, trigger_key, UNKNOWN
 
-# The inputs, as /diagnostics names them, and their states.
+# The inputs, as /diagnostics names them, and the styles of their states.
 INPUTS = ('fix', 'velocity', 'satellites', 'imu', 'attitude', 'mount', 'time_reference')
 STYLES = {'ok': 'green', 'missing': 'dim', 'stale': 'yellow', 'refused': 'bold red'}
 
 
 def place(device: Device) -> str:
     """Return the position of the last image."""
-    status, latitude, longitude, altitude = device.values.get('image/fix', (-1, 0, 0, 0))
-    return UNKNOWN if status < 0 else f'{latitude:.6f} {longitude:.6f} {altitude:.1f} m'
-
-
-def inputs(device: Device) -> Iterable[tuple[str, str, str]]:
-    """Return name, state and age of each input."""
-    for name in INPUTS:
-        seconds = device.number('camera', f'{name}_s_ago')
-        if state := device.diagnosed('camera', name):
-            yield name, state, '' if seconds is None else shared.age(seconds)
+    status, *position = device.values.get('image/fix', (-1,))
+    return (UNKNOWN if status < 0 or None in position else
+            '{:.6f} {:.6f} {:.1f} m'.format(*position))
 
 
 def _image(device: Device) -> str:
@@ -50,10 +43,18 @@ def _image(device: Device) -> str:
     return f'{index}' + (since and f', {since} ago')
 
 
+def _inputs(device: Device) -> str:
+    return ' '.join(name for name in INPUTS if device.diagnosed('camera', name) == 'ok') or 'none'
+
+
 def _details(device: Device) -> Iterable[shared.Line]:
     yield 'image', [f'{_image(device)}, at {place(device)}']
-    yield 'inputs', [cell for name, state, seconds in inputs(device) for cell in (
-        f'{name} ', (state, STYLES.get(state, '')), f' {seconds}'.rstrip() + '   ')]
+    cells: list[shared.Cell] = []
+    for name in INPUTS:
+        state, seconds = device.diagnosed('camera', name), device.number('camera', f'{name}_s_ago')
+        cells += [f'{name} ', (state or UNKNOWN, STYLES.get(state, '')),
+                  '   ' if seconds is None else f' {shared.age(seconds)}   ']
+    yield 'inputs', cells
 
 
 VIEW = shared.View(
@@ -66,13 +67,8 @@ VIEW = shared.View(
     (Column('IMAGE', 14, _image),
      Column('PING', 8, lambda device: shared.measured(
          device.number('camera', 'round_trip_ms'), 'ms')),
-     Column('INPUTS', 24, lambda device: ' '.join(
-         name for name, state, _ in inputs(device) if state == 'ok') or 'none'),
-     Column('POSITION', 30, place)),
+     Column('INPUTS', 24, _inputs), Column('POSITION', 30, place)),
     _details,
-    (Key(('space',), 'take an image', 'capture',
-         lambda device, typed: shared.trigger('capture', 'capture')),
-     Key(('b',), 'take an image of the calibration panel', 'panel',
-         lambda device, typed: shared.trigger('panel', 'capture_panel')),
-     Key(('p',), 'measure the round trip through the camera', 'ping',
-         lambda device, typed: shared.trigger('ping', 'ping'))))
+    (trigger_key('space', 'take an image', 'capture', 'capture'),
+     trigger_key('b', 'take an image of the calibration panel', 'panel', 'capture_panel'),
+     trigger_key('p', 'measure the round trip through the camera', 'ping', 'ping')))
