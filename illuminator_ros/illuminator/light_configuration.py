@@ -110,17 +110,11 @@ class Required:
         """Return s that the next attempt may take."""
         return RETRY_LIMIT if self.has_ended else CONFIGURE_LIMIT
 
-    @property
-    def delays_on(self) -> bool:
-        """Whether an ON waits until a command with them has ended."""
-        return (bool(self.values) and not self.has_ended
-                and self.requirement is not Requirement.OTHER_SENDER)
-
-    def and_also(self, values: Changes, requirement: Requirement, due: float) -> Required:
+    def merged(self, values: Changes, requirement: Requirement, due: float) -> Required:
         """Return these values and others; only overrides replace values that wait."""
-        merged = ({**self.values, **values} if requirement is Requirement.OVERRIDE
-                  else {**values, **self.values})
-        return Required(merged, max(requirement, self.requirement), due)
+        both = ({**self.values, **values} if requirement is Requirement.OVERRIDE
+                else {**values, **self.values})
+        return Required(both, max(requirement, self.requirement), due)
 
 
 def undoing_limit(reassert: bool) -> RepeatLimit | None:
@@ -229,7 +223,9 @@ class LightConfiguration:
     @property
     def must_send_before_on(self) -> bool:
         """Whether the light must be sent a configuration before it is switched on."""
-        return self._required.delays_on
+        required = self._required
+        return (bool(required.values) and not required.has_ended
+                and required.requirement is not Requirement.OTHER_SENDER)
 
     @property
     def sent_at(self) -> float:
@@ -306,7 +302,7 @@ class LightConfiguration:
 
         :param values: by name, checked, except against the limits that the light reports.
         """
-        self._required = self._required.and_also(
+        self._required = self._required.merged(
             values, Requirement.OVERRIDE, self._first_due(now))
 
     def _first_due(self, now: float) -> float:
@@ -432,7 +428,7 @@ class LightConfiguration:
             confirmed = self.agreed.confirmed
             values = {name: getattr(confirmed, name) for name in FIELDS
                       if name != 'mode' or confirmed.mode}
-            self._required = self._required.and_also(values, Requirement.RESTART, now)
+            self._required = self._required.merged(values, Requirement.RESTART, now)
         elif self._required.requirement in _SENT_ONCE:
             # The light has other values now.
             self._required = Required()
@@ -562,7 +558,7 @@ class LightConfiguration:
             return False
         due = self._undoing.take(now)
         if due is not None:
-            self._required = self._required.and_also(
+            self._required = self._required.merged(
                 {name: getattr(confirmed, name) for name in names}, Requirement.OTHER_SENDER, due)
         self._emit(events.ChangedByOther(
             self._address, reported.describe(names), due is not None))
@@ -576,7 +572,7 @@ class LightConfiguration:
                 and (due := self.guard.due(now)) is not None):
             limited = self.guard.limits.clipped(reported, self._newest.strobe_range)
             values = {name: getattr(limited, name) for name in reported.differences(limited)}
-            self._required = self._required.and_also(values, Requirement.LIMIT, due)
+            self._required = self._required.merged(values, Requirement.LIMIT, due)
 
     # Time
 
