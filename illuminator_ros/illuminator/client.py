@@ -52,6 +52,7 @@ class IlluminatorClient(Payload):
     :param wanted: returns whether a light at an address is of interest; others are ignored.
     :param needs_mounts: whether the messages for :attr:`mounts` are received.
     :ivar events: the events of all lights.
+    :ivar discovery: finds the lights.
     :ivar lights: the announced lights by address, in the order of their announcement.
     :ivar mounts: the directions of gimbals.
     :ivar mount_moved: the system id of each mount that sends its attitude.
@@ -68,9 +69,9 @@ class IlluminatorClient(Payload):
         self.events: Listeners[LightEvent] = Listeners()
         # Takes the results of the OFF at the end of the process.
         self._report_off: Callable[[Light, Result, float], None] | None = None
-        self._discovery = Discovery(
+        self.discovery = Discovery(
             self._make, commands, found=self._found, forgotten=self._forgotten, wanted=wanted)
-        self.lights: Mapping[Address, Light] = self._discovery.devices
+        self.lights: Mapping[Address, Light] = self.discovery.devices
         self.messages = (Heartbeat, IlluminatorStatus, ComponentInformationBasic,
                          *(self.mounts.messages if needs_mounts else ()))
 
@@ -79,38 +80,23 @@ class IlluminatorClient(Payload):
         """Return the announced lights in the order of their addresses."""
         return [self.lights[address] for address in sorted(self.lights)]
 
-    @property
-    def ignored(self) -> tuple[Address, ...]:
-        """Return the addresses of the first lights that are not wanted."""
-        return tuple(self._discovery.ignored)
-
-    @property
-    def unanswering(self) -> tuple[Address, ...]:
-        """Return the addresses that send an illuminator's heartbeat, and no status or answer."""
-        return tuple(self._discovery.candidates)
-
-    @property
-    def limit_reached(self) -> bool:
-        """Return whether there are more lights than the client takes."""
-        return self._discovery.limit_reached
-
     def change_settings(self, settings: Settings, now: float) -> None:
         """Take other settings, see :meth:`Light.change_settings`."""
         self.settings = settings
-        for light in self._discovery:
+        for light in self.discovery:
             light.change_settings(settings, now)
 
     def _make(self, address: Address) -> Light:
         def emit(event: LightEvent) -> None:
-            if address in self._discovery.devices:
+            if address in self.discovery.devices:
                 self.events.emit(event)
 
         return Light(address, self._commands, self.settings, emit, self._changed)
 
     def _changed(self, light: Light, now: float) -> None:
-        self._discovery.changed(light.address)
+        self.discovery.changed(light.address)
         if light.has_answered and light.address not in self.lights:
-            self._discovery.prove(light.address, now)
+            self.discovery.prove(light.address, now)
 
     def _found(self, light: Light, now: float) -> None:
         self.events.emit(LightFound(light.address))
@@ -123,7 +109,7 @@ class IlluminatorClient(Payload):
 
     def link_opened(self, now: float) -> None:
         """See :meth:`Payload.link_opened`."""
-        for light in self._discovery:
+        for light in self.discovery:
             light.link_opened(now)
         # A light that is heard again answers immediately; its next heartbeat may take a second.
         lost = (light for light in self.lights.values() if not light.connected)
@@ -132,34 +118,34 @@ class IlluminatorClient(Payload):
 
     def link_closed(self, now: float, reason: str) -> None:
         """See :meth:`Payload.link_closed`."""
-        for light in self._discovery:
+        for light in self.discovery:
             light.link_closed(now, reason)
-            self._discovery.changed(light.address)
+            self.discovery.changed(light.address)
 
     def components_lost(self, lost: Collection[Address], now: float, reason: str) -> None:
         """See :meth:`Payload.components_lost`."""
-        for light in self._discovery:
+        for light in self.discovery:
             if light.address in lost:
                 light.lose('the link was lost', now)
-                self._discovery.changed(light.address)
+                self.discovery.changed(light.address)
 
     def receive(self, source: Address, message: Message, now: float) -> None:
         """See :meth:`Payload.receive`."""
         if isinstance(message, IlluminatorStatus):
-            if light := self._discovery.hear(source, now, proved=True):
+            if light := self.discovery.hear(source, now, proved=True):
                 light.take_status(Status.from_message(message), now, sender_of(message))
         elif isinstance(message, Heartbeat) and message.type == mavlink.MAV_TYPE_ILLUMINATOR:
-            if light := self._discovery.hear(source, now, proved=False):
+            if light := self.discovery.hear(source, now, proved=False):
                 light.heard(now)
         elif isinstance(message, self.mounts.messages):
             if self.mounts.take(source, message, now):
                 self.mount_moved.emit(source.system)
-        elif light := self._discovery.get(source):
-            self._discovery.changed(source)
+        elif light := self.discovery.get(source):
+            self.discovery.changed(source)
             if isinstance(message, Heartbeat):
                 light.heard(now)
             elif isinstance(message, ComponentInformationBasic):
-                self._discovery.prove(source, now)
+                self.discovery.prove(source, now)
                 light.take_identity(Identity.from_message(message), now)
 
     def may_send_at_end(self, sent: Command | Message) -> bool:
@@ -169,7 +155,7 @@ class IlluminatorClient(Payload):
 
     def close(self, now: float) -> None:
         """See :meth:`Payload.close`."""
-        for light in self._discovery:
+        for light in self.discovery:
             light.close(now)
 
     def switch_off_finally(
@@ -186,11 +172,11 @@ class IlluminatorClient(Payload):
 
     def poll(self, now: float) -> None:
         """See :meth:`Payload.poll`."""
-        self._discovery.poll(now)
+        self.discovery.poll(now)
 
     def next_deadline(self) -> float:
         """See :meth:`Payload.next_deadline`."""
-        return self._discovery.next_deadline()
+        return self.discovery.next_deadline()
 
 
 def enable_all(

@@ -116,9 +116,9 @@ def test_a_candidate_that_gave_way_gets_no_more_commands_and_is_found_by_its_sta
 def test_further_lights_are_ignored_when_there_are_too_many(client: Heard) -> None:
     for source in FORGED[:MAX_DEVICES]:
         client.receive(source, status_message(), 0.0)
-    assert not client.limit_reached
+    assert not client.discovery.limit_reached
     client.receive(LIGHT, status_message(), 0.0)
-    assert client.limit_reached
+    assert client.discovery.limit_reached
     assert list(client.lights) == FORGED[:MAX_DEVICES]
 
 
@@ -144,6 +144,6 @@ def test_a_light_that_is_not_wanted_is_named_and_not_commanded() -> None:
     for system in (1, 2):
         client.receive(mav.Address(system, 243), status_message(), 0.0)
     assert list(client.lights) == [mav.Address(2, 243)]
-    assert client.ignored == (mav.Address(1, 243),)
+    assert list(client.discovery.ignored) == [mav.Address(1, 243)]
     assert {message.target_system for _, message in client.outgoing
             if hasattr(message, 'target_system')} == {2}

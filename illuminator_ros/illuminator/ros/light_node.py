@@ -275,12 +275,12 @@ class LightNode:
             started=self._started, mount_absence=self._mount_absence(now))
 
     def _heard(self) -> LightsHeard:
-        client = self._client
+        lights, discovery = self._client.lights, self._client.discovery
         # Only a node without a light names them.
         some, unanswering = ((), ()) if self._light() else (
             tuple(itertools.islice(sorted(addresses), MAX_NAMED))
-            for addresses in ({*client.lights, *client.ignored}, client.unanswering))
-        return LightsHeard(len(client.lights), some, unanswering, client.limit_reached)
+            for addresses in ({*lights, *discovery.ignored}, discovery.candidates))
+        return LightsHeard(len(lights), some, unanswering, discovery.limit_reached)
 
 
 def _checked(overrides: Mapping[str, object], limits: SafetyLimits) -> dict[str, float]:
