@@ -23,7 +23,6 @@ from ..messages import IlluminatorStatus
 from ..model import (
     Configuration,
     DIMMING_FLAGS,
-    flag_names,
     Mode,
     NOTHING,
     shortest,
@@ -50,16 +49,9 @@ BRIGHTNESS_STEP = 5.0
 
 
 def status_text(status: Status) -> str:
-    """Return a status in one line."""
+    """Return the switch and the configuration that a status shows; 0 replaces invalid values."""
     on = {True: 'on', False: 'off', None: 'enable invalid'}[status.enabled]
-    numbers = ', '.join(
-        f'{name} {"invalid" if value is None else f"{value:g}"}{unit}' for name, value, unit in (
-            ('brightness', status.brightness, ' %'),
-            ('strobe_period', status.strobe_period, ' s'),
-            ('strobe_duty_cycle', status.strobe_duty_cycle, ' %'),
-            ('temp_c', status.temperature, '')))
-    flags = ', '.join(flag_names(status.error_flags)) or 'no flags'
-    return f'{on}, mode {status.mode.label}, {numbers}, {flags}, uptime_ms {status.uptime_ms}'
+    return f'{on}, {status.configuration(NOTHING).describe()}'
 
 
 def differences(asked: Configuration, status: Status) -> list[str]:
@@ -127,12 +119,6 @@ class LightSession(Session):
         """See :class:`Session`."""
         return isinstance(message, IlluminatorStatus) or (
             isinstance(message, Heartbeat) and message.type == mavlink.MAV_TYPE_ILLUMINATOR)
-
-    def describe(self, message: Message) -> str:
-        """See :class:`Session`."""
-        if isinstance(message, IlluminatorStatus):
-            return f'{message.get_type()} {status_text(Status.from_message(message))}'
-        return super().describe(message)
 
     # Commands and statuses
 

@@ -189,7 +189,7 @@ class Session(Endpoint):
         self._latest: dict[int, Transaction] = {}
         self._heartbeat = HeartbeatTimer(self.address, mavlink.MAV_TYPE_GCS, self.outgoing)
 
-    # What a payload adds
+    # A payload overrides these
 
     @abstractmethod
     def is_device(self, message: Message) -> bool:
