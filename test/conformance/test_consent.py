@@ -12,11 +12,10 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Without consent the light neither strobes nor shines brighter than 20 %."""
+"""Without consent no light strobes or dazzles, no gimbal moves, and no camera takes an image."""
 
 from dataclasses import replace
 
-from illuminator_ros.illuminator.checks.requirements import REQUIREMENTS
 from illuminator_ros.illuminator.model import Configuration, Mode
 from illuminator_ros.illuminator.simulated_properties import (
     FAULTS,
@@ -24,10 +23,11 @@ from illuminator_ros.illuminator.simulated_properties import (
     PROFILES,
 )
 from illuminator_ros.mavlink.dialect import mavlink
+from illuminator_ros.mavlink.messages import Address
 from illuminator_ros.payload.checks.requirement import Verdict
-from illuminator_ros.payload.simulated import CommandReply
+from illuminator_ros.payload.simulated import CommandReply, Effect
 import pytest
-from support.conformance_run import Run
+from support.checks_run import ChecksRun, KINDS, start
 
 LIGHTS = {
     'switch': IlluminatorProperties(),
@@ -41,6 +41,19 @@ SWITCHING = ('other-target', 'repeated', 'on', 'on-off-values', 'mode-internal',
 all_lights = pytest.mark.parametrize('light', LIGHTS.values(), ids=LIGHTS)
 
 
+def watch(one: ChecksRun) -> list[Configuration]:
+    """Return a list that gets the configuration of a light after each change that leaves it on."""
+    seen: list[Configuration] = []
+    apply = one.component.apply
+
+    def noted(effect: Effect, now: float) -> None:
+        apply(effect, now)
+        if one.device.enabled:
+            seen.append(one.device.configuration)
+    one.component.apply = noted
+    return seen
+
+
 def dazzling(seen: list[Configuration]) -> list[Configuration]:
     # A comparison with NaN is false, so NaN counts as dazzling. Under external sync the other
     # signal may strobe.
@@ -49,38 +62,32 @@ def dazzling(seen: list[Configuration]) -> list[Configuration]:
         and one.mode is Mode.INTERNAL_CONTROL)]
 
 
-def rejecting(
-    light: IlluminatorProperties, configuration: Configuration, *, consent: bool,
-    only: tuple[str, ...] = (),
-) -> tuple[Run, list[Configuration]]:
-    """Return a run against a light that rejects every configuration, and its states while on."""
-    run = Run(light, consent=consent)
-    run.lamp.configuration = configuration
-    execute = run.light.device.execute
-    run.light.device.execute = (  # type: ignore[method-assign]
-        lambda source, command, now: CommandReply(mavlink.MAV_RESULT_FAILED)
-        if command.command == mavlink.MAV_CMD_DO_ILLUMINATOR_CONFIGURE
-        else execute(source, command, now))
-    seen = run.watch()
-    return run.finish(), seen
-
-
-def test_checks_that_need_consent_are_skipped_without_it() -> None:
-    run = Run(consent=False).finish()
-    assert {one.requirement.name for one in run.runner.results
-            if 'not agreed to; see --yes' in one.detail
-            } == {one.name for one in REQUIREMENTS if one.needs_consent}
-    assert run.runner.passed
+@pytest.mark.parametrize('kind', KINDS)
+def test_checks_that_need_consent_are_skipped_without_it_and_change_nothing(kind: str) -> None:
+    one = start(kind, consent=False)
+    if 'gimbal' in kind:
+        one.device.mount.motion.turn(-0.5, 0.4, one.link.now)
+    one.finish()
+    assert {found.requirement.name for found in one.runner.results
+            if 'not agreed to; see --yes' in found.detail
+            } == {found.name for found in one.checks.requirements if found.needs_consent}
+    assert one.runner.passed
+    if 'gimbal' in kind:
+        assert one.device.mount.motion.angles == (0.0, -0.5, 0.4)
+        assert getattr(one.device, 'primary', Address(0, 0)) == Address(0, 0)
+    if kind == 'rededge':
+        assert not one.device.images
+        assert one.runner.restored == 'nothing was changed'
 
 
 @all_lights
 @pytest.mark.parametrize('fault', [None, *FAULTS])
 def test_without_consent_a_light_is_on_at_low_brightness_only(
         light: IlluminatorProperties, fault: str | None) -> None:
-    run = Run(light, faults=(fault,) if fault else (), consent=False,
-              only=SWITCHING if fault else ())
-    seen = run.watch()
-    run.finish()
+    one = start('illuminator', *([fault] if fault else []), of=light, consent=False,
+                only=SWITCHING if fault else ())
+    seen = watch(one)
+    one.finish()
     assert seen or fault
     assert dazzling(seen) == []
 
@@ -92,9 +99,16 @@ def test_without_consent_a_light_is_on_at_low_brightness_only(
 ], ids=['bright', 'strobing', 'external sync'])
 def test_without_consent_a_light_that_cannot_be_dimmed_is_not_switched_on(
         light: IlluminatorProperties, configuration: Configuration) -> None:
-    run, seen = rejecting(light, configuration, consent=False)
+    one = start('illuminator', of=light, consent=False)
+    execute, one.device.configuration = one.device.execute, configuration
+    one.device.execute = (
+        lambda source, command, now: CommandReply(mavlink.MAV_RESULT_FAILED)
+        if command.command == mavlink.MAV_CMD_DO_ILLUMINATOR_CONFIGURE
+        else execute(source, command, now))
+    seen = watch(one)
+    one.finish()
     assert seen == []
     for name in ('on', 'off', 'on-off-values', 'other-target', 'command-int', 'repeated'):
-        assert run.result(name).verdict is Verdict.SKIPPED
-        assert 'cannot be changed: not agreed to; see --yes' in run.result(name).detail
-    assert {'mode-internal', 'brightness', 'brightness-values'} <= run.failed
+        assert one.result(name).verdict is Verdict.SKIPPED
+        assert 'cannot be changed: not agreed to; see --yes' in one.result(name).detail
+    assert {'mode-internal', 'brightness', 'brightness-values'} <= one.failed

@@ -19,25 +19,23 @@ import json
 from xml.etree import ElementTree
 
 from illuminator_ros.illuminator.checks.requirements import REQUIREMENTS
-from illuminator_ros.illuminator.simulated_properties import IlluminatorProperties
 from illuminator_ros.mavlink.messages import Address
 from illuminator_ros.payload.checks import report as reports
 from illuminator_ros.payload.checks.report import lines, RunReport, unreached
 from illuminator_ros.payload.checks.requirement import Verdict
 import pytest
-from support.conformance_run import Run
+from support.checks_run import ChecksRun, run, start
 
 
 @pytest.fixture(scope='module')
-def run() -> Run:
-    return Run(IlluminatorProperties(vendor='\x07bell', serial_number='x&<y>'),
-               faults=('nan', 'any-target')).finish()
+def done() -> ChecksRun:
+    return run('illuminator', 'nan', 'any-target', vendor='\x07bell', serial_number='x&<y>')
 
 
 @pytest.fixture(scope='module')
-def report(run: Run) -> RunReport:
+def report(done: ChecksRun) -> RunReport:
     return RunReport('illuminator', 'light', 'udpin://127.0.0.1:1', 'light 1/243: x&<y>',
-                     tuple(run.runner.results), run.runner.restored, 12.5, run.runner.passed)
+                     tuple(done.runner.results), done.runner.restored, 12.5, done.runner.passed)
 
 
 def test_the_json_report_has_every_requirement_with_its_messages(report: RunReport) -> None:
@@ -91,44 +89,36 @@ def test_the_junit_report_contains_no_character_that_xml_excludes(report: RunRep
     assert suite.findall('properties/property')[0].get('value') == 'a?b?c?d?e'
 
 
-def test_the_table_has_reason_section_and_messages_of_a_failed_requirement(run: Run) -> None:
-    assert lines(run.result('off')) == ['PASS    off                    can be switched off']
-    first, reason, section, *messages = lines(run.result('other-target'))
+def test_the_table_has_reason_section_and_messages_of_a_failed_requirement(
+        done: ChecksRun) -> None:
+    assert lines(done.result('off')) == ['PASS    off                    can be switched off']
+    first, reason, section, *messages = lines(done.result('other-target'))
     assert first.startswith('FAIL    other-target')
     assert 'switched on by a command for 1/200' in reason
     assert section.strip() == ('see routing, "Routing Detail": '
                                'https://mavlink.io/en/guide/routing.html')
     assert '> COMMAND_LONG to 1/200: MAV_CMD_ILLUMINATOR_ON_OFF 1' in messages[0]
     assert not any(' HEARTBEAT ' in line for line in messages)
-    assert 'set no flag; try a longer --heat' in lines(run.result('thermal-flags'))[1]
+    assert 'set no flag; try a longer --heat' in lines(done.result('thermal-flags'))[1]
 
 
 def test_the_table_has_the_last_messages_of_a_long_exchange() -> None:
-    text = lines(Run(faults=('toggle',), only=('repeated',)).finish().result('repeated'))
+    text = lines(run('illuminator', 'toggle', only=('repeated',)).result('repeated'))
 
     assert text[3].endswith('earlier lines with --json')
     assert any(line.endswith('ON_OFF 1, confirmation 1') for line in text[4:])
 
 
 def test_requirements_that_were_not_reached_share_one_line() -> None:
-    absent = Run(target=Address(9, 9)).finish()
+    absent = run('illuminator', target=Address(9, 9))
     assert unreached(absent.runner.results) == ['SKIPPED 47 not reached: no light was found']
 
-    interrupted = Run(consent=False)
+    interrupted = start('illuminator', consent=False)
     interrupted.link.run_until(lambda: len(interrupted.runner.results) == 10, within=100.0)
     interrupted.interrupt()
+    # Requirements that lack consent keep their lines.
     assert unreached(interrupted.finish().runner.results) == [
         'SKIPPED 38 not reached: interrupted']
-
-    lost = Run()
-    lost.link.run(8.0)
-    lost.fault('silence')
-    (line,) = unreached(lost.finish().runner.results)
-    assert line.endswith('the light has stopped sending')
-
-
-def test_requirements_that_were_skipped_for_their_own_reason_are_not_among_them() -> None:
-    assert unreached(Run(consent=False).finish().runner.results) == []
 
 
 def test_the_catalogue_has_a_line_for_each_requirement_with_its_section() -> None:

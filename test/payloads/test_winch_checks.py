@@ -21,14 +21,12 @@ from illuminator_ros.cli import conformance
 from illuminator_ros.illuminator.simulated import SimulatedIlluminator
 from illuminator_ros.illuminator.simulated_properties import IlluminatorProperties
 from illuminator_ros.mavlink.messages import Address
-from illuminator_ros.payload.checks.requirement import Verdict
-from illuminator_ros.payload.checks.runner import CheckRunner
-from illuminator_ros.payload.checks.session import Conditions
 from illuminator_ros.payload.simulated import SimulatedComponents
 from payloads.winch import SIMULATED, SimulatedWinch, WINCH
 from payloads.winch_checks import REQUIREMENTS
 import pytest
-from support.virtual_link import START, VirtualLink
+from support.checks_run import ChecksRun
+from support.virtual_link import START
 
 DECK = Address(1, 169)
 
@@ -42,20 +40,12 @@ def test_a_winch_is_checked_and_restored_by_its_own_requirements_and_those_of_ev
     component = devices.components[1]
     if fault:
         component.behave(winch.faults.add(component.behaviour, fault), START)
-    session = checks.session(Conditions(Address(255, 190)))
-    suite = CheckRunner(checks, session, checks.requirements)
+    done = ChecksRun(checks, devices).finish()
 
-    async def run() -> None:
-        await session.find(10.0, 2.0)
-        await suite.run()
-
-    session.runner.run(run())
-    VirtualLink(session, devices).run_until(lambda: not session.runner.running, within=100.0)
-
-    assert session.components.found == DECK
-    assert {one.requirement.name for one in suite.results if one.verdict is Verdict.FAIL} == failed
-    assert len(suite.results) == len(REQUIREMENTS)
-    assert suite.restored == 'the winch is as it was'
+    assert done.session.components.found == DECK
+    assert done.failed == failed
+    assert len(done.runner.results) == len(REQUIREMENTS)
+    assert done.runner.restored == 'the winch is as it was'
     assert winch.line_length == 0.0
 
 

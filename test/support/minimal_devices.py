@@ -36,9 +36,10 @@ from illuminator_ros.rededge import messages as rededge
 
 NAN = math.nan
 # GIMBAL_DEVICE_FLAGS
-ROLL_LOCK, PITCH_LOCK, YAW_LOCK, IN_VEHICLE_FRAME, IN_EARTH_FRAME = 4, 8, 16, 32, 64
-# s
+ROLL_LOCK, PITCH_LOCK, IN_VEHICLE_FRAME = 4, 8, 32
+# s; UTC at 0 on the link's clock, since 1970.
 STEP = 0.05
+UTC = 1.7e9
 # rad/s
 SPEED = 0.7
 
@@ -121,9 +122,9 @@ class MinimalDevice(Endpoint):
         else:
             self.execute(source, command)
 
-    def acknowledge(self, command: mav.CommandLong, result: int, progress: int = 0) -> None:
-        """Send COMMAND_ACK without its optional target."""
-        self.send(mav.CommandAck(command.command, result, progress, 0, 0, 0))
+    def acknowledge(self, command: mav.CommandLong, result: int) -> None:
+        """Send COMMAND_ACK without its optional fields."""
+        self.send(mav.CommandAck(command.command, result))
 
     # What a device of one kind adds
 
@@ -148,20 +149,15 @@ class MinimalLight(MinimalDevice):
 
     :param step: of its brightness, %.
     :param fade: s from a change of brightness to its end.
-    :param progress: s of MAV_RESULT_IN_PROGRESS before each change.
-    :param busy: how many commands are rejected temporarily at first.
     :param strobes: whether it has a strobe, which then shows no period while it does not strobe.
     """
 
     requestable = (IlluminatorStatus, mav.ComponentInformationBasic)
 
-    def __init__(
-        self, *, step: float = 1.0, fade: float = 0.0, progress: float = 0.0, busy: int = 0,
-        strobes: bool = False,
-    ) -> None:
+    def __init__(self, *, step: float = 1.0, fade: float = 0.0, strobes: bool = False) -> None:
         super().__init__(Address(1, 243), mavlink.MAV_TYPE_ILLUMINATOR,
                          mavlink.MAV_AUTOPILOT_INVALID)
-        self.step, self.fade, self.progress, self.busy = step, fade, progress, busy
+        self.step, self.fade = step, fade
         self.limits = (0.1, 5.0) if strobes else (0.0, 0.0)
         self.on = 0
         self.brightness = 40.0
@@ -175,30 +171,20 @@ class MinimalLight(MinimalDevice):
 
     def execute(self, source: Address, command: mav.CommandLong) -> None:
         p1, p2, p3, p4 = command.param1, command.param2, command.param3, command.param4
-        change: Callable[[], object]
+        low, high = self.limits
         if command.command == mavlink.MAV_CMD_ILLUMINATOR_ON_OFF:
-            valid, change = p1 in (0, 1), lambda: setattr(self, 'on', int(p1))
+            valid = p1 in (0, 1)
+            self.on = int(p1) if valid else self.on
         elif command.command == mavlink.MAV_CMD_DO_ILLUMINATOR_CONFIGURE:
-            low, high = self.limits
             valid = (p1 == 1 and 0 <= p2 <= 100 and 0 <= p4 <= 100
                      and (p3 == 0 or low <= p3 <= high and high > 0))
-            change = lambda: self.configure(p2, p3, p4)  # noqa: E731
+            if valid:
+                self.configure(p2, p3, p4)
         else:
             super().execute(source, command)
             return
-        if self.busy and valid:
-            self.busy -= 1
-            self.acknowledge(command, mavlink.MAV_RESULT_TEMPORARILY_REJECTED)
-        elif self.progress and valid:
-            self.acknowledge(command, mavlink.MAV_RESULT_IN_PROGRESS, 255)
-            self.after(self.progress,
-                       lambda: self.acknowledge(command, mavlink.MAV_RESULT_ACCEPTED))
-            self.after(self.progress, change)
-        else:
-            self.acknowledge(command, mavlink.MAV_RESULT_ACCEPTED if valid
-                             else mavlink.MAV_RESULT_DENIED)
-            if valid:
-                change()
+        self.acknowledge(command, mavlink.MAV_RESULT_ACCEPTED if valid
+                         else mavlink.MAV_RESULT_DENIED)
 
     def configure(self, brightness: float, period: float, duty: float) -> None:
         """Apply a configuration."""
@@ -260,10 +246,32 @@ class MinimalAxes:
             (2, 4), self._targets, self.ranges, strict=True) if target < low or target > high)
 
 
-class MovingDevice(MinimalDevice):
-    """A component with axes."""
+PITCH = math.radians(-90), math.radians(30)
+YAW = math.radians(-160), math.radians(160)
 
-    axes: MinimalAxes
+
+class MinimalGimbal(MinimalDevice):
+    """
+    A gimbal device with pitch and yaw that obeys its manager.
+
+    It reports no rates, no heading and no names, and has neither neutral nor retracted position,
+    yaw lock, nor yaw relative to north.
+
+    :cvar ranges: of pitch and yaw, rad.
+    :cvar capabilities: HAS_PITCH_AXIS, HAS_PITCH_LOCK, HAS_YAW_AXIS, HAS_YAW_FOLLOW.
+    """
+
+    intervals = {AttitudeStatus: 0.1}
+    requestable = (gimbal.GimbalDeviceInformation,)
+    messages = (*MinimalDevice.messages, gimbal.GimbalManagerStatus,
+                gimbal.GimbalDeviceSetAttitude, gimbal.GimbalManagerSetPitchyaw)
+    ranges: ClassVar[tuple[tuple[float, float], tuple[float, float]]] = (PITCH, YAW)
+    capabilities: ClassVar[int] = 32 | 128 | 256 | 512
+
+    def __init__(self) -> None:
+        super().__init__(Address(1, 154), mavlink.MAV_TYPE_GIMBAL, mavlink.MAV_AUTOPILOT_INVALID)
+        self.axes = MinimalAxes(self.ranges)
+        self.manager: Address | None = None
 
     def start(self) -> None:
         super().start()
@@ -273,41 +281,11 @@ class MovingDevice(MinimalDevice):
         self.axes.advance(STEP)
         self.after(STEP, self._move)
 
-
-PITCH = math.radians(-90), math.radians(30)
-YAW = math.radians(-160), math.radians(160)
-
-
-class MinimalGimbal(MovingDevice):
-    """
-    A gimbal device with pitch and yaw that obeys its manager.
-
-    It reports no rates, no heading and no names, and has neither neutral nor retracted position,
-    yaw lock, nor yaw relative to north.
-
-    :cvar ranges: of pitch and yaw, rad.
-    :cvar capabilities: HAS_PITCH_AXIS, HAS_PITCH_LOCK, HAS_YAW_AXIS, HAS_YAW_FOLLOW.
-    :cvar frame: the flag of its yaw frame.
-    """
-
-    intervals = {AttitudeStatus: 0.1}
-    requestable = (gimbal.GimbalDeviceInformation,)
-    messages = (*MovingDevice.messages, gimbal.GimbalManagerStatus,
-                gimbal.GimbalDeviceSetAttitude, gimbal.GimbalManagerSetPitchyaw)
-    ranges: ClassVar[tuple[tuple[float, float], tuple[float, float]]] = (PITCH, YAW)
-    capabilities: ClassVar[int] = 32 | 128 | 256 | 512
-    frame: ClassVar[int] = IN_VEHICLE_FRAME
-    mav_type: ClassVar[int] = mavlink.MAV_TYPE_GIMBAL
-
-    def __init__(self) -> None:
-        super().__init__(Address(1, 154), self.mav_type, mavlink.MAV_AUTOPILOT_INVALID)
-        self.axes = MinimalAxes(self.ranges)
-        self.flags = ROLL_LOCK | PITCH_LOCK
-        self.manager: Address | None = None
-
     def message(self, message_id: int) -> mav.Message:
         if message_id == AttitudeStatus.id:
-            return self.status()
+            return AttitudeStatus(
+                0, 0, self.uptime_ms, ROLL_LOCK | PITCH_LOCK | IN_VEHICLE_FRAME, self.reported(),
+                NAN, NAN, NAN, self.axes.at_limits(), NAN, NAN)
         return gimbal.GimbalDeviceInformation(
             self.uptime_ms, b'', b'', b'', 0, 0, 0, self.capabilities, 0, NAN, NAN,
             *self.reported_limits())
@@ -315,12 +293,6 @@ class MinimalGimbal(MovingDevice):
     def reported_limits(self) -> tuple[float, float, float, float]:
         """Return pitch_min to yaw_max."""
         return (*self.ranges[0], *self.ranges[1])
-
-    def status(self) -> AttitudeStatus:
-        """Return its attitude."""
-        return AttitudeStatus(
-            0, 0, self.uptime_ms, self.flags | self.frame, self.reported(), NAN, NAN, NAN,
-            self.axes.at_limits(), NAN, NAN)
 
     def reported(self) -> tuple[float, float, float, float]:
         """Return the quaternion of its status."""
@@ -335,92 +307,13 @@ class MinimalGimbal(MovingDevice):
         if isinstance(message, gimbal.GimbalManagerStatus):
             if (source.system, message.gimbal_device_id) == self.address and not self.manager:
                 self.manager = source
-        elif isinstance(message, gimbal.GimbalDeviceSetAttitude) and self.obeys(source):
+        elif isinstance(message, gimbal.GimbalDeviceSetAttitude) and source == self.manager:
             self.obey(message)
-
-    def obeys(self, source: Address) -> bool:
-        """Return whether it obeys a component."""
-        return source == self.manager
 
     def obey(self, message: gimbal.GimbalDeviceSetAttitude) -> None:
         """Obey a setpoint."""
         self.axes.turn(self.commanded(message.q),
                        (message.angular_velocity_y, message.angular_velocity_z))
-
-
-class MinimalManager(MovingDevice):
-    """
-    An autopilot that manages a gimbal on its outputs, without region of interest.
-
-    It gives control to each component that asks for it, and takes angles of its gimbal's frame.
-    """
-
-    intervals = {AttitudeStatus: 0.1, gimbal.GimbalManagerStatus: 0.2}
-    requestable = (gimbal.GimbalManagerInformation,)
-    messages = (*MovingDevice.messages, gimbal.GimbalManagerSetAttitude,
-                gimbal.GimbalManagerSetPitchyaw, gimbal.GimbalManagerSetManualControl)
-    device_id: ClassVar[int] = 1
-
-    def __init__(self) -> None:
-        super().__init__(Address(1, 1), mavlink.MAV_TYPE_QUADROTOR, mavlink.MAV_AUTOPILOT_PX4)
-        self.axes = MinimalAxes((PITCH, YAW))
-        # Primary system and component id, and those of secondary control.
-        self.control = [0, 0, 0, 0]
-        self.flags = ROLL_LOCK | PITCH_LOCK
-
-    def message(self, message_id: int) -> mav.Message:
-        if message_id == AttitudeStatus.id:
-            return AttitudeStatus(
-                0, 0, self.uptime_ms, self.flags | IN_VEHICLE_FRAME,
-                quaternion(*self.axes.now), NAN, NAN, NAN, self.axes.at_limits(), NAN, NAN,
-                self.device_id)
-        if message_id == gimbal.GimbalManagerStatus.id:
-            return gimbal.GimbalManagerStatus(
-                self.uptime_ms, self.flags, self.device_id, *self.control)
-        return gimbal.GimbalManagerInformation(
-            self.uptime_ms, 32 | 128 | 256 | 512, self.device_id, NAN, NAN, *PITCH, *YAW)
-
-    def controls(self, source: Address) -> bool:
-        """Return whether a component has control."""
-        return list(source) in (self.control[:2], self.control[2:])
-
-    def take(self, source: Address, message: Any) -> None:
-        if message.gimbal_device_id not in (0, self.device_id) or not self.controls(source):
-            return
-        if isinstance(message, gimbal.GimbalManagerSetAttitude):
-            is_set = not any(map(math.isnan, message.q))
-            self.axes.turn(angles(message.q) if is_set else (NAN, NAN),
-                           (message.angular_velocity_y, message.angular_velocity_z))
-        elif isinstance(message, gimbal.GimbalManagerSetPitchyaw):
-            self.axes.turn((message.pitch, message.yaw), (message.pitch_rate, message.yaw_rate))
-        elif isinstance(message, gimbal.GimbalManagerSetManualControl):
-            self.axes.turn((NAN, NAN), (message.pitch_rate * SPEED, message.yaw_rate * SPEED))
-
-    def execute(self, source: Address, command: mav.CommandLong) -> None:
-        values = [command.param1, command.param2, command.param3, command.param4]
-        if command.command not in (1000, 1001):
-            super().execute(source, command)
-        elif command.param7 not in (0, self.device_id):
-            self.acknowledge(command, mavlink.MAV_RESULT_DENIED)
-        elif command.command == 1000:
-            if self.controls(source):
-                pitch, yaw, *rates = map(math.radians, values)
-                self.axes.turn((pitch, yaw), (rates[0], rates[1]))
-            self.acknowledge(
-                command, mavlink.MAV_RESULT_ACCEPTED if self.controls(source)
-                else mavlink.MAV_RESULT_DENIED)
-        elif any(value < -3 or value > 255 for value in values):
-            self.acknowledge(command, mavlink.MAV_RESULT_DENIED)
-        else:
-            for at in (0, 2):
-                if values[at] == -3:
-                    given = [0, 0] if self.control[at:at + 2] == list(source) else [-1, -1]
-                else:
-                    given = list(source) if values[at] == -2 else [
-                        int(value) for value in values[at:at + 2]]
-                if given != [-1, -1]:
-                    self.control[at:at + 2] = given
-            self.acknowledge(command, mavlink.MAV_RESULT_ACCEPTED)
 
 
 class MinimalCamera(MinimalDevice):
@@ -451,17 +344,14 @@ class MinimalCapturingCamera(MinimalCamera):
     A camera of the serial API 1.5.5: it takes images, too, and uses injected state for 5 s.
 
     The API says nothing about its system id, and about messages for other components.
-
-    :param utc: UTC at 0 on the link's clock, s since 1970.
     """
 
     messages = (*MinimalCamera.messages, rededge.GpsRawInt, SystemTime, GlobalPositionInt,
                 Attitude, rededge.MountStatus)
 
-    def __init__(self, utc: float) -> None:
+    def __init__(self) -> None:
         super().__init__()
         self.heartbeat = mav.Heartbeat(0, 1, 2, 3, 4, 3)
-        self.utc = utc
         self.images = 0
         # The latest message of each class, and when it was received, s.
         self.injected: dict[type[mav.Message], tuple[float, Any]] = {}
@@ -478,7 +368,7 @@ class MinimalCapturingCamera(MinimalCamera):
         if message.shot not in (1, 2):
             return
         self.images += 1
-        time_usec = int((self.utc + self.now) * 1e6)
+        time_usec = int((UTC + self.now) * 1e6)
         place = self._fresh(rededge.GpsRawInt) or self._fresh(GlobalPositionInt)
         attitude, mount = self._fresh(Attitude), self._fresh(rededge.MountStatus)
         # The roll of the mount is about the line of sight, so it turns the image.
