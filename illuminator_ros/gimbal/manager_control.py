@@ -90,10 +90,6 @@ class ControlArbiter:
         """Return the player that has a role, None if none has."""
         return self._arbiters[role].holder
 
-    def since(self, role: Role) -> float:
-        """Return when a role got its player, s."""
-        return self._arbiters[role].since
-
     def configure(
         self, source: Address, params: Sequence[float], now: float,
     ) -> list[RoleHolderChanged]:

@@ -20,7 +20,7 @@ from collections.abc import Callable
 import math
 
 from illuminator_ros.gimbal.gimbal import GimbalSettings
-from illuminator_ros.gimbal.messages import DEVICE_ID_PARAM, GimbalManagerSetAttitude
+from illuminator_ros.gimbal.messages import DEVICE_ID_PARAM, GimbalManagerSetAttitude, rates_of
 from illuminator_ros.gimbal.setpoint_stream import REPEATS
 from illuminator_ros.mavlink.dialect import mavlink, replaced
 from illuminator_ros.mavlink.messages import Address, CommandAck, CommandInt, CommandLong
@@ -63,8 +63,7 @@ def test_gm_2_gm_4_attitude_is_sent_in_the_frame_and_the_signs_of_mavlink() -> N
             | mavlink.GIMBAL_DEVICE_FLAGS_YAW_LOCK)
     assert (relative.target_system, relative.target_component, relative.gimbal_device_id) == (
         1, 1, 154)
-    assert all(map(math.isnan, (relative.angular_velocity_x, relative.angular_velocity_y,
-                                relative.angular_velocity_z)))
+    assert all(map(math.isnan, rates_of(relative)))
 
 
 def test_attitude_is_sent_again_a_few_times_unless_another_replaces_it() -> None:
@@ -91,8 +90,7 @@ def test_rate_is_a_message_in_rad_per_s_and_ends_with_one_zero() -> None:
 
     sent = setpoints(rig)
     assert [at - start for at, _ in sent] == approx([0.0, 0.3, 0.6, 1.1], abs=0.03)
-    assert [(one.angular_velocity_x, one.angular_velocity_y, one.angular_velocity_z)
-            for _, one in sent] == [(0.0, -0.2, 0.1)] * 3 + [(0.0, 0.0, 0.0)]
+    assert [rates_of(one) for _, one in sent] == [(0.0, -0.2, 0.1)] * 3 + [(0.0, 0.0, 0.0)]
     assert all(map(math.isnan, setpoints(rig)[0][1].q))
 
 
@@ -143,7 +141,11 @@ def request_lock(rig: Rig, lock: bool) -> None:
     rig.gimbal.set_yaw_lock(lock, rig.now, rig.done)
 
 
-def send_attitude(rig: Rig, lock: bool) -> None:
+def turn(rig: Rig) -> None:
+    assert rig.gimbal.set_rates((0.0, 0.0, 0.2), rig.now) == ''
+
+
+def send_attitude(rig: Rig, lock: bool = False) -> None:
     rig.gimbal.set_attitude(Quaternion(), EARTH if lock else VEHICLE, rig.now)
 
 
@@ -189,42 +191,13 @@ def test_gm_2_rate_leaves_the_yaw_lock_of_the_newer_of_a_request_and_an_attitude
 
 def test_an_attitude_is_not_sent_again_after_a_request() -> None:
     rig = in_control()
-    send_attitude(rig, False)
+    send_attitude(rig)
     rig.run(0.1)
 
     request_lock(rig, True)
     rig.run(3.0)
 
     assert len(setpoints(rig)) == 1
-
-
-def test_gm_17_setpoints_stop_when_control_is_lost() -> None:
-    rig = in_control()
-    rig.gimbal.set_rates((0.0, 0.2, 0.0), rig.now)
-    rig.run(0.02)
-
-    rig.managers[0].primary = OTHER
-    rig.run(0.3)
-    rig.run(3.0)
-
-    assert len(setpoints(rig)) == 1
-    assert rig.gimbal.set_rates((0.0, 0.2, 0.0), rig.now) == (
-        'no control of gimbal 1/154: primary 1/195, secondary none')
-    assert len(setpoints(rig.run(3.0))) == 1
-
-
-def test_zero_that_a_closed_link_has_held_back_is_sent_when_control_is_shown_again() -> None:
-    rig = in_control()
-    rig.gimbal.set_rates((0.0, 0.2, 0.0), rig.now)
-    rig.run(0.1)
-    rig.component.link_closed(rig.now, 'cable pulled')
-    rig.now += 10.0
-    before = len(setpoints(rig))
-
-    rig.component.link_opened(rig.now)
-    rig.run(2.0)
-
-    assert [one.angular_velocity_y for _, one in setpoints(rig)[before:]] == [0.0]
 
 
 def test_a_late_attitude_is_ignored_unless_the_device_has_restarted() -> None:
@@ -246,7 +219,7 @@ def test_a_late_attitude_is_ignored_unless_the_device_has_restarted() -> None:
 
 def test_zero_is_sent_again_if_a_late_rate_turns_the_device_after_it_has_stopped() -> None:
     rig = in_control()
-    rig.gimbal.set_rates((0.0, 0.0, 0.2), rig.now)
+    turn(rig)
     rig.managers[0].rates = (0.0, 0.0, 0.0)
     rig.run(1.1)
     rig.managers[0].rates = (0.0, 0.0, -0.2)
@@ -255,15 +228,16 @@ def test_zero_is_sent_again_if_a_late_rate_turns_the_device_after_it_has_stopped
     assert [one.angular_velocity_z for _, one in setpoints(rig)][1:3] == [0.0, 0.0]
 
 
-@pytest.mark.parametrize(('rate', 'sent'), [(0.2, [0.0]), (None, [])])
-def test_only_a_zero_of_a_rate_is_sent_if_the_link_is_lost_before_an_attitude_is_repeated(
-        rate: float | None, sent: list[float]) -> None:
+@pytest.mark.parametrize(('starts', 'sent'), [
+    ((turn,), [0.0]), ((turn, send_attitude), [0.0]), ((send_attitude,), [])])
+def test_only_a_zero_of_a_rate_is_sent_when_a_closed_link_is_open_and_shows_control_again(
+        starts: tuple[Callable[[Rig], object], ...], sent: list[float]) -> None:
     rig = in_control()
-    if rate:
-        rig.gimbal.set_rates((0.0, 0.0, rate), rig.now)
-    rig.gimbal.set_attitude(Quaternion(), VEHICLE, rig.now)
+    for start in starts:
+        start(rig)
     rig.run(0.1)
     rig.component.link_closed(rig.now, 'cable pulled')
+    rig.now += 10.0
     before = len(setpoints(rig))
     rig.component.link_opened(rig.now)
     rig.run(2.0)
@@ -272,9 +246,7 @@ def test_only_a_zero_of_a_rate_is_sent_if_the_link_is_lost_before_an_attitude_is
 
 
 @pytest.mark.parametrize(('start', 'turns', 'zeros'), [
-    (lambda rig: rig.gimbal.set_rates((0.0, 0.0, 0.2), rig.now), True, len(REPEATS)),
-    (lambda rig: rig.gimbal.set_rates((0.0, 0.0, 0.2), rig.now), False, 0),
-    (lambda rig: send_attitude(rig, False), True, 0)])
+    (turn, True, len(REPEATS)), (turn, False, 0), (send_attitude, True, 0)])
 def test_a_rate_that_another_player_has_ended_gets_its_zero_if_it_lasts_until_control_is_back(
         start: Callable[[Rig], object], turns: bool, zeros: int) -> None:
     rig = in_control()
@@ -307,7 +279,7 @@ def test_zero_is_sent_again_only_while_the_device_reports_that_it_turns(
         rate: float, zeros: int) -> None:
     rig = in_control()
     rig.managers[0].rates = (NAN, 0.0, rate)
-    rig.gimbal.set_rates((0.0, 0.0, 0.2), rig.now)
+    turn(rig)
     rig.run(10.0)
 
     assert [one.angular_velocity_z for _, one in setpoints(rig)] == [approx(-0.2)] + [0.0] * zeros
@@ -321,7 +293,7 @@ def test_zero_that_is_lost_is_sent_again_to_a_device_that_reports_no_rates(
     manager = rig.managers[0]
     if not names_frame:
         manager.flags = 0
-    rig.gimbal.set_rates((0.0, 0.0, 0.2), rig.now)
+    turn(rig)
     yaw = 0.0
     for _ in range(500):
         zeros = [one for _, one in setpoints(rig) if one.angular_velocity_z == 0.0]
@@ -340,7 +312,7 @@ def test_zero_that_is_lost_is_sent_again_when_the_device_is_heard_again() -> Non
     rig = in_control()
     manager = rig.managers[0]
     manager.rates = (0.0, 0.0, 0.2)
-    rig.gimbal.set_rates((0.0, 0.0, 0.2), rig.now)
+    turn(rig)
     rig.run(0.4)
     manager.alive = manager.device_alive = False
     rig.run(4.0)
@@ -352,8 +324,7 @@ def test_zero_that_is_lost_is_sent_again_when_the_device_is_heard_again() -> Non
 
 
 @pytest.mark.parametrize('start', [
-    lambda rig: rig.gimbal.set_rates((0.0, 0.0, 0.2), rig.now),
-    lambda rig: rig.gimbal.set_roi(PLACE, rig.now, lambda *_: None)],
+    turn, lambda rig: rig.gimbal.set_roi(PLACE, rig.now, lambda *_: None)],
     ids=['rate', 'place'])
 def test_zero_of_a_release_while_the_manager_is_lost_is_sent_when_it_is_heard_again(
         start: Callable[[Rig], object]) -> None:
@@ -371,16 +342,6 @@ def test_zero_of_a_release_while_the_manager_is_lost_is_sent_when_it_is_heard_ag
 
     assert rig.gimbal.in_control
     assert manager.received[-1].angular_velocity_z == 0.0
-
-
-def test_release_stops_a_rate_first() -> None:
-    rig = in_control()
-    rig.gimbal.set_rates((0.0, 0.2, 0.0), rig.now)
-    rig.gimbal.release_control(rig.now, rig.done)
-    rig.run(3.0)
-
-    assert [one.angular_velocity_y for _, one in setpoints(rig)] == [approx(-0.2), 0.0]
-    assert rig.results[0].success
 
 
 @pytest.mark.parametrize(('result', 'most'), [
@@ -402,6 +363,7 @@ def test_control_is_released_once_the_manager_has_acknowledged_the_zero_or_after
     assert [one.command for _, one in sent] == [
         mavlink.MAV_CMD_DO_GIMBAL_MANAGER_PITCHYAW, mavlink.MAV_CMD_DO_GIMBAL_MANAGER_CONFIGURE]
     stop = sent[0][1]
+    assert [rates_of(one) for at, one in setpoints(rig) if at >= asked_at] == [(0.0, 0.0, 0.0)]
     assert (stop.param3, stop.param4, stop.param7) == (0.0, 0.0, 154)
     assert math.isnan(stop.param1) and math.isnan(stop.param2)
     assert sent[1][0] - asked_at <= most
@@ -423,8 +385,6 @@ def test_at_the_end_of_the_process_only_a_zero_its_command_and_the_release_are_s
 
     rig.component.close(rig.now)
     rig.gimbal.release_control(rig.now, rig.done)
-    for move in MOVES:
-        move(rig)
     rig.run(1.0)
 
     sent = [one for _, one in rig.sent[begun:]]

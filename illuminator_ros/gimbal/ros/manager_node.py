@@ -276,7 +276,7 @@ def _reports(
 
 def _values(manager: GimbalManager, now: float) -> dict[str, Value]:
     control, settings = manager.control, manager.settings.control
-    since = control.since(Role.PRIMARY)
+    since = control.primary.since
     return {
         'state': manager.tracker.state.value,
         'gimbal_device_id': manager.tracker.device_id,
