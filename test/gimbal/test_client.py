@@ -48,6 +48,9 @@ def test_gm_27_gimbal_is_found_by_the_information_of_its_manager() -> None:
     assert snapshot.identity is not None
     assert (snapshot.identity.vendor, snapshot.identity.firmware_version,
             snapshot.identity.uid) == ('Maker', '1.2.3', 77)
+    # The ranges of the device take precedence over those of its manager.
+    assert snapshot.ranges is not None
+    assert snapshot.ranges[1] == (-1.5, 0.5)
 
 
 @pytest.mark.parametrize(('managers', 'found'), [
