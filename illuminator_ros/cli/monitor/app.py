@@ -70,6 +70,12 @@ class Question(NamedTuple):
     typed: str | None
     deadline: float
 
+    def edited(self, key: str) -> str | None:
+        """Return the typed text after a key."""
+        if self.typed is None or key == 'backspace':
+            return self.typed and self.typed[:-1]
+        return self.typed + (' ' if key == 'space' else key * (len(key) == 1))
+
 
 class MonitorApp(App[None], inherit_bindings=False):
     """The monitor on a terminal or in a browser."""
@@ -87,8 +93,7 @@ class MonitorApp(App[None], inherit_bindings=False):
         self._graph = graph
         self._ascii_only = ascii_only
         self._selected: GraphDevice | None = None
-        self._mode = NORMAL
-        self._question: Question | None = None
+        self._mode: str | Question = NORMAL
         self._lines: list[GraphDevice | Cell] = []
         # Held here, since a poll may come before they are on the screen.
         self._parts = {name: Static(id=name) for name in ('devices', 'details', 'bar')}
@@ -107,8 +112,8 @@ class MonitorApp(App[None], inherit_bindings=False):
     def poll(self) -> None:
         """Take new values, and draw them."""
         self._graph.poll()
-        if self._question is not None and self._graph.clock() > self._question.deadline:
-            self._question = None
+        if isinstance(self._mode, Question) and self._graph.clock() > self._mode.deadline:
+            self._mode = NORMAL
         self.draw()
 
     def on_key(self, event: events.Key) -> None:
@@ -118,7 +123,8 @@ class MonitorApp(App[None], inherit_bindings=False):
 
     def on_paste(self, event: events.Paste) -> None:
         """Take text while the operator types."""
-        self._type(event.text)
+        if isinstance(self._mode, Question) and self._mode.typed is not None:
+            self._ask(self._mode.text, self._mode.answer, self._mode.typed + event.text)
         self.draw()
 
     def on_click(self, event: events.Click) -> None:
@@ -128,30 +134,20 @@ class MonitorApp(App[None], inherit_bindings=False):
                 self._select(line)
         self.draw()
 
-    def on_mouse_scroll_down(self) -> None:
-        """Select the next device."""
-        self.action_press('j')
-
-    def on_mouse_scroll_up(self) -> None:
-        """Select the device before."""
-        self.action_press('k')
-
     def action_press(self, key: str) -> None:
         """Act on a key, or on a click on its label."""
-        device, mode, action = self._selected, self._mode, ACTIONS.get(key)
-        question, self._question, self._mode = self._question, None, NORMAL
+        device, action = self._selected, ACTIONS.get(key)
+        mode, self._mode = self._mode, NORMAL
         if action == 'quit':
             self.exit()
         elif action == 'all off':
             # The help names this key, and it acts there and while the operator types, too.
             self._graph.all_off()
-        elif question is not None and device is not None:
-            asked, answer, typed, _ = question
+        elif isinstance(mode, Question) and device is not None:
             if key == 'enter':
-                self._request(device, asked, answer(typed or ''), is_confirmed=True)
+                self._request(device, mode.text, mode.answer(mode.typed or ''), is_confirmed=True)
             elif key != 'escape':
-                self._ask(asked, answer, typed)
-                self._type(' ' if key == 'space' else key)
+                self._ask(mode.text, mode.answer, mode.edited(key))
         elif action == 'help' and mode != HELP:
             self._mode = HELP
         elif action == 'stop':
@@ -192,19 +188,13 @@ class MonitorApp(App[None], inherit_bindings=False):
     def _ask(
         self, text: str, answer: Callable[[str], Request | str], typed: str | None = None,
     ) -> None:
-        self._question = Question(text, answer, typed, self._graph.clock() + QUESTION_LIFETIME)
-
-    def _type(self, key: str) -> None:
-        if self._question is not None and self._question.typed is not None:
-            typed = self._question.typed
-            typed = typed[:-1] if key == 'backspace' else typed + key
-            self._question = self._question._replace(typed=typed[:MAX_TYPED])
+        self._mode = Question(text, answer, typed and typed[:MAX_TYPED],
+                              self._graph.clock() + QUESTION_LIFETIME)
 
     def _select(self, device: GraphDevice | None) -> None:
         if device is not self._selected:
-            # The question belongs to the other device.
-            self._selected, self._question = device, None
-            self._mode = HELP if self._mode == HELP else NORMAL
+            # A question belongs to the other device.
+            self._selected, self._mode = device, HELP if self._mode == HELP else NORMAL
 
     def draw(self) -> None:
         """Draw what has changed."""
@@ -255,20 +245,19 @@ class MonitorApp(App[None], inherit_bindings=False):
         return row.stylize(' '.join(styles))
 
     def _labels(self) -> Iterable[Content]:
-        view = None if self._selected is None else self._selected.view
-        if self._question is not None:
-            yield Content.styled(self._question.text, 'bold yellow')
-            if self._question.typed is not None:
-                yield Content.styled(f'{self._question.typed}_', 'reverse')
+        view, mode = None if self._selected is None else self._selected.view, self._mode
+        if isinstance(mode, Question):
+            yield Content.styled(mode.text, 'bold yellow')
+            yield Content.styled('' if mode.typed is None else f'{mode.typed}_', 'reverse')
             yield from (_label('enter', 'yes'), _label('escape', 'no'))
-        elif self._mode == HELP:
+        elif mode == HELP:
             yield _label('escape', 'or any other key goes back')
         else:
             if view is not None:
-                keys = view.steering if self._mode == STEERING else view.keys
+                keys = view.steering if mode == STEERING else view.keys
                 yield from (_label(one.keys[0], one.label) for one in keys if one.label)
                 if view.steering:
-                    yield _label('m', 'move') if self._mode == NORMAL else _label('escape', 'ends')
+                    yield _label('m', 'move') if mode == NORMAL else _label('escape', 'ends')
             yield from (_label(names[0], label) for names, _, label, _ in COMMON_KEYS if label)
 
     def _help(self) -> Content:
