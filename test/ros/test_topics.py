@@ -22,7 +22,7 @@ import pytest
 from rosgraph_msgs.msg import Clock
 from sensor_msgs.msg import Temperature
 from std_msgs.msg import Bool, Float32, Float64, String, UInt32
-from support.light import ON_OFF, ServedLight
+from support.light import ServedLight
 from support.recording import Recorder
 from support.ros import Parameters, Ros, running_bridge, STREAM
 from support.slow import CLOCK, pass_time_until
@@ -173,13 +173,9 @@ def test_all_names_follow_namespace_node_name_and_remapping(
 
     remapped = {rule.rpartition(':=')[2] for rule in arguments if rule[:2] in ('~/', '/d')}
     diagnostics = next(iter(name for name in remapped if 'diag' in name), '/diagnostics')
-    with running_bridge(own_ros.domain, port, *arguments), ServedLight(port) as light:
+    with running_bridge(own_ros.domain, port, *arguments), ServedLight(port):
         Parameters(own_ros, node).wait(mode='internal_control')
         assert own_ros.enable(node=node).success
-        own_ros.subscribe(Bool, f'{node}/enabled').wait_value(True)
-        assert Parameters(own_ros, node).set(brightness=20)[0].successful
-        own_ros.publish(Bool, f'{node}/cmd/enable', False)
-        light.wait_for(ON_OFF, 2)
         recorder = own_ros.subscribe(DiagnosticArray, diagnostics, STREAM)
         CLOCK.forward(1.0)
         array = recorder.wait(lambda array: len(array.status) == 2)
