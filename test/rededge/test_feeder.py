@@ -172,9 +172,10 @@ def test_an_old_or_early_message_is_refused_and_one_that_another_has_overtaken_r
         take(rig, age)
         reason = f'its stamp is {format_seconds(abs(age))} {relation} the ROS clock'
         assert rig.state(name) == (InputState.REFUSED, reason)
-        assert rig.feeder.snapshot(rig.now).inputs[name].refused == 1
         rig.run(limit)
-        assert rig.state(name)[0] is InputState.STALE
+        found = rig.feeder.snapshot(rig.now).inputs[name]
+        assert (found.state, found.refused, found.age) == (InputState.STALE, 1, None)
+        assert found.refused_age == pytest.approx(limit)
 
     rig = Rig()
     assert rig.state(name) == (InputState.MISSING, '')
@@ -182,8 +183,10 @@ def test_an_old_or_early_message_is_refused_and_one_that_another_has_overtaken_r
     for age in (0.0, 0.1):
         take(rig, age)
         assert rig.state(name) == (InputState.OK, 'its stamp is not newer than the last')
+    rig.run(0.2)
     rig.feeder.clock_jumped()
     rig.clock -= 3600.0
+    assert rig.feeder.snapshot(rig.now).inputs[name].age == pytest.approx(0.2)
     take(rig, 0.0)
     assert rig.feeder.snapshot(rig.now).inputs[name].refused == 2
 
