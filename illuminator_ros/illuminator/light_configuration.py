@@ -21,9 +21,8 @@ command before it that is not confirmed yet, and the confirmed ones for the rest
 
 from __future__ import annotations
 
-from collections.abc import Callable, Container
-from dataclasses import dataclass, field, replace
-from enum import IntEnum
+from collections.abc import Callable
+from dataclasses import replace
 import math
 
 from . import events
@@ -42,20 +41,17 @@ from .model import (
     StrobeRange,
     unexpected_differences,
 )
+from .required_values import (
+    CONFIGURE_LIMIT,
+    RequiredValues,
+    Requirement,
+    RESTORE_INTERVAL,
+)
 from .status_tracker import NewestStatus
 from ..payload.attempt import Done, Result, StatusReport, Target
 from ..payload.reconciler import Desired, Reconciler
 from ..payload.repeat_limit import RepeatLimit
 
-# s; rqt_reconfigure gives up after 1.0 s, and the answer must arrive before. The middleware waits
-# up to 0.1 s before it sends an answer to a client that it has not discovered yet.
-CONFIGURE_LIMIT = 0.78
-# s between tries of overrides and restored configurations that got no answer.
-RESTORE_INTERVAL = 2.0
-# s for each try after the first one: no ON waits for it, and the line may be slow.
-RETRY_LIMIT = 1.5
-# Attempts before giving up on a light that accepts a configuration but does not apply it.
-MAX_CONTRADICTIONS = 3
 # s to wait for the first status before a complete set of overrides is sent without one.
 FIRST_STATUS_TIMEOUT = 3.0
 # %; set together with a strobe period where the duty cycle is 0, at which a light does not strobe.
@@ -68,53 +64,6 @@ IMPLIED_TIME = 2.0
 # two tries of an OFF that no request has asked for.
 REPEATS = 3
 REPEAT_INTERVAL = 2.0
-
-
-class Requirement(IntEnum):
-    """The reason why values must be sent that no request has asked for; the highest counts."""
-
-    OTHER_SENDER = 0
-    OVERRIDE = 1
-    LIMIT = 2
-    RESTART = 3
-
-
-# Values with these reasons are dropped when the light has accepted and not applied them; a
-# RepeatLimit limits further attempts.
-_SENT_ONCE = (Requirement.LIMIT, Requirement.OTHER_SENDER)
-
-
-@dataclass
-class Required:
-    """
-    Values that must be sent, see :class:`Requirement`.
-
-    :param values: empty if there are none.
-    :param attempts: how often the light has accepted them but then reported others.
-    :param due: when they are sent next, s.
-    :param is_sent: whether a command with them was sent.
-    :param has_ended: whether a command with them has ended, or none can be sent.
-    :param failure: why the last attempt failed, '' if it did not.
-    """
-
-    values: Changes = field(default_factory=dict)
-    requirement: Requirement = Requirement.OTHER_SENDER
-    due: float = math.inf
-    attempts: int = 0
-    is_sent: bool = False
-    has_ended: bool = False
-    failure: str = ''
-
-    @property
-    def limit(self) -> float:
-        """Return s that the next attempt may take."""
-        return RETRY_LIMIT if self.has_ended else CONFIGURE_LIMIT
-
-    def merged(self, values: Changes, requirement: Requirement, due: float) -> Required:
-        """Return these values and others; only overrides replace values that wait."""
-        both = ({**self.values, **values} if requirement is Requirement.OVERRIDE
-                else {**values, **self.values})
-        return Required(both, max(requirement, self.requirement), due)
 
 
 def undoing_limit(reassert: bool) -> RepeatLimit | None:
@@ -194,7 +143,7 @@ class LightConfiguration:
         self._undoing = undoing_limit(reassert)
         self._reconciler: Reconciler[Status] = Reconciler(target, self._ended)
         self._setpoint: float | None = None
-        self._required = Required()
+        self._required = RequiredValues()
         # The result of the last command, None before the first.
         self._outcome: Result | None = None
 
@@ -223,9 +172,7 @@ class LightConfiguration:
     @property
     def must_send_before_on(self) -> bool:
         """Whether the light must be sent a configuration before it is switched on."""
-        required = self._required
-        return (bool(required.values) and not required.has_ended
-                and required.requirement is not Requirement.OTHER_SENDER)
+        return self._required.delays_on
 
     @property
     def sent_at(self) -> float:
@@ -239,7 +186,7 @@ class LightConfiguration:
         self.guard.limits = limits
         self.guard.renew()
         if self._required.requirement is Requirement.LIMIT:
-            self._required = Required()
+            self._required = RequiredValues()
         desired = self._reconciler.desired
         if desired is not None and isinstance(desired.change, Configure):
             goal = desired.change.configuration
@@ -259,7 +206,7 @@ class LightConfiguration:
         """Undo changes by other senders from now on, or follow them."""
         self._undoing = undoing_limit(reassert)
         if self._required.requirement is Requirement.OTHER_SENDER:
-            self._required = Required()
+            self._required = RequiredValues()
 
     # Requests
 
@@ -325,14 +272,7 @@ class LightConfiguration:
         if self._required.requirement is Requirement.LIMIT:
             # The light may be switched on beyond the limit.
             self.guard.renew()
-        self._required = Required()
-
-    def _drop_fields(self, names: Container[str]) -> None:
-        """Remove fields from the required values."""
-        self._required.values = {name: value for name, value in self._required.values.items()
-                                 if name not in names}
-        if not self._required.values:
-            self._required = Required()
+        self._required = RequiredValues()
 
     def _checked(self, changes: Changes) -> dict[str, float]:
         return {name: checked(name, value, self._newest.strobe_range)
@@ -393,9 +333,9 @@ class LightConfiguration:
         assert isinstance(change, Configure)
         self._outcome = result
         if result.success:
-            self._drop_fields([name for name, value in self._required.values.items()
-                               if name in change.names
-                               or value == getattr(change.configuration, name)])
+            self._required = self._required.without([
+                name for name, value in self._required.values.items()
+                if name in change.names or value == getattr(change.configuration, name)])
             self.agreed.accept(change.configuration, status)
         elif result.contradicted:
             self.agreed.contradicted(change.configuration, self._newest.status, result.message)
@@ -405,20 +345,12 @@ class LightConfiguration:
             self._setpoint_failed(result.message)
 
     def _required_ended(self, result: Result, now: float) -> None:
-        required = self._required
         if result.success:
             self._restored(True, result.message)
-        elif required.is_sent and result.superseded:
-            required.due = now
-        elif required.is_sent:
-            required.has_ended = True
-            required.failure = result.message
-            required.attempts += result.contradicted
-            if (result.permanent or required.attempts >= MAX_CONTRADICTIONS
-                    or required.attempts and required.requirement in _SENT_ONCE):
-                self._required = Required()
-                self.agreed.failed(result.message)
-                self._restored(False, result.message)
+        elif self._required.is_given_up(result, now):
+            self._required = RequiredValues()
+            self.agreed.failed(result.message)
+            self._restored(False, result.message)
 
     # Reports
 
@@ -429,17 +361,15 @@ class LightConfiguration:
             values = {name: getattr(confirmed, name) for name in FIELDS
                       if name != 'mode' or confirmed.mode}
             self._required = self._required.merged(values, Requirement.RESTART, now)
-        elif self._required.requirement in _SENT_ONCE:
+        elif self._required.is_sent_once:
             # The light has other values now.
-            self._required = Required()
+            self._required = RequiredValues()
         # The restart may have undone the command that brought the light within the limits.
         self.guard.renew()
 
     def retry_required(self, now: float) -> None:
         """Make required values due, since the light is heard or a command was cancelled."""
-        required = self._required
-        if required.due < math.inf:
-            required.due, required.has_ended = self._first_due(now), False
+        self._required.retry(self._first_due(now))
 
     def lost(self, message: str, now: float) -> None:
         """Note that the light is lost: no request must take effect when it is heard again."""
@@ -488,7 +418,7 @@ class LightConfiguration:
                 shown := self._shown_goal(required, self.agreed.confirmed, reported, status)):
             # The light has kept the values, another sender has restored them, or our command was
             # acknowledged too late.
-            self._required = Required()
+            self._required = RequiredValues()
             self.agreed.accept(shown, status)
             if required.has_ended:
                 self._restored(True, f'{shown.describe(list(required.values))}, {CONFIRMED}')
@@ -532,7 +462,7 @@ class LightConfiguration:
                     and now <= sent.at + IMPLIED_TIME)
 
     def _shown_goal(
-        self, required: Required, confirmed: Configuration, reported: Configuration,
+        self, required: RequiredValues, confirmed: Configuration, reported: Configuration,
         status: Status,
     ) -> Configuration | None:
         """
@@ -626,17 +556,17 @@ class LightConfiguration:
         self._emit(events.ConfigurationRestored(self._address, success, message))
 
     def _send_required(self, now: float) -> None:
-        required = self._required
-        limit = required.limit
-        required.due = now + RESTORE_INTERVAL + limit - CONFIGURE_LIMIT
-        for name, value in list(required.values.items()):
+        for name, value in self._required.values.items():
             try:
                 checked(name, value, self._newest.strobe_range)
             except InvalidValue as error:
-                self._drop_fields([name])
+                self._required = self._required.without([name])
                 self._restored(False, str(error))
-        if self._required is not required:
+        required = self._required
+        if not required.values:
             return
+        limit = required.limit
+        required.due = now + RESTORE_INTERVAL + limit - CONFIGURE_LIMIT
         try:
             change = self._change(self._checked(required.values))
         except InvalidValue as error:

@@ -21,8 +21,8 @@ from typing import Any
 
 from illuminator_ros.illuminator.events import ChangeCause
 from illuminator_ros.illuminator.light import Settings
-from illuminator_ros.illuminator.light_configuration import RESTORE_INTERVAL
 from illuminator_ros.illuminator.model import Configuration, float32, Mode, SafetyLimits
+from illuminator_ros.illuminator.required_values import RESTORE_INTERVAL
 from illuminator_ros.mavlink.dialect import mavlink
 from illuminator_ros.mavlink.messages import CommandAck, result_name
 from illuminator_ros.payload.attempt import Result
