@@ -31,7 +31,7 @@ import pytest
 from support.frames import frame_of
 from support.processes import ended, python
 from support.strict_mavlink_1 import strict_frames
-from support.waiting import eventually, PATIENCE
+from support.waiting import PATIENCE
 
 HOST = Address(1, 191)
 
@@ -61,13 +61,6 @@ def test_camera_answers_in_mavlink_1_only_and_writes_each_image_at_once_re_1_re_
     assert not port.is_symlink()
 
 
-def test_console_and_view_show_the_images() -> None:
-    with ended(python('illuminator_ros.simulator', '--payload', 'rededge', 'pty://',
-                      '--interval', '0.2', '--own-gps', 'none')) as simulator:
-        # The view prints a line for each number that it sees; a busy machine skips some.
-        simulator.wait_for(' images  time none  position none', count=3)
-
-
 def test_file_that_cannot_be_written_is_named_at_the_start(tmp_path: Path) -> None:
     with pytest.raises(SettingError, match=f'{tmp_path}/no/file: No such file or directory'):
         CsvFile(f'{tmp_path}/no/file', ['a'])
@@ -85,15 +78,3 @@ def test_full_disk_is_said_once_and_ends_the_records(
         file.append(['2', ''])
     assert [one.getMessage() for one in caplog.records] == [
         f'{path}: No space left on device: no more records are written']
-
-
-def test_images_go_on_while_the_file_cannot_be_written(tmp_path: Path) -> None:
-    images = tmp_path / 'images.csv'
-    with ended(python('illuminator_ros.simulator', '--payload', 'rededge', 'pty://',
-                      '--interval', '0.1', '--images', str(images))) as simulator:
-        eventually(lambda: images.exists(), 'no file')
-        images.unlink()
-        images.mkdir()
-        simulator.wait_for('Is a directory: no more records are written')
-        before = simulator.count('images')
-        eventually(lambda: simulator.count('images') > before + 2, 'no more images')

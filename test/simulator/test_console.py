@@ -115,13 +115,6 @@ def test_ambient_and_own_temperature_can_be_set(console: Console) -> None:
     assert console.status(2000.1).error_status == 3
 
 
-def test_the_state_of_each_light_is_shown(console: Console) -> None:
-    console.enter('bow on')
-    first, second = console.enter('status').splitlines()
-    assert first.startswith('1/243 bow') and '  ON  ' in first
-    assert second.startswith('1/244') and '  off  ' in second
-
-
 def test_help_has_each_command_and_each_fault(console: Console) -> None:
     text = console.enter('help')
     words = [*(one.usage for one in COMMANDS), *(one.usage for one in LIGHT_COMMANDS), *FAULTS]
