@@ -440,7 +440,7 @@ class Light:
         """
         Switch the light off, and again whenever it may be on, after :meth:`close`.
 
-        :param report: see :class:`~..payload.last_change.LastChange`. The failure of a light that
+        :param report: see :class:`~..payload.attempt.LastChange`. The failure of a light that
             is not heard is permanent until it is heard.
         """
         self._switch.switch_off_finally(now, report, connected=self.connected)

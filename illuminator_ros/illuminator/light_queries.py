@@ -16,22 +16,86 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 import functools
 import math
 
 from .messages import STATUS_ID
-from ..mavlink.command_sender import format_seconds
+from ..mavlink.command_sender import CommandResult, format_seconds
 from ..mavlink.dialect import mavlink
 from ..mavlink.messages import ComponentInformationBasic
 from ..payload.attempt import Done, Result, Target
 from ..payload.identity import Identity
-from ..payload.message_query import MessageQuery
 
 # s without a status after which the light is asked for one, and between the requests.
 STATUS_TIMEOUT = 2.5
+# s from the acknowledgement of a request to the message.
+MESSAGE_TIMEOUT = 0.5
+# How often a message is requested if it is acknowledged and does not come: it may be lost.
+MAX_QUESTIONS = 3
 # s from the first request until the identity counts as unknown.
 SETTLING_TIME = 2.0
 STATUS, IDENTITY = 'ILLUMINATOR_STATUS', 'COMPONENT_INFORMATION_BASIC'
+
+
+class MessageQuery:
+    """
+    Requests one message until it has come, or the light does not send it. Times are s.
+
+    :ivar first_asked: the time of the first request, infinity before it.
+    :ivar failure: why the light did not send the message, '' if it did or an answer is awaited.
+    """
+
+    def __init__(self, target: Target, message_id: int) -> None:
+        self.first_asked = math.inf
+        self.failure = ''
+        self._target = target
+        self._message_id = message_id
+        self._waiting: list[Callable[[str, float], None]] = []
+        # The number of requests that were sent, 0 while none is under way.
+        self._questions = 0
+        self._message_until = math.inf
+
+    def ask(self, now: float, done: Callable[[str, float], None] | None = None) -> None:
+        """Ask; ``done`` is called with '' once the message has come, else with the failure."""
+        if done is not None:
+            self._waiting.append(done)
+        if not self._questions:
+            self.first_asked = min(self.first_asked, now)
+            self._send(now)
+
+    def _send(self, now: float) -> None:
+        self._questions += 1
+        self._message_until = math.inf
+        self._target.request_message(self._message_id, now, self._answered)
+
+    def _answered(self, result: CommandResult, now: float) -> None:
+        if self._questions and result.accepted:
+            self._message_until = now + MESSAGE_TIMEOUT
+        elif self._questions:
+            self.finish(result.describe_failure(), now)
+
+    def finish(self, failure: str, now: float) -> None:
+        """End the requests: the message has come, or will not come for the reason given."""
+        self._message_until = math.inf
+        self._questions = 0
+        self.failure = failure
+        waiting, self._waiting = self._waiting, []
+        for done in waiting:
+            done(failure, now)
+
+    def poll(self, now: float) -> None:
+        """Ask again for a message that does not come, or give up."""
+        if now < self._message_until:
+            return
+        if self._questions < MAX_QUESTIONS:
+            self._send(now)
+        else:
+            self.finish('acknowledged, but not sent', now)
+
+    def next_deadline(self) -> float:
+        """Return when :meth:`poll` has something to do."""
+        return self._message_until
 
 
 class LightQueries:

@@ -38,8 +38,7 @@ from .model import DIMMING_FLAGS, Mode, Status
 from .status_tracker import NewestStatus
 from ..mavlink.command_sender import format_seconds
 from ..mavlink.dialect import mavlink
-from ..payload.attempt import Change, Done, Result, StatusReport, Target
-from ..payload.last_change import LastChange
+from ..payload.attempt import Change, Done, LastChange, Result, StatusReport, Target
 from ..payload.reconciler import decide, Desired, Reconciler, Rule
 
 # s after an ON in which an OFF may overtake it on the way to the light.

@@ -18,7 +18,7 @@ One command that changes a device: its acknowledgement, and the status that show
 MAV_RESULT_ACCEPTED says that the command is valid and is executed, not that it is completed
 (command protocol). So an attempt waits for a status, and requests one if none follows within
 :data:`ASK_DELAY`. Only a status that was sent after the command and shows the change makes the
-attempt a success.
+attempt a success. A :class:`LastChange` is sent until a status shows it.
 """
 
 from __future__ import annotations
@@ -43,6 +43,10 @@ ASK_INTERVAL = 0.25
 # s from a status that may be older than the command to the next request, doubled each time: it may
 # have been sent in the same millisecond as the command.
 OUTDATED_INTERVAL = 0.001
+# s between the commands of a last change, and from a status that is too old for it to the request
+# for the next one.
+LAST_CHANGE_INTERVAL = 0.1
+LAST_CHANGE_ASK_INTERVAL = 0.005
 # s by which the statuses of a device without a clock may be late, until that is measured.
 UNKNOWN_DELAY = 0.75
 # The last delays of statuses, from which the next delay is estimated.
@@ -491,3 +495,80 @@ class Attempt(Generic[S]):
     def _finish(self, result: Result, status: S | None, now: float) -> None:
         self.phase = TRANSITIONS[self.phase, Step.FINISH]
         self._ended(result, status, now)
+
+
+class LastChange(Generic[S]):
+    """
+    The last change of a device before the process ends. No I/O; times are s.
+
+    It is made again whenever the device does not have it. Unlike an :class:`Attempt` it needs no
+    acknowledgement: no later command of ours can undo it. Only a status that was sent after the
+    first try shows it.
+
+    :param report: called with a failure that is not permanent when the first command is sent and
+        when one has failed, and with a success or a permanent failure when no other command is
+        necessary.
+    :param counts_from: the time until which an earlier command may still reach the device and undo
+        the change: only a later status shows it.
+    """
+
+    def __init__(
+        self, target: Target, change: Change[S], report: Done, *, counts_from: float = -math.inf,
+    ) -> None:
+        self._target = target
+        self._change = change
+        self._report = report
+        self._counts_from = counts_from
+        self._begun_at = math.inf
+        self._evidence = Evidence(target, change)
+        self._send_due = self._ask_due = -math.inf
+        self._is_under_way = self._is_confirmed = False
+
+    def _answered(self, outcome: command_sender.CommandResult, now: float) -> None:
+        self._is_under_way = False
+        if self._is_confirmed:
+            return
+        text = f'{outcome.describe_failure()} ({outcome.timing()})'
+        is_permanent = outcome.refused and outcome.result in PERMANENT_RESULTS
+        if is_permanent:
+            self._send_due = self._ask_due = math.inf
+        elif outcome.accepted:
+            self._ask_due = now
+            text = f'{self._change.goal} not confirmed: {outcome}'
+        self._report(Result(False, text, permanent=is_permanent), now)
+
+    def reported(self, report: StatusReport[S], now: float) -> None:
+        """Take a status that is newer than all before."""
+        verdict = self._evidence.judge(report, now, is_accepted=False)
+        if verdict is Verdict.OUTDATED:
+            self._ask_due = min(self._ask_due, now + LAST_CHANGE_ASK_INTERVAL)
+        elif verdict is Verdict.CONTRADICTED and self._is_confirmed:
+            self._is_confirmed = False
+            self._send_due = now
+            self._report(Result(False, self._evidence.contradiction), now)
+        elif verdict is Verdict.SHOWN and not self._is_confirmed:
+            self._is_confirmed = True
+            self._send_due = self._ask_due = math.inf
+            took = command_sender.format_seconds(now - self._begun_at)
+            self._report(Result(True, (
+                f'{self._change.goal}, {self._change.evidence(report.status)} ({took})')), now)
+
+    def poll(self, now: float) -> None:
+        """Send the command or ask for a status, if that is due; the device must be connected."""
+        if self._begun_at == math.inf:
+            self._begun_at = now
+            self._evidence.sent_at = max(now, self._counts_from)
+            self._report(Result(False, ''), now)
+        if now >= self._send_due:
+            self._send_due = now + LAST_CHANGE_INTERVAL
+            if not self._is_under_way:
+                self._is_under_way = True
+                self._target.start(
+                    self._target.command(self._change), now, self._answered, overtake=True)
+        if now >= self._ask_due:
+            self._ask_due = now + LAST_CHANGE_INTERVAL
+            self._target.request_status(now)
+
+    def next_deadline(self) -> float:
+        """Return when :meth:`poll` has something to do."""
+        return min(self._send_due, self._ask_due)

@@ -20,13 +20,12 @@ import functools
 from typing import Any
 
 from illuminator_ros.illuminator.light import Settings
-from illuminator_ros.illuminator.light_queries import SETTLING_TIME
+from illuminator_ros.illuminator.light_queries import MAX_QUESTIONS, SETTLING_TIME
 from illuminator_ros.illuminator.messages import STATUS_ID
 from illuminator_ros.illuminator.simulated_properties import IlluminatorProperties
 from illuminator_ros.mavlink import messages as mav
 from illuminator_ros.mavlink.dialect import decode, encode, mavlink
 from illuminator_ros.payload.identity import Identity, text
-from illuminator_ros.payload.message_query import MAX_QUESTIONS
 import pytest
 from support.back_to_back import Pair, START
 from support.fake_light import FakeLight
