@@ -35,11 +35,8 @@ class ChangeCause(Enum):
     ROUNDING = 'rounding'
 
 
-class Origin(Enum):
-    """The sender that switched a light."""
-
-    REQUEST = 'request'
-    OTHER_SENDER = 'another sender'
+# The origins of a switch that no request names.
+A_REQUEST, OTHER_SENDER = 'a request', 'another sender'
 
 
 @dataclass(frozen=True)
@@ -215,12 +212,11 @@ class LightSwitched(LightEvent):
     """
     A light was switched on or off, and was not in that state before.
 
-    :param detail: how it was requested, such as ``service``; '' for another sender.
+    :param origin: such as ``service``, :data:`A_REQUEST` or :data:`OTHER_SENDER`, for people.
     """
 
     on: bool
-    origin: Origin
-    detail: str = ''
+    origin: str
 
 
 class LightSnapshot(NamedTuple):

@@ -167,7 +167,7 @@ class LightSwitch:
         # The OFF at the end of the process.
         self._last_off: LastChange[Status] | None = None
         # How the value was requested, for LightSwitched.
-        self._detail = ''
+        self._origin = ''
         # Whether it is switched on again if another sender switches it off: a request has switched
         # it on, and it was neither lost nor restarted since.
         self._undoes_off = False
@@ -199,18 +199,18 @@ class LightSwitch:
     # Desired values
 
     def ask(
-        self, on: bool, now: float, done: Done, detail: str = '', *, is_stream: bool = False,
+        self, on: bool, now: float, done: Done, origin: str = '', *, is_stream: bool = False,
     ) -> None:
         """
         Switch the light on or off; the light must be connected.
 
         :param done: called once with the result.
-        :param detail: how it was requested, for :class:`~.events.LightSwitched`.
+        :param origin: how it was requested, for :class:`~.events.LightSwitched`.
         :param is_stream: whether a newer request replaces it.
         """
         self.state.off = self.state.undoing = None
         self.state.asked = Desired(SWITCHES[on], since=now)
-        self._detail = detail
+        self._origin = origin
         self.decide(now, done, is_stream=is_stream)
 
     def require_off(self, reason: str, now: float) -> None:
@@ -281,9 +281,9 @@ class LightSwitch:
                 self._configuration.drop_required()
         if result.success or result.refused:
             self._settled_at = now
-        detail = desired.reason
+        origin = desired.reason
         if desired is state.asked:
-            state.asked, detail = None, self._detail
+            state.asked, origin = None, self._origin
         elif desired is state.off:
             state.off = self._failed(desired, result, now + REPEAT_INTERVAL)
         elif desired is state.undoing:
@@ -295,7 +295,7 @@ class LightSwitch:
                     self._target.address, 'off' if on else 'on', undone=False))
         if result.success and was_on is not on:
             self._emit(events.LightSwitched(
-                self._target.address, on, events.Origin.REQUEST, detail))
+                self._target.address, on, origin or events.A_REQUEST))
 
     def _failed(
         self, desired: Desired[Status], result: Result, due: float | None,
@@ -433,7 +433,7 @@ class LightSwitch:
                 or status.mode is Mode.EXTERNAL_SYNC):
             return
         is_own = self.is_own(status.enabled, now)
-        origin = events.Origin.REQUEST if is_own else events.Origin.OTHER_SENDER
+        origin = events.A_REQUEST if is_own else events.OTHER_SENDER
         self._emit(events.LightSwitched(self._target.address, status.enabled, origin))
         if self._undoing is None or is_own or before and not self._undoes_off:
             return

@@ -24,7 +24,6 @@ from illuminator_ros.illuminator.events import (
     ChangeCause,
     LightEvent,
     LightSwitched,
-    Origin,
     StatusReceived,
 )
 from illuminator_ros.illuminator.light import Settings
@@ -49,8 +48,8 @@ def events_of(pair: Pair) -> list[LightEvent]:
     return events
 
 
-def switches(events: list[LightEvent]) -> list[tuple[bool, Origin, str]]:
-    return [(one.on, one.origin, one.detail) for one in events if isinstance(one, LightSwitched)]
+def switches(events: list[LightEvent]) -> list[tuple[bool, str]]:
+    return [(one.on, one.origin) for one in events if isinstance(one, LightSwitched)]
 
 
 # Late frames
@@ -296,7 +295,7 @@ def test_each_switch_is_one_event_with_its_origin(fake: FakeLight, faked: Pair) 
     fake.fields['enable'] = 0
     faked.run(3.0)
     assert switches(events) == [
-        (True, Origin.REQUEST, 'service'), (False, Origin.OTHER_SENDER, '')]
+        (True, 'service'), (False, 'another sender')]
 
 
 @pytest.mark.parametrize('before', [
@@ -310,7 +309,7 @@ def test_a_button_pressed_soon_after_a_command_of_ours_is_another_sender(
     events = events_of(faked)
     fake.fields['enable'] = 1
     faked.run(1.5)
-    assert switches(events) == [(True, Origin.OTHER_SENDER, '')]
+    assert switches(events) == [(True, 'another sender')]
 
 
 def test_a_switch_that_takes_effect_late_is_ours(fake: FakeLight, faked: Pair) -> None:
@@ -318,7 +317,7 @@ def test_a_switch_that_takes_effect_late_is_ours(fake: FakeLight, faked: Pair) -
     events = events_of(faked)
     assert not faked.enable(True).success
     faked.run(6.0)
-    assert switches(events) == [(True, Origin.REQUEST, '')]
+    assert switches(events) == [(True, 'a request')]
 
 
 @pytest.mark.parametrize('change', [
@@ -355,7 +354,7 @@ def test_a_listener_that_raises_does_not_stop_the_others(
     faked.controller.events.subscribe(fail)
     events = events_of(faked)
     assert faked.enable(True).success
-    assert switches(events) == [(True, Origin.REQUEST, '')]
+    assert switches(events) == [(True, 'a request')]
     assert 'A listener failed on LightSwitched' in caplog.text
     assert 'as the test says' in caplog.text
 

@@ -123,8 +123,7 @@ class EventPublisher:
                 serial = identity.serial_number and f', serial number {identity.serial_number}'
                 log.info(f'{light} is {known or "nameless"}{serial}', 'identity')
             case events.LightSwitched(on=on, origin=origin):
-                way = event.detail if origin is events.Origin.REQUEST else origin.value
-                log.info(f'{light} was switched {_state(on)} by {way or "a request"}', 'switched')
+                log.info(f'{light} was switched {_state(on)} by {origin}', 'switched')
             case events.LightHeld(change=change):
                 log.info(f'{light} {describe(change)}', 'holder')
                 self._source = f'{change.after}/' if change.after not in (None, DEFAULT) else ''
