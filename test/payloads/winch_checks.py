@@ -47,7 +47,7 @@ class WinchSession(Session):
 
     async def save(self) -> bool:
         """See :class:`Session`."""
-        self.before = await self.length() if self.before is None else self.before
+        self.before = await self.length()
         return self.before is not None
 
     @property

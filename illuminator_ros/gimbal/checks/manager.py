@@ -208,7 +208,7 @@ class ManagerSession(GimbalSession):
     async def save(self) -> bool:
         """See :class:`Session`."""
         try:
-            self._control_before = self._control_before or await self.control()
+            self._control_before = await self.control()
         except Skipped:
             return False
         return await super().save()

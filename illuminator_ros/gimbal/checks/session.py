@@ -332,7 +332,7 @@ class GimbalSession(Session):
     async def save(self) -> bool:
         """See :class:`Session`."""
         try:
-            self._before = self._before or await self.pose()
+            self._before = await self.pose()
         except Skipped:
             return False
         return True

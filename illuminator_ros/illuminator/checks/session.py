@@ -242,14 +242,14 @@ class LightSession(Session):
 
     async def save(self) -> bool:
         """See :class:`Session`."""
-        self._before = self._before or await self.status()
+        self._before = await self.status()
         return self._before is not None
 
     @property
     def saved(self) -> str:
         """See :class:`Session`."""
         assert self._before is not None
-        return f'{"on" if self._before.enabled else "off"}, {_saved(self._before).describe()}'
+        return status_text(self._before)
 
     async def restore(self) -> list[str]:
         """See :class:`Session`."""

@@ -139,7 +139,7 @@ class CheckRunner(Generic[T]):
             raise _Unreached(self._lost)
         if one.needs_consent and not self._session.consent:
             raise Skipped(f'the {device} would {self._checks.risk}: {NOT_AGREED}')
-        if one.changes and not await self._session.save():
+        if one.changes and not (self.changed or await self._session.save()):
             raise Skipped(f'the {device} does not report its state, so it could not be restored')
         self.changed |= one.changes
 
