@@ -37,6 +37,8 @@ from illuminator_ros.rededge import messages as rededge
 NAN = math.nan
 # GIMBAL_DEVICE_FLAGS
 ROLL_LOCK, PITCH_LOCK, IN_VEHICLE_FRAME = 4, 8, 32
+# GIMBAL_DEVICE_ERROR_FLAGS
+AT_PITCH_LIMIT, AT_YAW_LIMIT = 2, 4
 # s; UTC at 0 on the link's clock, since 1970.
 STEP = 0.05
 UTC = 1.7e9
@@ -210,42 +212,6 @@ def angles(q: Sequence[float]) -> tuple[float, float]:
             math.atan2(2 * (w * z + x * y), 1 - 2 * (y * y + z * z)))
 
 
-class MinimalAxes:
-    """
-    Pitch and yaw that turn to angles, or at rates, within their ranges, rad.
-
-    :ivar now: pitch and yaw.
-    """
-
-    def __init__(self, ranges: tuple[tuple[float, float], tuple[float, float]]) -> None:
-        self.ranges = ranges
-        self.now = [0.0, 0.0]
-        self._targets = [0.0, 0.0]
-        self._rates = [0.0, 0.0]
-
-    def turn(self, targets: tuple[float, float], rates: tuple[float, float]) -> None:
-        """Turn each axis to an angle, else at a rate; NaN for neither, which stops it."""
-        for axis in (0, 1):
-            self._targets[axis] = targets[axis]
-            self._rates[axis] = 0.0 if math.isnan(rates[axis]) else rates[axis]
-
-    def advance(self, seconds: float) -> None:
-        """Move."""
-        for axis, (low, high) in enumerate(self.ranges):
-            if math.isnan(self._targets[axis]):
-                moved = self.now[axis] + self._rates[axis] * seconds
-            else:
-                speed = abs(self._rates[axis]) or SPEED
-                way = self._targets[axis] - self.now[axis]
-                moved = self.now[axis] + math.copysign(min(abs(way), speed * seconds), way)
-            self.now[axis] = max(low, min(high, moved))
-
-    def at_limits(self) -> int:
-        """Return AT_PITCH_LIMIT and AT_YAW_LIMIT of the axes whose target is beyond the range."""
-        return sum(flag for flag, target, (low, high) in zip(
-            (2, 4), self._targets, self.ranges, strict=True) if target < low or target > high)
-
-
 PITCH = math.radians(-90), math.radians(30)
 YAW = math.radians(-160), math.radians(160)
 
@@ -264,13 +230,14 @@ class MinimalGimbal(MinimalDevice):
     intervals = {AttitudeStatus: 0.1}
     requestable = (gimbal.GimbalDeviceInformation,)
     messages = (*MinimalDevice.messages, gimbal.GimbalManagerStatus,
-                gimbal.GimbalDeviceSetAttitude, gimbal.GimbalManagerSetPitchyaw)
+                gimbal.GimbalDeviceSetAttitude)
     ranges: ClassVar[tuple[tuple[float, float], tuple[float, float]]] = (PITCH, YAW)
     capabilities: ClassVar[int] = 32 | 128 | 256 | 512
 
     def __init__(self) -> None:
         super().__init__(Address(1, 154), mavlink.MAV_TYPE_GIMBAL, mavlink.MAV_AUTOPILOT_INVALID)
-        self.axes = MinimalAxes(self.ranges)
+        # Of pitch and yaw: the angle, rad, the commanded one, NaN for none, and the rate, rad/s.
+        self.angles, self.targets, self.rates = [0.0, 0.0], [0.0, 0.0], [0.0, 0.0]
         self.manager: Address | None = None
 
     def start(self) -> None:
@@ -278,14 +245,22 @@ class MinimalGimbal(MinimalDevice):
         self._move()
 
     def _move(self) -> None:
-        self.axes.advance(STEP)
+        for axis, (low, high) in enumerate(self.ranges):
+            step = self.rates[axis] * STEP
+            if not math.isnan(self.targets[axis]):
+                longest = (abs(self.rates[axis]) or SPEED) * STEP
+                step = max(-longest, min(longest, self.targets[axis] - self.angles[axis]))
+            self.angles[axis] = max(low, min(high, self.angles[axis] + step))
         self.after(STEP, self._move)
 
     def message(self, message_id: int) -> mav.Message:
         if message_id == AttitudeStatus.id:
+            at_limits = sum(flag for flag, target, (low, high) in zip(
+                (AT_PITCH_LIMIT, AT_YAW_LIMIT), self.targets, self.ranges, strict=True)
+                if target < low or target > high)
             return AttitudeStatus(
                 0, 0, self.uptime_ms, ROLL_LOCK | PITCH_LOCK | IN_VEHICLE_FRAME, self.reported(),
-                NAN, NAN, NAN, self.axes.at_limits(), NAN, NAN)
+                NAN, NAN, NAN, at_limits, NAN, NAN)
         return gimbal.GimbalDeviceInformation(
             self.uptime_ms, b'', b'', b'', 0, 0, 0, self.capabilities, 0, NAN, NAN,
             *self.reported_limits())
@@ -296,7 +271,7 @@ class MinimalGimbal(MinimalDevice):
 
     def reported(self) -> tuple[float, float, float, float]:
         """Return the quaternion of its status."""
-        pitch, yaw = self.axes.now
+        pitch, yaw = self.angles
         return quaternion(pitch, yaw)
 
     def commanded(self, q: Sequence[float]) -> tuple[float, float]:
@@ -311,9 +286,10 @@ class MinimalGimbal(MinimalDevice):
             self.obey(message)
 
     def obey(self, message: gimbal.GimbalDeviceSetAttitude) -> None:
-        """Obey a setpoint."""
-        self.axes.turn(self.commanded(message.q),
-                       (message.angular_velocity_y, message.angular_velocity_z))
+        """Turn each axis to an angle, else at a rate; NaN for neither, which stops it."""
+        self.targets = [*self.commanded(message.q)]
+        self.rates = [0.0 if math.isnan(rate) else rate for rate in (
+            message.angular_velocity_y, message.angular_velocity_z)]
 
 
 class MinimalCamera(MinimalDevice):
