@@ -129,10 +129,8 @@ class ManagerWithClient(Payload):
             self.client.receive(self._commands.address, alive, now)
             self.manager.receive(self._commands.address, alive, now)
         self.manager.poll(now)
-        self._exchange(now)
         self._own.poll(now)
         self.client.poll(now)
-        # ROS may have used the client since the last call.
         self._exchange(now)
 
     def next_deadline(self) -> float:

@@ -21,7 +21,7 @@ import math
 from typing import Any
 
 from illuminator_ros.gimbal.axes import Range
-from illuminator_ros.gimbal.events import AttitudeReceived, GimbalConnected
+from illuminator_ros.gimbal.events import AttitudeReceived, GimbalConnected, GimbalLost
 from illuminator_ros.gimbal.gimbal import Gimbal, GimbalSettings
 from illuminator_ros.gimbal.manager import GimbalManager, ManagerSettings
 from illuminator_ros.gimbal.manager_control import Role
@@ -31,8 +31,9 @@ from illuminator_ros.gimbal.messages import GimbalDeviceSetAttitude, GimbalManag
 from illuminator_ros.mavlink.command_sender import CommandSender
 from illuminator_ros.mavlink.component import Component
 from illuminator_ros.mavlink.dialect import mavlink
+from illuminator_ros.mavlink.messages import CommandLong
 from illuminator_ros.payload.attempt import Result
-from illuminator_ros.payload.messages import GeoPoint
+from illuminator_ros.payload.messages import GeoPoint, GimbalDeviceAttitudeStatus
 from illuminator_ros.payload.mount_attitude import YawFrame
 from illuminator_ros.payload.rotation import Quaternion
 import pytest
@@ -59,7 +60,7 @@ class Rig(ManagerRig):
     def make(
         self, commands: CommandSender, settings: ManagerSettings,
     ) -> tuple[GimbalManager, Component]:
-        self.both = ManagerWithClient(commands, settings, GimbalSettings())
+        self.both = ManagerWithClient(commands, settings, GimbalSettings(attitude_interval=0.05))
         self.told: list[Any] = []
         self.both.client.events.subscribe(self.told.append)
         return self.both.manager, Component(commands, [self.both])
@@ -141,6 +142,21 @@ def test_gm_22_ros_turns_a_device_without_mavlink_that_reports_no_attitude() -> 
     assert attitude is not None
     assert attitude.rotation.euler() == pytest.approx((0.0, 0.2, 0.3))
     assert rig.messages(GimbalDeviceSetAttitude) == []
+
+
+def test_the_requests_of_the_client_to_the_device_are_sent_on_the_link() -> None:
+    assert [(one.param1, one.param2) for one in Rig().messages(CommandLong)
+            if one.command == mavlink.MAV_CMD_SET_MESSAGE_INTERVAL
+            and one.target_component == DEVICE.component] == [
+        (GimbalDeviceAttitudeStatus.id, 50_000)]
+
+
+def test_the_client_loses_the_gimbal_with_the_line_of_its_device() -> None:
+    rig = Rig()
+
+    rig.component.components_lost([DEVICE], rig.now, 'cut')
+
+    assert [one.reason for one in of(GimbalLost, rig.told)] == ['cut']
 
 
 def test_the_client_ends_its_requests_when_the_link_is_lost() -> None:

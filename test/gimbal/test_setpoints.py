@@ -102,7 +102,7 @@ def test_a_rate_that_lasts_ends_after_a_shorter_timeout_and_never_later_than_it_
     rig.gimbal.set_rates((0.0, 0.2, 0.0), rig.now)
     rig.run(1.0)
 
-    rig.gimbal.change_settings(GimbalSettings(setpoint_timeout=timeout), rig.now)
+    rig.client.change_settings(GimbalSettings(setpoint_timeout=timeout), rig.now)
     rig.run(10.0)
 
     assert [at - start for at, _ in setpoints(rig)] == approx([0.0, zero_at], abs=0.03)
