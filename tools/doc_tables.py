@@ -218,7 +218,7 @@ def ros_tables() -> Tables:
             (*gimbal_node.PUBLICATIONS, SOURCE),
             '`gimbal: link` and `gimbal: device`; [their values](#values-of-diagnostics)'),
         ('gimbal', 'accepted'): endpoints(
-            (*setpoints, *gimbal_node.REQUESTS, gimbal_node.SET_YAW_LOCK)),
+            (*setpoints, *gimbal_node.REQUESTS)),
         ('gimbal', 'of a source'): of_a_source(setpoints, RELEASE),
         ('gimbal_manager', 'published by the manager'): published(
             [manager_node.DEVICE_SETPOINT], '`gimbal_manager: manager`'),

@@ -63,18 +63,22 @@ PUBLICATIONS = (
     Endpoint('controller', String,
              'the components in control, such as `primary 1/195, secondary none`, or `unknown`'),
 )
-# Services without an argument.
-REQUESTS: dict[Endpoint, Callable[[Gimbal, float, Done], None]] = {
-    Endpoint('take_control', Trigger, 'take primary control'): Gimbal.take_control,
+# What each service asks of the gimbal; the message is the second argument.
+REQUESTS: dict[Endpoint, Callable[[Gimbal, Any, float, Done], None]] = {
+    Endpoint('take_control', Trigger, 'take primary control'):
+        lambda gimbal, _, *asked: gimbal.take_control(*asked),
     Endpoint('release_control', Trigger, 'stop, and release all control that this node has'):
-        Gimbal.release_control,
-    Endpoint('neutral', Trigger, 'turn to the neutral position'): Gimbal.set_neutral,
-    Endpoint('retract', Trigger, 'turn to the retracted position'): Gimbal.retract,
-    Endpoint('clear_roi', Trigger, 'no longer point at a place'): Gimbal.clear_roi,
+        lambda gimbal, _, *asked: gimbal.release_control(*asked),
+    Endpoint('neutral', Trigger, 'turn to the neutral position'):
+        lambda gimbal, _, *asked: gimbal.set_neutral(*asked),
+    Endpoint('retract', Trigger, 'turn to the retracted position'):
+        lambda gimbal, _, *asked: gimbal.retract(*asked),
+    Endpoint('clear_roi', Trigger, 'no longer point at a place'):
+        lambda gimbal, _, *asked: gimbal.clear_roi(*asked),
+    Endpoint('set_yaw_lock', SetBool, 'hold yaw against the earth, or let it follow the vehicle; '
+             'refused where the gimbal lacks it'):
+        lambda gimbal, message, *asked: gimbal.set_yaw_lock(message.data, *asked),
 }
-SET_YAW_LOCK = Endpoint(
-    'set_yaw_lock', SetBool, 'hold yaw against the earth, or let it follow the vehicle; refused '
-    'where the gimbal lacks it')
 CMD_ATTITUDE = Endpoint(
     'cmd/attitude', QuaternionStamped,
     'an attitude; `frame_id` names the yaw frame, any other is refused', ros_node.SWITCH_QOS)
@@ -123,7 +127,6 @@ class GimbalNode:
             services=(
                 *(ros_node.RequestService(one, functools.partial(self._request, one))
                   for one in REQUESTS),
-                ros_node.RequestService(SET_YAW_LOCK, self._set_yaw_lock),
                 *release_services(sources, self._release)),
             commands=(topic for way in prefixes(sources).items()
                       for topic in self._command_topics(*way)))
@@ -242,24 +245,15 @@ class GimbalNode:
         else:
             answer(False, self.absence(now))
 
-    def _claimed(self, name: str, now: float, answer: ros_node.Answer) -> Gimbal | None:
-        """Return the gimbal for a request of the plain interface; answer a refused request."""
-        gimbal = self._gimbal()
-        refusal = self.absence(now) if gimbal is None else _refusal(gimbal, name, now)
-        if refusal:
-            answer(False, refusal)
-        return None if refusal else gimbal
-
     def _request(
-        self, service: Endpoint, message: Trigger.Request, now: float, answer: ros_node.Answer,
+        self, service: Endpoint, message: Any, now: float, answer: ros_node.Answer,
     ) -> None:
-        if gimbal := self._claimed(service.name, now, answer):
-            REQUESTS[service](gimbal, now, lambda result, now: answer(
-                result.success, result.message))
-
-    def _set_yaw_lock(self, message: SetBool.Request, now: float, answer: ros_node.Answer) -> None:
-        if gimbal := self._claimed(SET_YAW_LOCK.name, now, answer):
-            gimbal.set_yaw_lock(message.data, now, lambda result, now: answer(
+        gimbal = self._gimbal()
+        refusal = self.absence(now) if gimbal is None else _refusal(gimbal, service.name, now)
+        if gimbal is None or refusal:
+            answer(False, refusal)
+        else:
+            REQUESTS[service](gimbal, message, now, lambda result, now: answer(
                 result.success, result.message))
 
     # Setpoints
