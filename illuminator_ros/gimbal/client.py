@@ -123,8 +123,9 @@ class GimbalClient(Payload):
         elif isinstance(message, GimbalManagerInformation):
             if gimbal := self._managed(source, message.gimbal_device_id):
                 gimbal.take_information(source, message, now)
-                self._component(source, now).query.finish()
-                self._queries.set(source, math.inf)
+                if not any(one.lacks_information_of(source) for one in self._gimbals.values()):
+                    self._component(source, now).query.finish()
+                    self._queries.set(source, math.inf)
         elif (isinstance(message, GimbalDeviceInformation)
                 and (gimbal := self._sender(source, message.gimbal_device_id))):
             gimbal.take_device_information(message)

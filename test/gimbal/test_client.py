@@ -23,7 +23,7 @@ from illuminator_ros.mavlink.dialect import mavlink
 from illuminator_ros.mavlink.messages import Address, CommandLong, heartbeat
 import pytest
 from support.entries import entries
-from support.gimbals import AUTOPILOT, DEVICE, FakeManager, keys, NAN, OTHER, Rig
+from support.gimbals import ALL, AUTOPILOT, DEVICE, FakeManager, keys, NAN, OTHER, Rig
 
 INFORMATION, DEVICE_INFORMATION = 280, 283
 
@@ -111,6 +111,21 @@ def test_gm_27_manager_that_tells_no_information_is_known_by_its_status() -> Non
     assert rig.gimbal.snapshot(rig.now).capabilities is None
     # The pauses grow.
     assert 3 <= len(requests(rig)) <= 15
+
+
+def test_gm_27_information_that_comes_of_one_of_two_gimbals_is_requested_until_both_came() -> None:
+    second = FakeManager(device_id=2, alive=False, announces=False)
+    rig = Rig(FakeManager(device_id=1), second).run(3.0)
+
+    second.alive = True
+    rig.run(30.0)
+    asked = len(requests(rig))
+    second.announces = True
+    rig.run(40.0)
+
+    # The pauses grow, though the information of the first gimbal comes each time.
+    assert 3 <= asked <= 8
+    assert [one.snapshot(rig.now).capabilities for one in rig.client.gimbals.values()] == [ALL] * 2
 
 
 @pytest.mark.parametrize('answer', [mavlink.MAV_RESULT_UNSUPPORTED, None])
