@@ -33,7 +33,6 @@ import pytest
 from rclpy.client import Client
 from rclpy.node import Node
 from rclpy.qos import QoSProfile
-from rclpy.service import Service
 from std_msgs.msg import Float32, Float64
 from std_srvs.srv import Trigger
 from support.light import eventually, ON_OFF, ServedLight
@@ -159,7 +158,6 @@ def test_requests_fail_at_once_and_say_why_while_the_link_is_not_open(
                 f'cannot listen on 127.0.0.1:{port}: Address already in use'}
 
 
-EXECUTOR = 'executor'
 MakeClient = Callable[[str], Client]
 
 
@@ -171,7 +169,7 @@ def node(ros: Ros, monkeypatch: pytest.MonkeyPatch) -> Iterator[Node]:
     executor = NodeExecutor(ros.context, NodeLog(node.get_logger()))
     node.create_service(Trigger, '~/fast', lambda request, response: response)
     executor.add_node(node)
-    thread = threading.Thread(target=executor.run, name=EXECUTOR)
+    thread = threading.Thread(target=executor.run)
     thread.start()
     yield node
     executor.end()
@@ -255,36 +253,6 @@ def test_answers_are_spaced_where_a_service_has_more_clients_than_are_answered_a
         answered.result()
     Call(fast.call_async(Trigger.Request())).result()
     assert not calls[2].answered
-
-
-def test_answer_that_comes_while_the_executor_sends_another_one_does_not_stop_it(
-    node: Node, clients: MakeClient, monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    monkeypatch.setattr(answer_spacing, 'PAUSE_PER_CLIENT', 0.001)
-    waiting = serve_later(node)
-    slow, fast = clients('slow'), clients('fast')
-    calls = call(slow, waiting, answer_spacing.MAX_UNSPACED + 2)
-    left = list(waiting)
-    genuine, nested = Service.send_response, Log[int]()
-
-    def send_response(service: Service, *arguments: object) -> None:
-        genuine(service, *arguments)
-        if not nested and threading.current_thread().name == EXECUTOR:
-            nested.append(1)
-            other = threading.Thread(target=left.pop(), args=(Trigger.Response(),))
-            other.start()
-            other.join()
-
-    monkeypatch.setattr(Service, 'send_response', send_response)
-    for _ in range(3):
-        left.pop()(Trigger.Response())
-    nested.wait_for(lambda one: True)
-    while left:
-        left.pop()(Trigger.Response())
-
-    for answered in calls:
-        answered.result()
-    Call(fast.call_async(Trigger.Request())).result()
 
 
 def test_executor_that_ends_refuses_requests_that_wait_without_a_pause(
