@@ -77,7 +77,7 @@ class SetpointMixer:
         self._emit = emit
         self._offsets = STILL
         self._roi: GeoPoint | None = None
-        # By axis, the demand whose clipped angle was reported.
+        # By axis, the request whose clipped angle was reported.
         self._reported: dict[str, object] = {}
         self._lost: set[str] = set()
 
@@ -258,15 +258,15 @@ class SetpointMixer:
 
     def _report_clipped(self, setpoint: Setpoint) -> None:
         """Report a clipped angle once, although it changes while the vehicle turns or moves."""
-        demands: dict[str, object] = {
+        requests: dict[str, object] = {
             axis: (setpoint.frame, self._roi or (
                 math.copysign(1.0, rate) if rate else round(angle + offset, 6)))
             for axis, angle, offset, rate in zip(
                 AXES, setpoint.angles, self._offsets, setpoint.turning, strict=True)}
-        self._reported = {axis: demand for axis, demand in self._reported.items()
-                          if demand == demands[axis]}
+        self._reported = {axis: request for axis, request in self._reported.items()
+                          if request == requests[axis]}
         if new := tuple(one for one in self.clipped if one.axis not in self._reported):
-            self._reported |= {one.axis: demands[one.axis] for one in new}
+            self._reported |= {one.axis: requests[one.axis] for one in new}
             self._emit(events.SetpointClipped(new))
 
     def _note_lost(self, name: str, *, is_lost: bool) -> None:

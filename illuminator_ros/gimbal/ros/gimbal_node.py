@@ -63,7 +63,7 @@ PUBLICATIONS = (
     Endpoint('controller', String,
              'the components in control, such as `primary 1/195, secondary none`, or `unknown`'),
 )
-# What each service asks of the gimbal; the message is the second argument.
+# The request of each service to the gimbal; its message is the second argument.
 REQUESTS: dict[Endpoint, Callable[[Gimbal, Any, float, Done], None]] = {
     Endpoint('take_control', Trigger, 'take primary control'):
         lambda gimbal, _, *asked: gimbal.take_control(*asked),
