@@ -175,12 +175,12 @@ class SimulatedMount:
         self.motion.advance(now)
         self.motion.fail(behaviour.frozen_axis, limited=behaviour.limits_range)
 
-    def obey(self, demand: Setpoint, now: float) -> None:
+    def obey(self, setpoint: Setpoint, now: float) -> None:
         """Take a setpoint, see :meth:`GimbalMotion.obey`."""
-        stop = demand.has_rates_only and not any(
-            rate for rate in demand.rates if math.isfinite(rate))
+        stop = setpoint.has_rates_only and not any(
+            rate for rate in setpoint.rates if math.isfinite(rate))
         if not self._behaviour.ignores_changes and (self._behaviour.stops or not stop):
-            self.motion.obey(demand, now)
+            self.motion.obey(setpoint, now)
 
     @property
     def flags(self) -> int:
@@ -356,11 +356,11 @@ class SimulatedGimbal(simulated.SimulatedDevice):
         now: float,
     ) -> None:
         try:
-            demand = Setpoint.from_attitude(message)
+            setpoint = Setpoint.from_attitude(message)
         except ValueError:
             return
-        if demand.frame is YawFrame.VEHICLE or self.mount.motion.heading_known(now):
-            self.mount.obey(demand, now)
+        if setpoint.frame is YawFrame.VEHICLE or self.mount.motion.heading_known(now):
+            self.mount.obey(setpoint, now)
 
     def snapshot(self, now: float) -> simulated.Snapshot:
         """See :meth:`SimulatedDevice.snapshot`."""

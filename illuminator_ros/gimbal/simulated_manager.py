@@ -231,9 +231,9 @@ class SimulatedManager(simulated.SimulatedDevice):
                 self._take_vehicle(message, now)
         elif isinstance(message, AnySetpoint) and self._is_for_device(message.gimbal_device_id):
             with contextlib.suppress(ValueError):
-                demand = self._read(message)
+                setpoint = self._read(message)
                 if self._may_control(source):
-                    self._obey(source, demand, now)
+                    self._obey(source, setpoint, now)
         return ()
 
     def _take_vehicle(self, message: Attitude | GlobalPositionInt, now: float) -> None:
@@ -258,37 +258,37 @@ class SimulatedManager(simulated.SimulatedDevice):
         return flags & ~frames if self.behaviour.frame_is_lock else flags
 
     def _read(self, message: AnySetpoint) -> Setpoint:
-        """Return the demand of a message; ValueError if it is ignored."""
+        """Return the setpoint of a message; ValueError if it is ignored."""
         behaviour = self.behaviour
-        demand = read_setpoint(
+        setpoint = read_setpoint(
             replaced(message, flags=self._flags(message.flags)), self.properties.ranges)
-        has_both = all(map(math.isfinite, (*demand.angles, *demand.rates[1:])))
+        has_both = all(map(math.isfinite, (*setpoint.angles, *setpoint.rates[1:])))
         if (isinstance(message, gimbal.GimbalManagerSetPitchyaw) and not behaviour.takes_pitchyaw
                 or isinstance(message, gimbal.GimbalManagerSetManualControl)
                 and not behaviour.takes_manual
-                or has_both and not behaviour.angles_with_rates or self._lacks_an_axis(demand)):
+                or has_both and not behaviour.angles_with_rates or self._lacks_an_axis(setpoint)):
             raise ValueError('the profile ignores it')
-        return demand
+        return setpoint
 
-    def _lacks_an_axis(self, demand: Setpoint) -> bool:
-        """Return whether a demand has the angle of only one axis, and the profile ignores it."""
-        _, pitch, yaw = demand.angles
+    def _lacks_an_axis(self, setpoint: Setpoint) -> bool:
+        """Return whether a setpoint has the angle of only one axis, and the profile ignores it."""
+        _, pitch, yaw = setpoint.angles
         return math.isnan(pitch) is not math.isnan(yaw) and (
             self.behaviour.partial_angles is not None)
 
-    def _obey(self, source: Address, demand: Setpoint, now: float) -> None:
+    def _obey(self, source: Address, setpoint: Setpoint, now: float) -> None:
         if self.behaviour.enforces_control and source == self.secondary != self.primary:
             # Nudging adds angles; a rate would override the angles of primary control.
             nudge = Range(-NUDGE_LIMIT, NUDGE_LIMIT)
             roll, pitch, yaw = (
                 (own if math.isfinite(own) else 0.0) + nudge.clip(added)
                 if math.isfinite(added) else math.nan
-                for own, added in zip(self._base, demand.angles, strict=True))
-            demand = Setpoint(demand.flags, demand.frame, (roll, pitch, yaw))
+                for own, added in zip(self._base, setpoint.angles, strict=True))
+            setpoint = Setpoint(setpoint.flags, setpoint.frame, (roll, pitch, yaw))
         else:
-            self._base = demand.angles
+            self._base = setpoint.angles
         self._roi = None
-        self.mount.obey(demand, now)
+        self.mount.obey(setpoint, now)
 
     # Commands
 
@@ -326,16 +326,16 @@ class SimulatedManager(simulated.SimulatedDevice):
         pitch_rate, yaw_rate = rates if self.behaviour.rates_in_degrees else values[2:]
         try:
             # int() of NaN raises ValueError, and of infinity OverflowError.
-            demand = Setpoint.from_pitch_yaw(
+            setpoint = Setpoint.from_pitch_yaw(
                 self._flags(int(flags)), pitch, yaw, pitch_rate, yaw_rate)
         except (ValueError, OverflowError):
             return simulated.CommandReply(mavlink.MAV_RESULT_DENIED)
-        if self._lacks_an_axis(demand):
+        if self._lacks_an_axis(setpoint):
             assert self.behaviour.partial_angles is not None
             return simulated.CommandReply(self.behaviour.partial_angles)
         return simulated.CommandReply(
             mavlink.MAV_RESULT_ACCEPTED if self._may_control(source)
-            else mavlink.MAV_RESULT_DENIED, partial(self._obey, source, demand, now))
+            else mavlink.MAV_RESULT_DENIED, partial(self._obey, source, setpoint, now))
 
     def _configure(
         self, source: Address, values: Sequence[float],

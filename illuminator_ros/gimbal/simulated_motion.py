@@ -225,7 +225,7 @@ class GimbalMotion:
                        for axis, angle in enumerate((vehicle.roll, vehicle.pitch)))
         return roll, pitch, -self._heading(now) if self.locked(2) else 0.0
 
-    def obey(self, demand: Setpoint, now: float) -> None:
+    def obey(self, setpoint: Setpoint, now: float) -> None:
         """
         Take a setpoint (GIMBAL_DEVICE_SET_ATTITUDE).
 
@@ -233,8 +233,8 @@ class GimbalMotion:
         neither keeps its angle.
         """
         self.advance(now)
-        flags, angles, rates = demand.flags, demand.angles, demand.rates
-        self.flags, self.frame = flags & SETTABLE, demand.frame
+        flags, angles, rates = setpoint.flags, setpoint.angles, setpoint.rates
+        self.flags, self.frame = flags & SETTABLE, setpoint.frame
         if flags & (mavlink.GIMBAL_DEVICE_FLAGS_RETRACT | mavlink.GIMBAL_DEVICE_FLAGS_NEUTRAL):
             # RETRACT takes precedence (GIMBAL_DEVICE_FLAGS).
             mechanics = self.mechanics

@@ -139,7 +139,7 @@ def test_a_client_only_stops_and_releases_the_gimbal_whatever_is_under_way_and_c
 
 
 def follow(rig: ManagerRig, draw: random.Random) -> None:
-    """Make a random demand of a player, or change something else."""
+    """Make a random request of a player, or change something else."""
     player = draw.choice((PILOT, GUEST))
     draw.choice((
         lambda: rig.take(player), lambda: rig.points(player, draw.uniform(-0.4, 0.4)),
