@@ -118,8 +118,7 @@ class MountProperties(GimbalMechanics, simulated.Properties):
     model: str = setting('simulator', 'TEXT', 'model_name', text)
     custom_name: str = setting('', 'TEXT', 'custom_name', text)
     status_interval: float = setting(
-        0.1, 'S', 'time between attitudes; 0 sends them only on request (default: 0.1)',
-        number(0, 3600))
+        0.1, 'S', 'time between attitudes; 0 sends them only on request', number(0, 3600))
 
 
 @dataclass(frozen=True)
@@ -135,8 +134,7 @@ class GimbalProperties(MountProperties):
     behaviour: GimbalBehaviour = GimbalBehaviour()
     drift: float = setting(
         GimbalMechanics.drift, 'DEG_S',
-        'drift of a locked yaw without a heading from the vehicle (default: 0.5)',
-        number(-10, 10))
+        'drift of a locked yaw without a heading from the vehicle', number(-10, 10))
     manager_id: int | None = setting(
         None, 'ID', 'component id of its manager; without it, the first component that announces '
         'itself', integer(1, 255))

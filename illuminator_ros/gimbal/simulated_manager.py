@@ -119,7 +119,7 @@ class ManagerProperties(MountProperties):
         'GLOBAL_POSITION_INT, degrees and m above mean sea level (default: '
         '47.397742,8.545594,488)', geo_point)
     heading: float = setting(
-        0.0, 'DEG', 'of the vehicle until it sends ATTITUDE (default: 0)', number(-180, 360))
+        0.0, 'DEG', 'of the vehicle until it sends ATTITUDE', number(-180, 360))
 
     @property
     def capabilities(self) -> int:

@@ -86,8 +86,7 @@ class GimbalMechanics:
     yaw_range: Range = setting(
         _span('-170,170'), 'MIN,MAX', 'degrees from the front of the vehicle, right is positive; '
         '-180,180 has no stop (default: -170,170)', _span)
-    axis_rate: float = setting(
-        60.0, 'DEG_S', 'highest rate of each axis (default: 60)', number(0.1, 1000))
+    axis_rate: float = setting(60.0, 'DEG_S', 'highest rate of each axis', number(0.1, 1000))
     drift: float = 0.5
     lacks: int = setting(
         0, 'NAME,...', 'GIMBAL_DEVICE_CAP_FLAGS that it does not have, such as has_yaw_lock',

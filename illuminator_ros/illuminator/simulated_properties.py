@@ -119,22 +119,19 @@ class IlluminatorProperties(Properties):
         '', 'TEXT', 'serial_number; several lights append their component id', text,
         distinct=True)
     status_interval: float = setting(
-        1.0, 'S', 'time between statuses; 0 sends them only on request (default: 1)', _period)
-    min_strobe_period: float = setting(
-        0.05, 'S', 'shortest strobe period (default: 0.05)', _period)
-    max_strobe_period: float = setting(10.0, 'S', 'longest strobe period (default: 10)', _period)
+        1.0, 'S', 'time between statuses; 0 sends them only on request', _period)
+    min_strobe_period: float = setting(0.05, 'S', 'shortest strobe period', _period)
+    max_strobe_period: float = setting(10.0, 'S', 'longest strobe period', _period)
     modes: tuple[Mode, ...] = setting(
         tuple(MODES.values()), 'MODE,...',
         f'modes that it can be configured to (default: {",".join(MODES)})', _modes)
     mode_bitmask: int | None = setting(
         None, 'N', 'mode_bitmask, if it does not follow from the modes', _byte)
-    ambient: float = setting(
-        25.0, 'DEG_C', 'ambient temperature (default: 25)', number(-60, 150))
+    ambient: float = setting(25.0, 'DEG_C', 'ambient temperature', number(-60, 150))
     thermal: ThermalProperties = setting(
         ThermalProperties(), 'NAME=VALUE,...', 'thermal model, see below', _thermal, adds=True)
     time_scale: float = setting(
-        1.0, 'X', 'factor by which it heats faster than real time (default: 1)',
-        number(0.001, 10000))
+        1.0, 'X', 'factor by which it heats faster than real time', number(0.001, 10000))
     zoom_level: int | None = setting(
         None, 'N', 'zoom_level, which makes the status one of 38 bytes', _byte)
     color_mode: int | None = setting(None, 'N', 'color_mode, likewise', _byte)

@@ -49,7 +49,13 @@ def setting(
     default: T, metavar: str, help: str, read: Callable[[str], object], *,  # noqa: A002
     adds: bool = False, distinct: bool = False,
 ) -> T:
-    """Return a field of properties that is a setting; see :class:`Setting`."""
+    """
+    Return a field of properties that is a setting; see :class:`Setting`.
+
+    :param default: its value without the setting; the help shows it if it is a float.
+    """
+    if isinstance(default, float):
+        help = f'{help} (default: {default:g})'  # noqa: A001
     return field(default=default, metadata={
         'setting': Setting(metavar, help, read, adds, distinct)})
 

@@ -276,10 +276,10 @@ class RedEdgeProperties(simulated.Properties):
     address: Address = Address(DEFAULT_SYSTEM_ID, mavlink.MAV_COMP_ID_CAMERA)
     behaviour: RedEdgeBehaviour = RedEdgeBehaviour()
     interval: float = setting(
-        0.0, 'S', 'take an image every S seconds (default: 0, none)', _interval)
+        0.0, 'S', 'take an image every S seconds, 0 for none', _interval)
     validity: float = setting(
-        5.0, 'S', 'time for which injected state is used (default: 5; firmware before 1.3.0 had '
-        '30)', number(0.001, 3600))
+        5.0, 'S', 'time for which injected state is used; firmware before 1.3.0 had 30',
+        number(0.001, 3600))
     firmware: rededge.Firmware = setting(
         rededge.PARAMETERS, 'X.Y.Z', 'its software version (default: 7.1.0); it takes images on '
         'DIGICAM_CONTROL from 1.5.5 on, and reports the version from 7.1.0 on',

@@ -39,7 +39,6 @@ from ..options import mavlink_version, signing
 from ..termination import Termination
 from ...mavlink.link import Link
 from ...mavlink.link_thread import LinkThreadError
-from ...mavlink.messages import Address
 from ...mavlink.url import parse_url, Url
 from ...payload.payload_type import PayloadType
 from ...payload.simulated import SimulatedComponents, SimulatedDevice, Snapshot
@@ -73,7 +72,8 @@ class _Simulation:
                 and os.environ.get('TERM') not in DUMB_TERMINALS)
         self._view: PlainView | LiveView = (LiveView if live else PlainView)(sys.stdout)
         self._endpoint: SimulatedComponents[SimulatedDevice] = SimulatedComponents(devices, 0.0)
-        self._endpoint.new_peers.subscribe(self._found)
+        self._endpoint.new_peers.subscribe(
+            lambda address: self._say(f'peer {address}: first message'))
         self._link = Link(url, self._endpoint, label=label, on_event=self._say,
                           signing=signs, store=store,
                           mavlink_version=mavlink_version(
@@ -123,9 +123,6 @@ class _Simulation:
             self._end()
         else:
             self._put((execute(line, self._endpoint.components, now), line))
-
-    def _found(self, address: Address) -> None:
-        self._say(f'peer {address}: first message')
 
     def _say(self, event: object) -> None:
         self._put((str(event), None))
