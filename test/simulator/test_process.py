@@ -102,7 +102,7 @@ def test_a_simulator_on_a_pipe_takes_commands_and_prints_plain_text(url: str) ->
 def test_text_that_the_encoding_lacks_is_escaped_in_output_and_replaced_in_input(
         url: str) -> None:
     ended = run('illuminator_ros.simulator', url, '--light', '1/243=Größe',
-                env={'PYTHONIOENCODING': 'ascii:strict'}, typed='Größe on\nquit\n')
+                env={'PYTHONIOENCODING': 'ascii:strict'}, typed='status\nGröße on\nquit\n')
 
     assert ended.returncode == 0
     assert r'1/243 Gr\xf6\xdfe' in ended.stdout
