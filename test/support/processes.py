@@ -173,6 +173,14 @@ def _can_be_forked(env: Mapping[str, str] | None) -> bool:
     return _python_variables({**os.environ, **(env or {})}) == PYTHON_VARIABLES
 
 
+def is_running(pid: str) -> bool:
+    """Return whether a process has not ended; a zombie has no command line."""
+    try:
+        return bool(Path(f'/proc/{pid}/cmdline').read_text())
+    except OSError:
+        return False
+
+
 def python(module: str, *arguments: str, env: Mapping[str, str] | None = None) -> Program:
     """Start a module of this package."""
     if _can_be_forked(env):

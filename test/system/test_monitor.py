@@ -22,7 +22,7 @@ from typing import Any
 
 import pytest
 from support.light import eventually, free_port, ServedLight
-from support.processes import run
+from support.processes import is_running, run
 from support.ros import Ros, running_bridge
 from support.slow import CLOCK
 from support.terminals import Terminal
@@ -98,6 +98,19 @@ def test_stopped_monitor_restores_the_terminal_until_it_continues(
         screen.type('q')
         assert screen.wait() == 0
         eventually(lambda: screen.restored)
+
+
+def test_signal_ends_a_stopped_monitor_without_the_terminal(own_ros: Ros) -> None:
+    shell = '"$@" & echo pid $!; fg; echo in the shell; kill $!; kill -CONT $!; read line'
+    with Terminal(MONITOR, env=domain(own_ros), shell=shell) as screen:
+        screen.wait_for('no devices in this ROS graph yet')
+        [pid] = re.findall(r'pid (\d+)', screen.raw)
+
+        screen.type('\x1a')
+
+        screen.wait_for('in the shell')
+        eventually(lambda: not is_running(pid))
+        assert screen.restored
 
 
 def test_monitor_ends_with_status_0_when_its_terminal_closes(own_ros: Ros) -> None:

@@ -30,7 +30,7 @@ pytest.importorskip('textual_serve')
 
 from support.browser import Browser, IS_INSTALLED, running_browser  # noqa: E402
 from support.ports import free_port  # noqa: E402
-from support.processes import ended, Program, python, run  # noqa: E402
+from support.processes import ended, is_running, Program, python, run  # noqa: E402
 from support.ros import own_domain  # noqa: E402
 from support.waiting import eventually  # noqa: E402
 
@@ -57,14 +57,6 @@ def urls(server: Program, count: int) -> list[str]:
     """Wait until the server has printed so many URLs, and return them."""
     eventually(lambda: len(re.findall('http://', server.log)) >= count)
     return re.findall(r'http://\S+', server.log)
-
-
-def is_running(pid: str) -> bool:
-    """Return whether a process has not ended; a zombie has no command line."""
-    try:
-        return bool(Path(f'/proc/{pid}/cmdline').read_text())
-    except OSError:
-        return False
 
 
 def status(url: str, **headers: str) -> int:

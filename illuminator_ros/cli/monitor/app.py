@@ -25,7 +25,6 @@ from textual import events
 from textual.app import App, ComposeResult
 from textual.binding import Binding, BindingType
 from textual.content import Content
-from textual.driver import Driver
 from textual.style import Style
 from textual.widgets import Static
 
@@ -86,10 +85,9 @@ class MonitorApp(App[None], inherit_bindings=False):
     BINDINGS: ClassVar[list[BindingType]] = [
         Binding(key, f'press("{key}")', priority=True) for key in ('ctrl+c', 'escape', 'tab')]
 
-    def __init__(self, graph: Graph, *, ascii_only: bool = False,
-                 driver_class: type[Driver] | None = None) -> None:
+    def __init__(self, graph: Graph, *, ascii_only: bool = False) -> None:
         # Without colours textual draws shades of grey, unless colours are those of the terminal.
-        super().__init__(driver_class, ansi_color=True if 'NO_COLOR' in os.environ else None)
+        super().__init__(ansi_color=True if 'NO_COLOR' in os.environ else None)
         self._graph = graph
         self._ascii_only = ascii_only
         self._selected: GraphDevice | None = None
@@ -98,6 +96,9 @@ class MonitorApp(App[None], inherit_bindings=False):
         # Held here, since a poll may come before they are on the screen.
         self._parts = {name: Static(id=name) for name in ('devices', 'details', 'bar')}
         self._shown: dict[str, Content] = {}
+
+    def restore(self) -> None:
+        """Restore the terminal in a hurry; called in another thread if the end hangs."""
 
     def compose(self) -> ComposeResult:
         """See :meth:`App.compose`."""

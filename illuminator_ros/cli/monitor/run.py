@@ -22,7 +22,6 @@ import functools
 import locale
 import os
 import sys
-import termios
 import threading
 import time
 from urllib.parse import urlsplit
@@ -128,12 +127,8 @@ def _watch(graph: Graph, ascii_only: bool, termination: Termination, is_tab: boo
     from .app import MonitorApp
     # Python itself takes UTF-8 for the locale POSIX.
     ascii_only = ascii_only or locale.nl_langinfo(locale.CODESET) != 'UTF-8'
-    app, restore = MonitorApp(graph, ascii_only=ascii_only), None
-    if not is_tab:
-        app = terminal.TerminalApp(graph, ascii_only=ascii_only,
-                                   driver_class=terminal.TerminalDriver)
-        restore = functools.partial(termios.tcsetattr, 0, termios.TCSANOW, termios.tcgetattr(0))
-    termination.calls(functools.partial(app.call_later, app.exit), last=restore)
+    app = (MonitorApp if is_tab else terminal.TerminalApp)(graph, ascii_only=ascii_only)
+    termination.calls(functools.partial(app.call_later, app.exit), last=app.restore)
     with terminal.quiet_errors():
         app.run()
     if is_tab or os.isatty(0):

@@ -22,8 +22,11 @@ import contextlib
 import os
 import signal
 import sys
+import termios
+import time
 from typing import Any
 
+from textual.driver import Driver
 from textual.drivers.linux_driver import LinuxDriver
 
 from .app import MonitorApp
@@ -42,6 +45,10 @@ class TerminalDriver(LinuxDriver):
 
 class TerminalApp(MonitorApp):
     """The monitor on the terminal at stdin."""
+
+    def get_driver_class(self) -> type[Driver]:
+        """See :meth:`App.get_driver_class`."""
+        return TerminalDriver
 
     def on_mount(self) -> None:
         """Take SIGTSTP."""
@@ -62,9 +69,15 @@ class TerminalApp(MonitorApp):
             os.kill(0, signal.SIGTSTP)
             signal.signal(signal.SIGTSTP, handler)
             with contextlib.suppress(OSError):
-                # "bg" continues it without the terminal.
+                # "bg" continues it without the terminal. A signal still ends it.
                 while os.tcgetpgrp(0) != os.getpgrp():
-                    os.kill(os.getpid(), signal.SIGSTOP)
+                    time.sleep(0.1)
+
+    def restore(self) -> None:
+        """See :meth:`MonitorApp.restore`."""
+        if isinstance(self._driver, TerminalDriver) and self._driver.attrs_before is not None and (
+                os.tcgetpgrp(0) == os.getpgrp()):
+            termios.tcsetattr(0, termios.TCSANOW, self._driver.attrs_before)
 
 
 @contextlib.contextmanager
