@@ -281,6 +281,14 @@ def test_a_person_turns_it_and_reads_its_state() -> None:
         turn.do(bench.device, ['-200', '0'], bench.now)
 
 
+def test_each_15_degrees_of_movement_are_worth_a_line() -> None:
+    bench = Bench()
+    bench.point(0.0, -45.0, -30.0)
+    bench.angles(0.5)
+    bench.angles(4.0)
+    assert bench.device.snapshot(bench.now).drift == pytest.approx(75.0 / 15.0)
+
+
 @pytest.mark.parametrize(('name', 'text', 'reason'), [
     ('pitch_range', '-90', 'is not MIN,MAX'), ('yaw_range', '90,-90', 'minimum is above'),
     ('roll_range', '-200,0', 'outside'), ('lacks', 'has_wings', 'is not one of has_retract')])
