@@ -175,7 +175,7 @@ class CameraSession(Session):
                 break
         assert self._first is not None
         if not self._first.taken:
-            if (version := await self._reported_version()) and version >= rededge.CAPTURES:
+            if (version := await self.firmware()) and version >= rededge.CAPTURES:
                 raise Failed(f'confirms no captures, with firmware {version}')
             raise Skipped(f'confirms no captures, as firmware before {rededge.CAPTURES}')
         return self._first
@@ -186,15 +186,13 @@ class CameraSession(Session):
 
         :param since: the firmware from which on it is a failure.
         """
-        version = rededge.CAPTURES if self._first and self._first.taken else None
-        if version is None or version < since:
-            version = await self._reported_version()
+        version = await self.firmware()
         if version and version >= since:
             raise failure
         raise Skipped(f'{failure}, as firmware before {since} may')
 
-    async def _reported_version(self) -> rededge.Firmware | None:
-        """Return the version of the firmware, None if the camera does not report it."""
+    async def firmware(self) -> rededge.Firmware | None:
+        """Return the firmware that the camera reports or at least has, None if it is unknown."""
         for _ in range(0 if self._asked_version else VERSION_ATTEMPTS):
             self.send(rededge.ParamRequestRead(
                 self.device.system, CAMERA_ID, rededge.VERSION_PARAMETER, -1))
@@ -203,7 +201,8 @@ class CameraSession(Session):
             if self._version:
                 break
         self._asked_version = True
-        return self._version
+        has_captures = self._first is not None and self._first.taken
+        return self._version or (rededge.CAPTURES if has_captures else None)
 
     async def image(
         self, shot: int = rededge.Shot.SURVEY, *, component: int = CAMERA_ID,

@@ -226,7 +226,7 @@ class ManagerSession(GimbalSession):
         try:
             if await self.control() != before:
                 await self.configure(*before[0], *before[1])
-            is_back = await self.shown(lambda control: control == before) == before
+            is_back = await self.control() == before
         except Skipped:
             is_back = False
         return differing if is_back else [*differing, 'control']
