@@ -143,12 +143,18 @@ class GimbalSession(Session):
         self._limits: Limits | None = None
 
     def describe(self, message: Message) -> str:
-        """See :class:`Session`; the angles follow a quaternion."""
-        text, q = super().describe(message), getattr(message, 'q', UNSET_QUATERNION)
-        if not all(map(math.isfinite, q)):
-            return text
-        _, pitch, yaw = map(math.degrees, Quaternion(*q).euler())
-        return f'{text}: {Pose(0.0, pitch, yaw)}'
+        """See :class:`Session`; an attitude is shown by its angles."""
+        if not isinstance(message, AttitudeStatus | gimbal.GimbalDeviceSetAttitude
+                          | gimbal.GimbalManagerSetAttitude):
+            return super().describe(message)
+        angles = 'no attitude'
+        if all(map(math.isfinite, message.q)):
+            _, pitch, yaw = map(math.degrees, Quaternion(*message.q).euler())
+            angles = str(Pose(0.0, pitch, yaw))
+        rates = ', '.join(f'{math.degrees(rate):g}' for rate in (
+            message.angular_velocity_y, message.angular_velocity_z))
+        return (f'{message.get_type()} {angles}, rates {rates} deg/s, flags {message.flags}, '
+                f'failures {getattr(message, "failure_flags", 0)}')
 
     # Reports
 
