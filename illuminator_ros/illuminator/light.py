@@ -160,8 +160,7 @@ class Light:
         self._switch.reported(report, now, restarted=restarted)
         self._configuration.reported(
             report, now, can_follow=self._tracker.conflict.can_follow,
-            switched_at=self._switch.switched_at,
-            brightness_is_switch=self._switch.brightness.is_switch)
+            switched_at=self._switch.switched_at)
         self._tracker.checked()
         self._queries.take_status(now)
         # Last, so that a caller has its answer before topics show the change.
@@ -331,7 +330,7 @@ class Light:
         """Forget what would switch the light on, if it was requested before a silence."""
         if self._switch.state.is_silent(now):
             self._switch.keep_off()
-            self._sources.forget_on(brightness_is_switch=self._switch.brightness.is_switch)
+            self._sources.forget_on(brightness_is_switch=self._configuration.brightness.is_switch)
 
     def _change_holder(self, change: HolderChanged[str] | None, now: float) -> None:
         if change is None:
@@ -365,7 +364,7 @@ class Light:
         if desired.enabled is False:
             self._switch.ask(False, now, done, way)
         if desired.brightness is not None and not (
-                desired.enabled is False and self._switch.brightness.is_switch):
+                desired.enabled is False and self._configuration.brightness.is_switch):
             self._configuration.set_brightness(desired.brightness, now)
         if desired.enabled:
             self._switch.ask(True, now, done, way)

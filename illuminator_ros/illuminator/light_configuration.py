@@ -109,6 +109,29 @@ class LimitGuard:
         return self._repeats.take(now)
 
 
+class BrightnessAsSwitch:
+    """
+    Whether a brightness above 0 is the switch of a light (ArduSub).
+
+    :ivar off_brightness: the brightness that the light reports while it is off, None if unknown.
+    :ivar is_switch: whether it was seen to report brightness 0 since it was switched off.
+    """
+
+    def __init__(self) -> None:
+        self.off_brightness: float | None = None
+        self.is_switch = False
+
+    def reported(self, status: Status, *, was_dimmed: bool) -> None:
+        """
+        Take the status of a light that is off.
+
+        :param was_dimmed: whether it was on with a brightness, and no configuration explains the
+            change.
+        """
+        self.off_brightness = status.brightness
+        self.is_switch = self.off_brightness == 0.0 and (self.is_switch or was_dimmed)
+
+
 # The reasons of values in the reconciler; a request has none.
 _REQUIRED, _SETPOINT = 'required values', 'a setpoint'
 
@@ -125,6 +148,7 @@ class LightConfiguration:
     :param must_wait: returns whether no required values may be sent now: the process ends, or an
         OFF is under way and a brightness may be an ON.
     :ivar agreed: the configuration agreed with the light.
+    :ivar brightness: whether its brightness is the switch of the light.
     :ivar guard: how the light exceeds the limits.
     """
 
@@ -134,6 +158,7 @@ class LightConfiguration:
         must_wait: Callable[[], bool] = lambda: False,
     ) -> None:
         self.agreed = AgreedConfiguration(target.address, emit)
+        self.brightness = BrightnessAsSwitch()
         self.guard = LimitGuard(limits, emit, events.LimitExceeded(target.address, (), ''))
         self._address = target.address
         self._emit = emit
@@ -383,7 +408,6 @@ class LightConfiguration:
 
     def reported(
         self, report: StatusReport[Status], now: float, *, can_follow: bool, switched_at: float,
-        brightness_is_switch: bool,
     ) -> None:
         """
         Confirm the request under way, or follow the change of another sender.
@@ -398,14 +422,13 @@ class LightConfiguration:
             return
         reported = status.configuration(self.agreed.confirmed or NOTHING)
         if not was_changing:
-            self._take(report, reported, now, can_follow=can_follow, switched_at=switched_at,
-                       brightness_is_switch=brightness_is_switch)
+            self._take(report, reported, now, can_follow=can_follow, switched_at=switched_at)
         if self.guard.is_limiting:
             self._keep_limits(reported, now)
 
     def _take(
         self, report: StatusReport[Status], reported: Configuration, now: float, *,
-        can_follow: bool, switched_at: float, brightness_is_switch: bool,
+        can_follow: bool, switched_at: float,
     ) -> None:
         status = report.status
         self.agreed.end_discrepancy(reported, status.error_flags)
@@ -424,12 +447,11 @@ class LightConfiguration:
                 self._restored(True, f'{shown.describe(list(required.values))}, {CONFIRMED}')
         elif ((not required.values or required.requirement is Requirement.OVERRIDE)
                 and can_follow and not report.shared_address):
-            self._follow(status, self.agreed.confirmed, reported, now, switched_at=switched_at,
-                         brightness_is_switch=brightness_is_switch)
+            self._follow(status, self.agreed.confirmed, reported, switched_at, now)
 
     def _follow(
-        self, status: Status, confirmed: Configuration, reported: Configuration, now: float, *,
-        switched_at: float, brightness_is_switch: bool,
+        self, status: Status, confirmed: Configuration, reported: Configuration,
+        switched_at: float, now: float,
     ) -> None:
         """Follow the change of another sender, or undo it."""
         names = unexpected_differences(confirmed, reported, status.error_flags, step=False)
@@ -442,7 +464,7 @@ class LightConfiguration:
             cause = events.ChangeCause.REQUEST if own else events.ChangeCause.LIGHT
         # Where brightness is the switch, each command to a light that is off is an ON.
         if not (cause is events.ChangeCause.LIGHT
-                and not (brightness_is_switch and status.enabled is False)
+                and not (self.brightness.is_switch and status.enabled is False)
                 and self._undo_change(status, confirmed, reported, now)):
             self.agreed.follow(reported, names, cause)
 

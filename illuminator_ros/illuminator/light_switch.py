@@ -113,29 +113,6 @@ def _is_off(change: Change[Status]) -> bool:
     return change.params == SWITCHES[False].params
 
 
-class BrightnessAsSwitch:
-    """
-    Whether a brightness above 0 is the switch of a light (ArduSub).
-
-    :ivar off_brightness: the brightness that the light reports while it is off, None if unknown.
-    :ivar is_switch: whether it was seen to report brightness 0 since it was switched off.
-    """
-
-    def __init__(self) -> None:
-        self.off_brightness: float | None = None
-        self.is_switch = False
-
-    def reported(self, status: Status, *, was_dimmed: bool) -> None:
-        """
-        Take the status of a light that is off.
-
-        :param was_dimmed: whether it was on with a brightness, and no configuration explains the
-            change.
-        """
-        self.off_brightness = status.brightness
-        self.is_switch = self.off_brightness == 0.0 and (self.is_switch or was_dimmed)
-
-
 class LightSwitch:
     """
     Switches one light. No I/O; times are s.
@@ -155,7 +132,6 @@ class LightSwitch:
         reassert: bool, earliest_on: Callable[[], float], rules: Sequence[SwitchRule] = RULES,
     ) -> None:
         self.state = SwitchState(off_after_silence)
-        self.brightness = BrightnessAsSwitch()
         self._target = target
         self._emit = emit
         self._configuration = configuration
@@ -261,7 +237,8 @@ class LightSwitch:
                 if self.is_known_off(now):
                     return
                 self._require_off(desired)
-            if self.brightness.is_switch and desired is not self._reconciler.desired:
+            if (self._configuration.brightness.is_switch
+                    and desired is not self._reconciler.desired):
                 # A brightness that is sent later would be an ON.
                 self._configuration.replace('superseded by off', now)
             self._undoes_off = False
@@ -277,7 +254,7 @@ class LightSwitch:
         was_on = sent.before.enabled if sent and sent.before else None
         if result.success:
             state.enabled = self._undoes_off = self._was_on = on
-            if not on and self.brightness.is_switch:
+            if not on and self._configuration.brightness.is_switch:
                 self._configuration.drop_required()
         if result.success or result.refused:
             self._settled_at = now
@@ -362,7 +339,7 @@ class LightSwitch:
         sent, at = self._reconciler.last_sent, -math.inf
         if sent is not None:
             at = sent.at if _is_off(sent.change) else now if self.is_own(True, now) else at
-        if self.brightness.off_brightness == 0.0:
+        if self._configuration.brightness.off_brightness == 0.0:
             at = max(at, self._configuration.sent_at)
         return at
 
@@ -370,14 +347,14 @@ class LightSwitch:
         """Return whether an OFF is under way that a brightness may undo."""
         # A brightness does not switch on a light that has shown one while it was off. Without this
         # exception a light that confirms slowly would not be configured while OFFs are repeated.
-        return (self.brightness.off_brightness in (None, 0.0)
+        return (self._configuration.brightness.off_brightness in (None, 0.0)
                 and self._reconciler.may_set(_is_off))
 
     def is_known_off(self, now: float) -> bool:
         """Return whether the light is off, and no command of ours may still switch it on."""
         return (self.state.enabled is False and not self._newest.is_shared
                 and not self._reconciler.may_set(_is_on) and not self.is_own(True, now)
-                and not (self.brightness.off_brightness == 0.0
+                and not (self._configuration.brightness.off_brightness == 0.0
                          and self._configuration.has_values_to_send))
 
     def is_own(self, on: bool, now: float) -> bool:
@@ -385,7 +362,7 @@ class LightSwitch:
         sent = self._reconciler.last_sent
         return (sent is not None and sent.change == SWITCHES[on] and self._settled_at < sent.at
                 and now <= sent.at + LATE_TIME
-                or self.brightness.off_brightness == 0.0
+                or self._configuration.brightness.off_brightness == 0.0
                 and now <= self._configuration.sent_at + IMPLIED_TIME)
 
     # Reports
@@ -398,7 +375,7 @@ class LightSwitch:
         self._was_on |= bool(enabled)
         if enabled is False:
             confirmed = self._configuration.agreed.confirmed
-            self.brightness.reported(
+            self._configuration.brightness.reported(
                 report.status, was_dimmed=bool(before and confirmed and confirmed.brightness)
                 and not self._configuration.is_changing)
         was_hot, self._was_hot = self._was_hot, bool(

@@ -227,12 +227,11 @@ def test_a_late_copy_of_a_refusal_does_not_refuse_the_next_command(
 ) -> None:
     fake.results[ON_OFF] = mavlink.MAV_RESULT_DENIED
     assert faked.enable(True).message.startswith('refused: MAV_RESULT_DENIED')
-    fake.results[ON_OFF] = mavlink.MAV_RESULT_ACCEPTED
+    # The first statuses contradict.
+    fake.results[ON_OFF], fake.apply_after = mavlink.MAV_RESULT_ACCEPTED, 0.1
     answer = faked.ask_enable(True)
-    faked.near.wire.receive(faked.now)
     faked.controller.receive(
         LIGHT, CommandAck(ON_OFF, mavlink.MAV_RESULT_DENIED, 0, 0, *BRIDGE), faked.now)
-    fake.fields['enable'] = 1
     result = faked.wait_for(answer)
     assert result.success
     assert result.message.startswith(
