@@ -268,6 +268,25 @@ def test_labels_of_keys_are_not_keys_of_others() -> None:
         assert own & ACTIONS.keys() == set()
 
 
+def test_row_of_the_selected_device_alone_is_reversed() -> None:
+    async def test(screen: Screen) -> None:
+        await screen.press('down')
+        reversed_ = [y for y in range(6) if any(
+            one.style is not None and one.style.reverse
+            for one in screen.app.query_one('#devices').render_line(y))]
+        assert [screen.lines[y].split()[0] for y in reversed_] == ['/b']
+
+    show(test, *map(light, ('/a', '/b', '/c')))
+
+
+def test_answers_are_taken_between_the_keys() -> None:
+    async def test(screen: Screen) -> None:
+        while not screen.graph.answers_polled:
+            await screen.settle()
+
+    show(test, light())
+
+
 def test_outcome_of_a_request_has_its_colour() -> None:
     one = light()
     one.action = ('on', DONE, 'confirmed', NOW)

@@ -33,7 +33,7 @@ from support.monitor import gimbal, light
 
 
 class Endpoint:
-    """What the endpoints of a node share; what was sent."""
+    """The common part of clients and publishers, with the messages that were sent."""
 
     def __init__(self, type_: Any = None) -> None:
         self.srv_type = type_

@@ -160,8 +160,9 @@ class FakeBridge:
 def test_device_that_leaves_is_gone_can_be_cleared_and_can_return(
     own_ros: Ros, monitor: Watching,
 ) -> None:
-    first = FakeBridge(own_ros, '/one')
     FakeBridge(own_ros, '/two')
+    eventually(lambda: monitor.names == ['/two'])
+    first = FakeBridge(own_ros, '/one')
     eventually(lambda: monitor.names == ['/one', '/two'])
 
     first.destroy()

@@ -90,6 +90,7 @@ class FakeGraph:
         self.devices = list(devices)
         self.requests: list[tuple[str, Request]] = []
         self.cleared = 0
+        self.answers_polled = 0
 
     def clock(self) -> float:
         """Return the time, s."""
@@ -109,7 +110,8 @@ class FakeGraph:
             one.sent = self.requests
 
     def poll_answers(self) -> None:
-        """Do nothing."""
+        """Count the calls."""
+        self.answers_polled += 1
 
     @property
     def asked(self) -> list[tuple[str, str]]:

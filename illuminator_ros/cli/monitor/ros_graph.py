@@ -279,7 +279,7 @@ class Graph:
 
 
 def _taken(subscription: Subscription, limit: int = 1) -> Iterator[Any]:
-    """Return messages that have come, without those that are too large or broken."""
+    """Return messages that have come; skip large and broken ones."""
     for _ in range(limit):
         if (taken := subscription.handle.take_message(subscription.msg_type, True)) is None:
             return

@@ -114,7 +114,7 @@ async def _serve(host: str, port: int, gate: Gate, termination: Termination) -> 
     ended = asyncio.Event()
     termination.calls(functools.partial(
         asyncio.get_running_loop().call_soon_threadsafe, ended.set))
-    # A tab ends with the server, even if that is killed.
+    # A tab ends with the server, even if that is killed; setpriv is of util-linux.
     server = Server(f'exec setpriv --pdeathsig TERM {shlex.join(sys.orig_argv)}')
     app = web.Application(middlewares=[gate.check])
     app.add_routes([web.get('/', _page), web.get('/ws', server.handle_websocket),
