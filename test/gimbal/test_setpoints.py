@@ -145,6 +145,13 @@ def turn(rig: Rig) -> None:
     assert rig.gimbal.set_rates((0.0, 0.0, 0.2), rig.now) == ''
 
 
+def turn_and_release(rig: Rig) -> None:
+    turn(rig)
+    rig.gimbal.release_control(rig.now, rig.done)
+    rig.run(1.0)
+    assert rig.results[0].success
+
+
 def send_attitude(rig: Rig, lock: bool = False) -> None:
     rig.gimbal.set_attitude(Quaternion(), EARTH if lock else VEHICLE, rig.now)
 
@@ -245,21 +252,23 @@ def test_only_a_zero_of_a_rate_is_sent_when_a_closed_link_is_open_and_shows_cont
     assert [one.angular_velocity_z for _, one in setpoints(rig)[before:]] == sent
 
 
-@pytest.mark.parametrize(('start', 'turns', 'zeros'), [
-    (turn, True, len(REPEATS)), (turn, False, 0), (send_attitude, True, 0)])
+@pytest.mark.parametrize(('start', 'sent', 'turns', 'zeros'), [
+    (turn, 1, True, len(REPEATS)), (turn, 1, False, 0), (send_attitude, 1, True, 0),
+    # The zero before a release was acknowledged.
+    (turn_and_release, 2, True, 0)])
 def test_a_rate_that_another_player_has_ended_gets_its_zero_if_it_lasts_until_control_is_back(
-        start: Callable[[Rig], object], turns: bool, zeros: int) -> None:
+        start: Callable[[Rig], object], sent: int, turns: bool, zeros: int) -> None:
     rig = in_control()
     start(rig)
     rig.managers[0].primary = OTHER
     rig.run(3.0)
-    assert len(setpoints(rig)) == 1
+    assert len(setpoints(rig)) == sent
 
     rig.managers[0].rates = (0.0, 0.0, -0.2 * turns)
     rig.managers[0].primary = OURS
     rig.run(3.0)
 
-    assert [one.angular_velocity_z for _, one in setpoints(rig)[1:]] == [0.0] * zeros
+    assert [one.angular_velocity_z for _, one in setpoints(rig)[sent:]] == [0.0] * zeros
 
 
 @pytest.mark.parametrize(('turns', 'zeros'), [(True, len(REPEATS)), (False, 0)])
