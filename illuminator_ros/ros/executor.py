@@ -90,7 +90,6 @@ class NodeExecutor(SingleThreadedExecutor):
     def __init__(self, context: Context, log: NodeLog) -> None:
         self._wakeup = GuardCondition(None, None, context)
         self._stale = threading.Event()
-        self._stale.set()
         super().__init__(context=context)
         self._log = log
         self._wait_set: _WaitSet | None = None
