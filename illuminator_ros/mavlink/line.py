@@ -32,7 +32,6 @@ from .frame import Frame
 from .link_state import LinkInput, LinkSnapshot, LinkState, LinkStatus
 from .messages import Address
 from .receiver import ReceivedFrame, Receiver
-from .signing import SigningCounters
 from .transport import Channel, Peer
 from .url import Url
 
@@ -118,17 +117,14 @@ class Line:
         """Open nothing any more; callable from any thread."""
         self._connector.stop()
 
-    def snapshot(self, now: float, signing: SigningCounters) -> LinkSnapshot:
-        """
-        Return the line at this moment.
-
-        :param signing: the counters of all lines.
-        """
+    def snapshot(self, now: float) -> LinkSnapshot:
+        """Return the line at this moment; the counters of signing are of all lines."""
         status, receiver, channel = self.status, self.receiver, self._channel
         return LinkSnapshot(
             status.state, status.since, channel.name if channel else status.label,
             status.reason, status.openings, receiver.routes.peer_count(now),
-            receiver.traffic.snapshot(now), copy.copy(receiver.counters), copy.copy(signing),
+            receiver.traffic.snapshot(now), copy.copy(receiver.counters),
+            copy.copy(receiver.signing.counters),
             self._forwarded,
             self._not_forwarded + channel.not_forwarded if channel else self._not_forwarded)
 

@@ -25,13 +25,13 @@ from .component import Endpoint
 from .dialect import decode, line_of
 from .duplicate_filter import DuplicateFilter
 from .fault_log import FaultLog
-from .frame import Frame, MAX_ID_V1
+from .frame import MAX_ID_V1
 from .frame_writer import FrameWriter
 from .line import ANNOUNCE_INTERVAL, Line, LineUser, SILENCE
 from .link_state import LinkSnapshot
 from .messages import Address
 from .receiver import ReceivedFrame, Receiver
-from .routing_table import Peers, Router
+from .routing_table import grouped, Router
 from .sender import Sender
 from .signing import Signing
 from .statistics import RECENT, SequenceCounter
@@ -69,7 +69,6 @@ class Lines(LineUser):
         self._classes = {cls.id: cls for cls in endpoint.messages}
         self._faults = faults
         self._clock = clock
-        self._signing = signing
         self._version = mavlink_version
         self._duplicates = DuplicateFilter() if len(urls) > 1 else None
         self._heard_at = -math.inf
@@ -92,7 +91,7 @@ class Lines(LineUser):
 
     def snapshots(self, now: float) -> tuple[LinkSnapshot, ...]:
         """Return each line at this moment."""
-        return tuple(line.snapshot(now, self._signing.counters) for line in self._lines)
+        return tuple(line.snapshot(now) for line in self._lines)
 
     def copies(self, now: float) -> Mapping[tuple[int, int], int]:
         """
@@ -210,20 +209,9 @@ class Lines(LineUser):
                  for other in self._lines]
         if not any(peers):
             return
-        # Frames for the same peers are sent together: each receiver is then woken only once.
-        held: list[Frame] = []
-        towards: Peers = ()
-        for frame, _ in frames:
-            if frame.version <= self._version:
-                found = self._router.targets(frame, peers, now)
-                if held and found != towards:
-                    self._forward_to(held, towards, now)
-                    held = []
-                towards = found
-                held.append(frame)
-        self._forward_to(held, towards, now)
-
-    def _forward_to(self, frames: Sequence[Frame], towards: Peers, now: float) -> None:
-        for line, peers in zip(self._lines, towards, strict=False):
-            if peers and frames:
-                line.forward(frames, peers, now)
+        known = (frame for frame, _ in frames if frame.version <= self._version)
+        for towards, some in grouped(
+                (self._router.targets(frame, peers, now), frame) for frame in known):
+            for other, receivers in zip(self._lines, towards, strict=False):
+                if receivers:
+                    other.forward(some, receivers, now)

@@ -27,7 +27,6 @@ from .fault_log import FaultLog
 from .lines import Lines
 from .link_state import LinkEvent, LinkInput, LinkSnapshot
 from .link_thread import LinkThread
-from .messages import Address
 from .signing import Signing
 from .signing_files import TimestampStore
 from .url import Url
@@ -51,6 +50,7 @@ class Link:
     :param clock: s, monotonic.
     :param wall_clock: s, Unix time, for the signing time stamps.
     :param selector: waits for the transport.
+    :ivar lines: for use in the link's thread.
     :raises ValueError: if MAVLink 1 cannot carry a message of the endpoint, or must be signed.
     """
 
@@ -74,7 +74,7 @@ class Link:
         self._faults = FaultLog(clock)
         self._thread = LinkThread(
             label, self._work, self._finish, self._faults, clock, selector)
-        self._lines = Lines(
+        self.lines = Lines(
             [(label, url), *further.items()], endpoint, faults=self._faults,
             selector=self._thread.selector, call=self._thread.call, signing=self._signing,
             mavlink_version=mavlink_version, clock=clock, wall_clock=wall_clock)
@@ -96,7 +96,7 @@ class Link:
         :param timeout: how long to wait for the thread, s.
         """
         # A channel that was just handed over is among the calls, which the thread still takes.
-        for line in self._lines:
+        for line in self.lines:
             line.stop()
         self._thread.stop(timeout)
 
@@ -116,53 +116,37 @@ class Link:
 
     def snapshot(self, now: float) -> LinkSnapshot:
         """Return the first line at this moment."""
-        return self.snapshots(now)[0]
-
-    def snapshots(self, now: float) -> tuple[LinkSnapshot, ...]:
-        """Return each line at this moment."""
-        return self._lines.snapshots(now)
-
-    def copies(self, now: float) -> Mapping[tuple[int, int], int]:
-        """See :meth:`Lines.copies`."""
-        return self._lines.copies(now)
-
-    def peer_count_of(self, source: Address, now: float) -> int:
-        """See :meth:`Lines.peer_count_of`."""
-        return self._lines.peer_count_of(source, now)
-
-    def reset_loss(self, source: Address) -> None:
-        """Forget recent losses of a component: its sequence numbers have restarted."""
-        self._lines.reset_loss(source)
+        return self.lines.snapshots(now)[0]
 
     def _work(self) -> float:
         now = self.clock()
-        self._lines.flush()
+        self.lines.flush()
         due = self._next_deadline()
         if self.clock() >= due:
             self._poll()
             due = self._next_deadline()
-        self._thread.pause(self._lines.pause(now))
+        self._thread.pause(self.lines.pause(now))
         return due
 
     def _next_deadline(self) -> float:
-        return min(self.endpoint.next_deadline(), self._lines.next_deadline(), self._store_due)
+        return min(self.endpoint.next_deadline(), self.lines.next_deadline(), self._store_due)
 
     def _poll(self) -> None:
         """Do what is due."""
-        self._lines.poll(self.clock())
+        self.lines.poll(self.clock())
         self._faults.call(self.endpoint.poll, self.clock())
-        self._lines.flush()
+        self.lines.flush()
         now = self.clock()
         if now >= self._store_due:
             self._store_due = now + STORE_INTERVAL
             self._store_timestamp(last=False)
-        for line in self._lines:
+        for line in self.lines:
             while event := line.status.event(now):
                 self._faults.call(self._on_event, event)
 
     def _finish(self) -> None:
         self._store_timestamp(last=True)
-        for line in self._lines:
+        for line in self.lines:
             line.close()
             line.status.take(LinkInput.STOPPED, self.clock())
 

@@ -12,16 +12,17 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""The receiving side of a line: accepted frames, the routes that they show, and statistics."""
+"""The receiving side of a line: frames of many peers, authenticated, routed and counted."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Collection, Iterable
 import math
+from typing import NamedTuple
 
+from .dialect import CRC_EXTRA
 from .duplicate_filter import DuplicateFilter
-from .frame import DecoderCounters, ForeignFrames, Frame
-from .frame_reader import FrameReader
+from .frame import Decoder, DecoderCounters, ForeignFrames, Frame
 from .frame_writer import FrameWriter
 from .messages import Address
 from .routing_table import RoutingTable
@@ -29,6 +30,11 @@ from .signing import Signing
 from .statistics import SequenceCounter, Traffic
 from .transport import Peer
 
+# Peers whose incomplete frames are kept apart.
+MAX_DECODERS = 64
+# s; the longest frame takes 0.3 s at 9600 baud. An older beginning of a frame is noise, which
+# delays the valid frames after it.
+STALL = 0.5
 # To wake the loop costs as much as ten foreign frames. Where more than BATCH_THRESHOLD come per
 # second, the loop pauses for BATCH_TIME s, or until BATCH_SIZE are expected; a UDP socket has room
 # for 250.
@@ -40,19 +46,43 @@ BATCH_SIZE = 128
 ReceivedFrame = tuple[Frame, int]
 
 
+class _Wait(NamedTuple):
+    """The wait for the rest of a frame: its position, the bytes taken by then, the time (s)."""
+
+    start: int
+    taken: int
+    since: float
+
+
+class _Stream:
+    """The bytes of one peer."""
+
+    def __init__(self, counters: DecoderCounters) -> None:
+        self.decoder = Decoder(counters=counters)
+        # Whether a frame of another component was ever accepted.
+        self.good = False
+
+
 class Receiver:
     """
     Accepts frames of other components, except those of ours that have returned.
 
-    :param handled: see :class:`~.frame_reader.FrameReader`.
+    pymavlink has one parser for all peers of a port, so a piece of a frame from one peer spoils
+    the frames of another, and no limit on the wait for the rest of a frame.
+
+    :param handled: ids of the messages that are read; frames of others are only counted, unless
+        their signatures matter.
     :param writer: has written our frames.
+    :param wall_clock: s, Unix time, for the signing time stamps.
     :param sources: see :class:`~.statistics.Traffic`.
     :param duplicates: the frames that any of several lines has accepted, None if there is one
-        line. A copy of one of these shows a route, but is not returned.
+        line. A copy of one of these shows a route, but is not returned. Frames of messages that
+        are not handled are then returned, and not only counted.
     :param line: the index of the line.
     :ivar traffic: of the line; the sending side counts here, too.
     :ivar routes: the peers over which components were heard.
-    :ivar waits: see :class:`~.frame_reader.FrameReader`.
+    :ivar counters: totals over all peers since it was made.
+    :ivar waits: the waits for rests of frames, by peer.
     :ivar leads_to: see :meth:`~.transport.base.Channel.leads_to`.
     """
 
@@ -63,21 +93,25 @@ class Receiver:
     ) -> None:
         self.traffic = Traffic(sources=sources)
         self.routes = RoutingTable()
+        self.counters = DecoderCounters()
+        self.waits: dict[Peer, _Wait] = {}
         self.leads_to: Callable[[Peer], Peer] = lambda peer: peer
-        self._reader = FrameReader(signing, handled, duplicates)
-        self.waits = self._reader.waits
+        self.signing = signing
+        self._signing_is_off = not signing.signs
         self._writer = writer
         self._duplicates = duplicates
         self._line = line
         self._wall_clock = wall_clock
-        # Foreign frames at the last pause, and the time of that.
-        self._foreign = 0
-        self._foreign_at = -math.inf
+        # Making a Frame of each foreign frame takes twice the time on a busy link.
+        self._foreign = {} if not self._signing_is_off or duplicates is not None else {
+            id_: bytes((crc_extra,)) for id_, crc_extra in CRC_EXTRA.items() if id_ not in handled}
+        self._streams: dict[Peer, _Stream] = {}
+        # The time of the last pause, s, and the foreign frames until then.
+        self._paused = (-math.inf, 0)
 
-    @property
-    def counters(self) -> DecoderCounters:
-        """See :class:`~.frame_reader.FrameReader`."""
-        return self._reader.counters
+    def __len__(self) -> int:
+        """Return the number of peers whose bytes are kept apart."""
+        return len(self._streams)
 
     def take(self, peer: Peer, data: bytes, now: float) -> list[ReceivedFrame] | None:
         """
@@ -86,52 +120,103 @@ class Receiver:
         :return: None if no frame was accepted, foreign frames included.
         """
         self.traffic.bytes_received += len(data)
-        return self._accept(peer, self._reader.take(peer, data, now, self._wall_clock()), now)
+        stream = self._streams.get(peer)
+        if stream is None:
+            stream = self._new_stream(peer)
+        frames = stream.decoder.sort(data, self._foreign)
+        if stream.decoder.rest or self.waits:
+            self._watch(peer, stream.decoder, now)
+        return self._accept(peer, stream, frames, now)
 
     def give_up(self, now: float) -> list[tuple[Peer, list[ReceivedFrame]]]:
-        """Return the frames behind beginnings of frames that are too old, by peer."""
-        return [(peer, accepted) for peer, frame in self._reader.give_up(now, self._wall_clock())
-                if (accepted := self._accept(peer, [frame], now)) is not None]
+        """
+        Return the frames behind beginnings of frames that are older than :data:`STALL`, by peer.
+
+        Later bytes may be the beginning of a valid frame, and are kept.
+        """
+        if now < self.next_deadline():
+            return []
+        found = []
+        for peer, wait in list(self.waits.items()):
+            if now >= wait.since + STALL:
+                stream = self._streams[peer]
+                frames = stream.decoder.give_up(wait.taken)
+                self._watch(peer, stream.decoder, now)
+                accepted = self._accept(peer, stream, frames, now)
+                if accepted is not None:
+                    found.append((peer, accepted))
+        return found
 
     def next_deadline(self) -> float:
         """Return when :meth:`give_up` has something to do, infinity if never."""
-        return self._reader.next_deadline()
+        if not self.waits:
+            return math.inf
+        return min(wait.since for wait in self.waits.values()) + STALL
 
     def pause(self, now: float) -> float:
         """Return for how long to let foreign frames collect before the next read, s."""
-        count, gap = self.counters.foreign - self._foreign, now - self._foreign_at
+        at, before = self._paused
+        count, gap = self.counters.foreign - before, now - at
         if not count:
             return 0.0
-        self._foreign, self._foreign_at = self.counters.foreign, now
+        self._paused = now, self.counters.foreign
         return min(BATCH_TIME, BATCH_SIZE * gap / count) if count > BATCH_THRESHOLD * gap else 0.0
 
     def clear(self) -> None:
-        """Forget the peers: the channel is closed."""
-        self._reader.clear()
+        """Forget the peers and incomplete frames: the channel is closed."""
+        self._streams.clear()
+        self.waits.clear()
         self.routes.clear()
 
+    def _new_stream(self, peer: Peer) -> _Stream:
+        if len(self._streams) >= MAX_DECODERS:
+            # Garbage from ever new ports must not displace peers that send valid frames.
+            oldest = next((old for old, stream in self._streams.items() if not stream.good),
+                          next(iter(self._streams)))
+            del self._streams[oldest]
+            self.waits.pop(oldest, None)
+        self._streams[peer] = stream = _Stream(self.counters)
+        return stream
+
+    def _watch(self, peer: Peer, decoder: Decoder, now: float) -> None:
+        start = decoder.incomplete
+        if start is None:
+            self.waits.pop(peer, None)
+        elif peer not in self.waits or self.waits[peer].start != start:
+            self.waits[peer] = _Wait(start, decoder.taken, now)
+
     def _accept(
-        self, peer: Peer, frames: Iterable[Frame | ForeignFrames], now: float,
+        self, peer: Peer, stream: _Stream, frames: Iterable[Frame | ForeignFrames], now: float,
     ) -> list[ReceivedFrame] | None:
         accepted: list[ReceivedFrame] = []
         heard = set()
-        duplicates = self._duplicates
+        own, duplicates = self._writer.sequences, self._duplicates
+        # An unsigned frame is accepted where signing is off; this test saves a call.
+        trusted = self._signing_is_off
         for frame in frames:
             if isinstance(frame, ForeignFrames):
                 # Frames from our own address have returned, or show an address conflict.
-                if frame.source in self._writer.sequences:
+                if frame.source in own:
                     continue
                 self.traffic.count_run(frame.source, frame.sequences)
-            elif frame.source in self._writer.sequences and self._writer.is_loopback(frame, now):
+            elif not (trusted and frame.signature is None or self._is_authentic(frame, now)) or (
+                    frame.source in own and self._writer.is_loopback(frame, now)):
                 continue
+            elif duplicates is not None and duplicates.is_copy(frame, self._line, now):
+                # Its sequence number, if late, would look like that of another sender.
+                self.traffic.frames_received += 1
             else:
-                if duplicates is not None and duplicates.is_copy(frame, self._line, now):
-                    # Its sequence number, if late, would look like that of another sender.
-                    self.traffic.frames_received += 1
-                else:
-                    accepted.append((frame, self.traffic.count(frame)))
+                accepted.append((frame, self.traffic.count(frame)))
             heard.add(frame.source)
+        if not heard:
+            return None
+        stream.good = True
         neighbour = self.leads_to(peer)
         for source in heard:
             self.routes.heard(source, neighbour, now)
-        return accepted if heard else None
+        return accepted
+
+    def _is_authentic(self, frame: Frame, now: float) -> bool:
+        # A copy of an accepted frame is not a replay.
+        return (self._duplicates is not None and self._duplicates.has(frame, now)
+                or self.signing.accepts(frame, self._wall_clock()))

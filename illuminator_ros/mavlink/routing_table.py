@@ -16,8 +16,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Container, Sequence
+from collections.abc import Container, Iterable, Iterator, Sequence
+import itertools
 import math
+from operator import itemgetter
+from typing import TypeVar
 
 from .frame import Frame
 from .message_traits import NEVER_FORWARDED, target_of
@@ -126,6 +129,17 @@ class RoutingTable:
 
 # The peers of each line, by its index.
 Peers = Sequence[Sequence[Peer]]
+T = TypeVar('T')
+
+
+def grouped(frames: Iterable[tuple[Peers, T]]) -> Iterator[tuple[Peers, list[T]]]:
+    """
+    Return consecutive frames for the same peers together.
+
+    They are sent together, so that each receiver is woken only once.
+    """
+    for peers, group in itertools.groupby(frames, key=itemgetter(0)):
+        yield peers, [frame for _, frame in group]
 
 
 class Router:

@@ -16,7 +16,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 import logging
 import math
 import struct
@@ -27,7 +27,7 @@ from .fault_log import FaultLog
 from .frame_writer import FrameWriter
 from .line import Line
 from .messages import Address, Heartbeat, Message, target_of
-from .routing_table import Peers, Router
+from .routing_table import grouped, Peers, Router
 
 # s for which the line may still be busy when the next group of a stream is written, so that it has
 # no gaps. The most urgent group may wait behind one more in the line.
@@ -98,33 +98,27 @@ class Sender:
 
     def _send_now(self, messages: Sequence[tuple[Address, Message]], now: float) -> None:
         everywhere = [tuple(line.peers(now)) for line in self._lines]
-        # Frames for the same peers are sent together: each receiver is then woken only once.
-        frames: list[bytes] = []
-        peers: Peers = ()
+        for towards, frames in grouped(self._frames(messages, everywhere, now)):
+            for line, peers in zip(self._lines, towards, strict=True):
+                if peers:
+                    line.write(frames, peers, now)
+
+    def _frames(
+        self, messages: Iterable[tuple[Address, Message]], everywhere: Peers, now: float,
+    ) -> Iterator[tuple[Peers, bytes]]:
+        """Return the frames of messages, with the peers that lead to their targets."""
         for source, message in messages:
             target = target_of(message)
             if target.system:
                 self.answer_expected_until = now + ANSWER_TIME
-            towards = self._router.towards(target, everywhere, now)
-            if frames and towards != peers:
-                self._write(frames, peers, now)
-                frames = []
-            peers = towards
             try:
                 frame = self._writer.frame(source, message, now, self._wall_clock())
             except (ValueError, OverflowError, struct.error):
                 self._faults.log()
                 continue
-            frames.append(frame)
             if isinstance(message, Heartbeat):
                 self.heartbeats[source] = frame
             if _frame_log.isEnabledFor(logging.DEBUG):
                 _frame_log.debug('sent from %s: %s', source, line_of(message),
                                  extra={'address': target})
-        if frames:
-            self._write(frames, peers, now)
-
-    def _write(self, frames: Sequence[bytes], peers: Peers, now: float) -> None:
-        for line, some in zip(self._lines, peers, strict=True):
-            if some:
-                line.write(frames, some, now)
+            yield self._router.towards(target, everywhere, now), frame

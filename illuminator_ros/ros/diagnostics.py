@@ -193,8 +193,8 @@ def link_diagnostics(
 
     :param urls: of its lines.
     """
-    lines = link.snapshots(now)
-    commands, copies = component.commands, link.copies(now)
+    lines = link.lines.snapshots(now)
+    commands, copies = component.commands, link.lines.copies(now)
     devices: dict[Address, Mapping[str, Value]] = {}
     for address, counter in lines[0].traffic.sources.items():
         trip = commands.round_trip(address)

@@ -87,7 +87,7 @@ class DiagnosticsPublisher:
 
     def loops(self, now: float) -> Iterable[str]:
         """Return the loops between lines, for people; call it in the link's thread."""
-        return loops(self._link.copies(now), self._urls).values()
+        return loops(self._link.lines.copies(now), self._urls).values()
 
     def poll(self, tolerance: float) -> None:
         """

@@ -76,10 +76,10 @@ def test_where_signing_is_required_an_unsigned_or_forged_configure_changes_nothi
 def test_without_signing_a_forged_address_is_seen_as_a_second_way_to_the_player() -> None:
     rig = Rig(SigningMode.OFF)
     rig.send(rig.good, PILOT, configure(*PILOT))
-    assert rig.link.peer_count_of(PILOT, rig.link.now) == 1
+    assert rig.link.lines.peer_count_of(PILOT, rig.link.now) == 1
 
     rig.send(Codec(), PILOT, heartbeat(6), EVIL)
 
-    assert rig.link.peer_count_of(PILOT, rig.link.now) == 2
+    assert rig.link.lines.peer_count_of(PILOT, rig.link.now) == 2
     rig.link.run(11.0)
-    assert rig.link.peer_count_of(PILOT, rig.link.now) == 0
+    assert rig.link.lines.peer_count_of(PILOT, rig.link.now) == 0

@@ -95,7 +95,9 @@ def test_each_further_line_has_a_status_and_a_loop_is_a_warning_that_names_both_
     one = reported.link.state()
     lost = one._replace(state=LinkState.LOST, reason='the device has gone', forwarded=7,
                         not_forwarded={30: 2, 36: 5, 8: 1})
-    link = Mock(snapshots=lambda now: (one, lost, one), copies=lambda now: {(0, 2): 3, (2, 2): 1})
+    link = Mock()
+    link.lines.snapshots.return_value = one, lost, one
+    link.lines.copies.return_value = {(0, 2): 3, (2, 2): 1}
     urls = ['udpin://', 'serial:///dev/light:57600', 'tcp://router:5760']
     second, third = (report.message('/illuminator') for report in line_reports(
         link_diagnostics(link, reported.client, urls, reported.link.now)))

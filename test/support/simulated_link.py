@@ -111,9 +111,9 @@ class SimulatedLink(Link):
         super().__init__(URL, endpoint, label='simulated', clock=lambda: self.now,
                          wall_clock=lambda: 1.7e9 + self.now, signing=signing,
                          mavlink_version=mavlink_version, selector=_Selector(self))
-        line = next(iter(self._lines))
+        line = next(iter(self.lines))
         line._connect_at = math.inf
-        self._lines._sender._writer.sequences = _FromZero()
+        self.lines._sender._writer.sequences = _FromZero()
         self._faults.log = self.log_fault  # type: ignore[method-assign]
         self.socket = _Socket(take)
         self.udp = UdpChannel(URL)

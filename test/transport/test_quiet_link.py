@@ -21,8 +21,8 @@ import socket
 
 from illuminator_ros.mavlink import component
 from illuminator_ros.mavlink.fault_log import FAULT_PAUSE
-from illuminator_ros.mavlink.frame_reader import STALL
 from illuminator_ros.mavlink.messages import Address
+from illuminator_ros.mavlink.receiver import STALL
 from illuminator_ros.mavlink.transport.udp import PEER_EXPIRY
 import pytest
 from support.frames import heartbeat_frame, raw_v2

@@ -245,7 +245,7 @@ class ManagerNode(ServedPayload):
 
     def _take_snapshot(self, now: float) -> MakeReports:
         holder = self._manager.control.holder(Role.PRIMARY)
-        peers = self._host.link.peer_count_of(holder, now) if holder else 0
+        peers = self._host.link.lines.peer_count_of(holder, now) if holder else 0
         return functools.partial(_reports, findings=findings(self._manager, peers), values=_values(
             self._manager, now))
 

@@ -91,7 +91,7 @@ class Lights(ServedPayload):
         elif node is not None:
             if isinstance(event, events.LightRestarted):
                 # Its sequence numbers have restarted, which is not a loss.
-                self._host.link.reset_loss(event.address)
+                self._host.link.lines.reset_loss(event.address)
             node.take(event)
         elif isinstance(event, events.LightConnected | events.StatusReceived):
             self._serve(event.address)

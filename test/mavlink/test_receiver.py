@@ -16,13 +16,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 import math
 
 from illuminator_ros.mavlink.dialect import CRC_EXTRA
-from illuminator_ros.mavlink.frame import ForeignFrames, Frame
-from illuminator_ros.mavlink.frame_reader import FrameReader, MAX_DECODERS, STALL
+from illuminator_ros.mavlink.frame_writer import FrameWriter
 from illuminator_ros.mavlink.messages import Address
+from illuminator_ros.mavlink.receiver import MAX_DECODERS, ReceivedFrame, Receiver, STALL
 from illuminator_ros.mavlink.signing import Signing, SigningMode
 import pytest
 from support.frames import frame_of, heartbeat_frame, LIGHT, raw_v1
@@ -33,84 +32,88 @@ FRAME = heartbeat_frame()
 FALSE_STARTS = [b'\xfe\xfa\x00\x01\x01\x6e', b'\xfd\xfa\x00\x00\x00\x01\x01\x6e\x00\x00']
 
 
+def make(signing: Signing) -> Receiver:
+    return Receiver(signing, CRC_EXTRA, FrameWriter(signing), lambda: UNIX, {})
+
+
 @pytest.fixture
-def receiver() -> FrameReader:
-    return FrameReader(Signing(), CRC_EXTRA)
+def receiver() -> Receiver:
+    return make(Signing())
 
 
-def sources(frames: Sequence[Frame | ForeignFrames]) -> list[Address]:
-    return [frame.source for frame in frames]
+def sources(frames: list[ReceivedFrame] | None) -> list[Address]:
+    return [frame.source for frame, _ in frames or ()]
 
 
-def test_pieces_are_put_together_for_each_peer_and_counted_over_all(receiver: FrameReader) -> None:
+def test_pieces_are_put_together_for_each_peer_and_counted_over_all(receiver: Receiver) -> None:
     frames = {peer: heartbeat_frame(Address(1, peer)) for peer in (1, 2)}
     for peer, frame in frames.items():
-        assert receiver.take(peer, frame[:9], 0.0, UNIX) == []
+        assert receiver.take(peer, frame[:9], 0.0) is None
     for peer, frame in frames.items():
-        assert sources(receiver.take(peer, frame[9:], 0.1, UNIX)) == [Address(1, peer)]
+        assert sources(receiver.take(peer, frame[9:], 0.1)) == [Address(1, peer)]
     assert receiver.counters.frames == 2
 
 
 @pytest.mark.parametrize('noise', [*FALSE_STARTS, b''.join(FALSE_STARTS * 5)])
 def test_good_frame_behind_false_starts_comes_after_the_stall_time_without_more_bytes(
-        receiver: FrameReader, noise: bytes) -> None:
-    assert receiver.take('a', noise + FRAME, 0.0, UNIX) == []
+        receiver: Receiver, noise: bytes) -> None:
+    assert receiver.take('a', noise + FRAME, 0.0) is None
     assert receiver.next_deadline() == STALL
-    assert receiver.give_up(STALL - 0.01, UNIX) == []
-    assert [(peer, frame.source) for peer, frame in receiver.give_up(STALL, UNIX)] == [
-        ('a', LIGHT)]
+    assert receiver.give_up(STALL - 0.01) == []
+    assert [(peer, sources(frames)) for peer, frames in receiver.give_up(STALL)] == [
+        ('a', [LIGHT])]
     assert receiver.next_deadline() == math.inf
 
 
-def test_frame_that_began_behind_a_false_start_is_still_awaited(receiver: FrameReader) -> None:
-    receiver.take('a', FALSE_STARTS[0], 0.0, UNIX)
-    receiver.take('a', FRAME[:9], 0.4, UNIX)
+def test_frame_that_began_behind_a_false_start_is_still_awaited(receiver: Receiver) -> None:
+    receiver.take('a', FALSE_STARTS[0], 0.0)
+    receiver.take('a', FRAME[:9], 0.4)
     assert receiver.next_deadline() == STALL
-    assert receiver.give_up(STALL, UNIX) == []
-    assert sources(receiver.take('a', FRAME[9:], STALL + 0.1, UNIX)) == [LIGHT]
+    assert receiver.give_up(STALL) == []
+    assert sources(receiver.take('a', FRAME[9:], STALL + 0.1)) == [LIGHT]
 
 
 def test_signed_frames_pass_and_are_counted_where_signing_is_off() -> None:
     frame = Signing(SigningMode.SIGN, bytes(32)).sign(frame_of(signed=True), UNIX)
     signing = Signing()
-    frames = FrameReader(signing, CRC_EXTRA).take('a', FRAME + frame, 0.0, UNIX)
+    frames = make(signing).take('a', FRAME + frame, 0.0)
     assert (sources(frames), signing.counters.unchecked) == ([LIGHT] * 2, 1)
 
 
-def test_wait_begins_anew_with_the_next_frame(receiver: FrameReader) -> None:
-    receiver.take('a', FRAME[:9], 0.0, UNIX)
-    receiver.take('a', FRAME[9:] + FRAME[:9], 0.4, UNIX)
+def test_wait_begins_anew_with_the_next_frame(receiver: Receiver) -> None:
+    receiver.take('a', FRAME[:9], 0.0)
+    receiver.take('a', FRAME[9:] + FRAME[:9], 0.4)
     assert receiver.next_deadline() == 0.4 + STALL
 
 
-def test_longest_frame_at_9600_baud_is_not_given_up(receiver: FrameReader) -> None:
+def test_longest_frame_at_9600_baud_is_not_given_up(receiver: Receiver) -> None:
     found = []
     for number, byte in enumerate(raw_v1(110, bytes(range(1, 251)))):
         now = number * 0.00104
-        assert receiver.give_up(now, UNIX) == []
-        found += receiver.take('a', bytes((byte,)), now, UNIX)
+        assert receiver.give_up(now) == []
+        found += receiver.take('a', bytes((byte,)), now) or []
     assert sources(found) == [LIGHT]
 
 
 def test_garbage_of_many_peers_is_bounded_and_costs_a_good_peer_nothing(
-        receiver: FrameReader) -> None:
-    receiver.take('good', FRAME + FRAME[:9], 0.0, UNIX)
+        receiver: Receiver) -> None:
+    receiver.take('good', FRAME + FRAME[:9], 0.0)
     for number in range(10 * MAX_DECODERS):
-        receiver.take(number, FALSE_STARTS[0], 0.0, UNIX)
+        receiver.take(number, FALSE_STARTS[0], 0.0)
     assert len(receiver) == MAX_DECODERS
-    assert sources(receiver.take('good', FRAME[9:], 0.1, UNIX)) == [LIGHT]
-    assert sources(receiver.take(0, FRAME, 0.1, UNIX)) == [LIGHT]
-    assert receiver.give_up(STALL, UNIX) == []
+    assert sources(receiver.take('good', FRAME[9:], 0.1)) == [LIGHT]
+    assert sources(receiver.take(0, FRAME, 0.1)) == [LIGHT]
+    assert receiver.give_up(STALL) == []
 
 
 def test_unsigned_frames_do_not_pass_where_signing_is_required() -> None:
-    receiver = FrameReader(Signing(SigningMode.REQUIRE, bytes(32)), CRC_EXTRA)
-    assert receiver.take('a', FRAME + FALSE_STARTS[0] + FRAME, 0.0, UNIX) == []
-    assert receiver.give_up(STALL, UNIX) == []
+    receiver = make(Signing(SigningMode.REQUIRE, bytes(32)))
+    assert receiver.take('a', FRAME + FALSE_STARTS[0] + FRAME, 0.0) is None
+    assert receiver.give_up(STALL) == []
 
 
-def test_closed_link_awaits_nothing(receiver: FrameReader) -> None:
-    receiver.take('a', FRAME[:9], 0.0, UNIX)
+def test_closed_link_awaits_nothing(receiver: Receiver) -> None:
+    receiver.take('a', FRAME[:9], 0.0)
     receiver.clear()
     assert receiver.next_deadline() == math.inf
-    assert receiver.take('a', FRAME[9:], 0.1, UNIX) == []
+    assert receiver.take('a', FRAME[9:], 0.1) is None
