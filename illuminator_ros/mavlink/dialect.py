@@ -77,6 +77,15 @@ def raw(message: mavlink.MAVLink_message, field: str) -> Any:
     return getattr(message, f'_{field}_raw', getattr(message, field))
 
 
+@cache
+def _wire_order(cls: type[mavlink.MAVLink_message]) -> tuple[list[str], bool]:
+    """Return the attributes of the fields as they are on the wire, and whether one is an array."""
+    strings = {field for field, type_ in zip(cls.fieldnames, cls.fieldtypes, strict=True)
+               if type_ == 'char'}
+    return [f'_{field}_raw' if field in strings else field for field in cls.ordered_fieldnames], (
+        max(cls.lengths) > 1)
+
+
 def encode(message: mavlink.MAVLink_message) -> bytes:
     """
     Return the payload, extension fields included, trailing zeros not yet cut.
@@ -85,13 +94,11 @@ def encode(message: mavlink.MAVLink_message) -> bytes:
 
     :raises struct.error: if a value does not fit into its field.
     """
-    values: list[Any] = []
-    for field, length in zip(message.ordered_fieldnames, message.lengths, strict=True):
-        value = raw(message, field)
-        if length > 1:
-            values += value
-        else:
-            values.append(value)
+    names, has_arrays = _wire_order(type(message))
+    values = [getattr(message, name) for name in names]
+    if has_arrays:
+        values = [one for value, length in zip(values, message.lengths, strict=True)
+                  for one in (value if length > 1 else (value,))]
     return message.unpacker.pack(*values)
 
 

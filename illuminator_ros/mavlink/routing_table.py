@@ -16,10 +16,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Container, Iterable, Iterator, Sequence
-import itertools
+from collections.abc import Container, Iterable, Sequence
 import math
-from operator import itemgetter
 from typing import TypeVar
 
 from .frame import Frame
@@ -132,14 +130,19 @@ Peers = Sequence[Sequence[Peer]]
 T = TypeVar('T')
 
 
-def grouped(frames: Iterable[tuple[Peers, T]]) -> Iterator[tuple[Peers, list[T]]]:
+def grouped(frames: Iterable[tuple[Peers, T]]) -> list[tuple[Peers, list[T]]]:
     """
     Return consecutive frames for the same peers together.
 
     They are sent together, so that each receiver is woken only once.
     """
-    for peers, group in itertools.groupby(frames, key=itemgetter(0)):
-        yield peers, [frame for _, frame in group]
+    groups: list[tuple[Peers, list[T]]] = []
+    for peers, frame in frames:
+        if groups and groups[-1][0] == peers:
+            groups[-1][1].append(frame)
+        else:
+            groups.append((peers, [frame]))
+    return groups
 
 
 class Router:
