@@ -94,7 +94,8 @@ def encode(message: mavlink.MAVLink_message) -> bytes:
 
     :raises struct.error: if a value does not fit into its field.
     """
-    names, has_arrays = _wire_order(type(message))
+    cls: Any = type(message)  # its __hash__ confuses mypy
+    names, has_arrays = _wire_order(cls)
     values = [getattr(message, name) for name in names]
     if has_arrays:
         values = [one for value, length in zip(values, message.lengths, strict=True)

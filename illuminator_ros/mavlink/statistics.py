@@ -42,29 +42,19 @@ _HASH_MASK = (1 << _HASH_BITS) - 1
 RECENT = 10.0
 
 
-class WindowedCounter(NamedTuple):
-    """
-    A growing counter, and its growth in the last :data:`RECENT` to twice that, s.
+class Window:
+    """The growth of some counters in the last :data:`RECENT` to twice that, s."""
 
-    :param samples: at most two of time (s) and count, the older first.
-    """
+    def __init__(self) -> None:
+        # At most two of time (s) and totals, the older first, RECENT apart.
+        self._samples: tuple[tuple[float, tuple[int, ...]], ...] = ()
 
-    total: int = 0
-    time: float = 0.0
-    samples: tuple[tuple[float, int], ...] = ()
-
-    def sample(self, total: int, now: float) -> WindowedCounter:
-        """Return the counter with its new total."""
-        samples = self.samples
-        if not samples or now - samples[-1][0] >= RECENT:
-            samples = (*samples[-1:], (now, total))
-        return WindowedCounter(total, now, samples)
-
-    @property
-    def rate(self) -> float:
-        """Return the growth per second."""
-        elapsed = self.time - self.samples[0][0] if self.samples else 0.0
-        return (self.total - self.samples[0][1]) / elapsed if elapsed > 0 else 0.0
+    def growth(self, now: float, *totals: int) -> tuple[float, ...]:
+        """Return for how long the counters are known, s, and by how much each has grown."""
+        if not self._samples or now - self._samples[-1][0] >= RECENT:
+            self._samples = (*self._samples[-1:], (now, totals))
+        since, before = self._samples[0]
+        return now - since, *(new - old for new, old in zip(totals, before, strict=True))
 
 
 class SourceCounts(NamedTuple):
@@ -121,8 +111,7 @@ class SequenceCounter:
     _next: int = -1
     # Bit i is set where number newest - i has come.
     _seen: int = 0
-    # At most two samples of time (s), lost and received, the older first, RECENT apart.
-    _samples: tuple[tuple[float, int, int], ...] = ()
+    _recent: Window = field(default_factory=Window, compare=False)
 
     def add(self, sequence: int, content: int | None = None) -> None:
         """
@@ -215,15 +204,11 @@ class SequenceCounter:
 
     def reset_loss(self) -> None:
         """Forget recent losses: the sequence numbers of the sender have restarted."""
-        self._samples = ()
+        self._recent = Window()
 
     def snapshot(self, now: float) -> SourceCounts:
         """Update the recent loss and return the counts."""
-        received = self.received - self.duplicate
-        if not self._samples or now - self._samples[-1][0] >= RECENT:
-            self._samples = (*self._samples[-1:], (now, self.lost, received))
-        _, lost_before, received_before = self._samples[0]
-        lost, received = self.lost - lost_before, received - received_before
+        _, lost, received = self._recent.growth(now, self.lost, self.received - self.duplicate)
         return SourceCounts(
             self.received, self.lost, self.duplicate, self.reordered,
             100.0 * max(lost, 0) / (lost + received) if lost + received > 0 else 0.0)
@@ -263,18 +248,16 @@ class Traffic:
     frames_sent: int = 0
     frames_dropped: int = 0
     sources: dict[Address, SequenceCounter] = field(default_factory=dict)
-    _received: WindowedCounter = WindowedCounter()
-    _sent: WindowedCounter = WindowedCounter()
+    _recent: Window = field(default_factory=Window)
 
     def snapshot(self, now: float) -> TrafficSnapshot:
         """Update the recent values and return all."""
-        self._received = self._received.sample(self.bytes_received, now)
-        self._sent = self._sent.sample(self.bytes_sent, now)
-        sources = {source: counter.snapshot(now) for source, counter in self.sources.items()}
+        elapsed, *grown = self._recent.growth(now, self.bytes_received, self.bytes_sent)
+        received_rate, sent_rate = (bytes_ / elapsed if elapsed else 0.0 for bytes_ in grown)
         return TrafficSnapshot(
             self.bytes_received, self.bytes_sent,
-            self.frames_received, self.frames_sent, self.frames_dropped,
-            self._received.rate, self._sent.rate, sources)
+            self.frames_received, self.frames_sent, self.frames_dropped, received_rate, sent_rate,
+            {source: counter.snapshot(now) for source, counter in self.sources.items()})
 
     def count(self, frame: Frame) -> int:
         """Count a frame, and return its sender; see :class:`SequenceCounter`."""

@@ -157,13 +157,12 @@ def test_recent_loss_is_shown_for_10_s_and_forgotten_after_20_s_or_a_restart() -
 
 @pytest.mark.parametrize('interval', [0.5, 1.0, 7.0])
 def test_rate_is_that_of_the_last_seconds(interval: float) -> None:
-    window, now, count, rates = statistics.WindowedCounter(), 0.0, 0, []
+    traffic, now, rates = statistics.Traffic(), 0.0, []
     while now < 100.0:
         # 1000 a second at first, then 10.
-        count += int((1000 if now < 50.0 else 10) * interval)
+        traffic.bytes_sent += int((1000 if now < 50.0 else 10) * interval)
         now += interval
-        window = window.sample(count, now)
-        rates.append((now, window.rate))
+        rates.append((now, traffic.snapshot(now).sent_rate))
     # The rate is unknown before any time has passed.
     assert rates[0][1] == 0.0
     assert all(rate == pytest.approx(1000) for now, rate in rates[1:] if now < 50.0)
