@@ -478,9 +478,7 @@ class CommandSender:
 
     def cancel(self, command: Command, now: float) -> None:
         """End a command that was started with CANCELLED, if it has not ended."""
-        for pending in list(self._pending.get(command.target, ())):
-            if pending.command is command:
-                self._end(pending, CommandStatus.CANCELLED, now)
+        self.end_all(now, CommandStatus.CANCELLED, command.target, lambda one: one is command)
 
     def round_trip(self, target: Address) -> RttEstimator:
         """Return the round-trip times of a target's acknowledgements."""
@@ -673,26 +671,11 @@ class CommandSender:
             self.unanswering[command.target] = None
             if len(self.unanswering) > MAX_TARGETS:
                 del self.unanswering[next(iter(self.unanswering))]
-        late = self._send_next(key, now) if queue else []
+        # The next poll ends those whose deadline has passed.
+        following = [one for one in queue if one.key == key and now < one.deadline]
+        if following and following[0].state is CommandState.WAITING:
+            self._begin(following[0], now)
         pending.done(result, now)
-        for other in late:
-            other.done(CommandResult(CommandStatus.OUT_OF_TIME), now)
-
-    def _send_next(self, key: Key, now: float) -> list[_PendingCommand]:
-        """Send the next command of a kind; return those whose deadline has passed."""
-        late = []
-        queue = self._pending[key[0]]
-        for pending in [one for one in queue if one.key == key]:
-            if pending.state is not CommandState.WAITING:
-                break
-            if now < pending.deadline:
-                self._begin(pending, now)
-                break
-            queue.remove(pending)
-            late.append(pending)
-        if not queue:
-            del self._pending[key[0]]
-        return late
 
 
 def _int32(value: float) -> int:
