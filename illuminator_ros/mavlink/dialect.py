@@ -43,13 +43,9 @@ CRC_EXTRA: dict[int, int] = {
 }
 
 # Results of common.xml that the dialect lacks.
-MAV_RESULT_CANCELLED = 6
 MAV_RESULT_COMMAND_UNSUPPORTED_MAV_FRAME = 9
-MAV_RESULT_NOT_IN_CONTROL = 10
-for _value, _name in (
-        (MAV_RESULT_CANCELLED, 'MAV_RESULT_CANCELLED'),
-        (MAV_RESULT_COMMAND_UNSUPPORTED_MAV_FRAME, 'MAV_RESULT_COMMAND_UNSUPPORTED_MAV_FRAME'),
-        (MAV_RESULT_NOT_IN_CONTROL, 'MAV_RESULT_NOT_IN_CONTROL')):
+for _value, _name in ((6, 'MAV_RESULT_CANCELLED'), (10, 'MAV_RESULT_NOT_IN_CONTROL'),
+                      (9, 'MAV_RESULT_COMMAND_UNSUPPORTED_MAV_FRAME')):
     if not hasattr(mavlink, _name):
         setattr(mavlink, _name, _value)
         mavlink.enums['MAV_RESULT'][_value] = mavlink.EnumEntry(_name, '')

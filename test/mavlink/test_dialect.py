@@ -20,7 +20,6 @@ import random
 import struct
 from typing import Any
 
-from illuminator_ros.mavlink import dialect
 from illuminator_ros.mavlink import messages as mav
 from illuminator_ros.mavlink.dialect import (
     base_size,
@@ -178,7 +177,7 @@ def test_every_result_has_a_name_of_its_own() -> None:
         'MAV_RESULT_COMMAND_UNSUPPORTED_MAV_FRAME', 'MAV_RESULT_NOT_IN_CONTROL']
     assert names[77] == 'MAV_RESULT 77 (unknown)'
     assert mav.command_name(405) == 'MAV_CMD_ILLUMINATOR_ON_OFF'
-    assert dialect.MAV_RESULT_CANCELLED == 6
+    assert names[6] == 'MAV_RESULT_CANCELLED'
 
 
 @pytest.mark.parametrize(('flags', 'names'), [

@@ -29,8 +29,8 @@ from illuminator_ros.mavlink.forward_queue import MAX_DELAY, MAX_QUEUED
 from illuminator_ros.mavlink.frame import Decoder, Frame, MAX_FRAME
 from illuminator_ros.mavlink.messages import Address, CommandLong, heartbeat, Message
 from illuminator_ros.mavlink.transport.base import FORWARD_AHEAD, FORWARD_SIZE, StreamChannel
-from illuminator_ros.mavlink.transport.tcp import TcpClient, TcpServer
-from illuminator_ros.mavlink.url import HostPort
+from illuminator_ros.mavlink.transport.tcp import open_tcp, TcpServer
+from illuminator_ros.mavlink.url import HostPort, TcpUrl
 import pytest
 from support.frames import frame_of, LIGHT, only
 from support.waiting import eventually
@@ -192,7 +192,7 @@ def test_our_own_message_waits_for_few_forwarded_bytes_in_a_tcp_connection_that_
         server.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 4096)
         server.bind(('127.0.0.1', 0))
         server.listen()
-        channel = TcpClient(HostPort(*server.getsockname()))
+        channel = open_tcp(TcpUrl(HostPort(*server.getsockname())))
         stack.callback(channel.close)
         channel.register(selector, lambda handle, events: None)
         other = stack.enter_context(server.accept()[0])

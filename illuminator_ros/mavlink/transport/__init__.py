@@ -16,14 +16,21 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Mapping
+from typing import Any
+
 from .base import Channel, ChannelLost, Peer
 from .memory import open_memory
 from .serial import open_pty, open_serial
-from .tcp import TcpClient, TcpServer
+from .tcp import open_tcp
 from .udp import UdpChannel
 from ..url import MemoryUrl, PtyUrl, SerialUrl, TcpUrl, UdpUrl, Url
 
 __all__ = ['Channel', 'ChannelLost', 'open_channel', 'Peer']
+
+_OPEN: Mapping[type, Callable[[Any], Channel]] = {
+    UdpUrl: UdpChannel, TcpUrl: open_tcp, SerialUrl: open_serial, PtyUrl: open_pty,
+    MemoryUrl: open_memory}
 
 
 def open_channel(url: Url) -> Channel:
@@ -32,13 +39,4 @@ def open_channel(url: Url) -> Channel:
 
     :raises OSError: if it cannot be opened; the text says why.
     """
-    if isinstance(url, UdpUrl):
-        return UdpChannel(url)
-    if isinstance(url, TcpUrl):
-        return TcpServer(url.address) if url.listen else TcpClient(url.address)
-    if isinstance(url, SerialUrl):
-        return open_serial(url)
-    if isinstance(url, PtyUrl):
-        return open_pty(url)
-    assert isinstance(url, MemoryUrl)
-    return open_memory(url)
+    return _OPEN[type(url)](url)

@@ -33,7 +33,7 @@ from .base import (
     StreamChannel,
 )
 from ..frame import Frame
-from ..url import HostPort
+from ..url import HostPort, TcpUrl
 
 # s for all addresses of a name together; the link must return within 1 s of the other side.
 CONNECT_TIMEOUT = 0.8
@@ -73,11 +73,15 @@ class _Connection(StreamChannel):
         self._connection.close()
 
 
-class TcpClient(_Connection):
-    """A connection to a server."""
+def open_tcp(url: TcpUrl) -> Channel:
+    """
+    Connect to a server, or listen.
 
-    def __init__(self, address: HostPort) -> None:
-        super().__init__(f'tcp to {address}', _connect(address))
+    :raises OSError: if that fails.
+    """
+    if url.listen:
+        return TcpServer(url.address)
+    return _Connection(f'tcp to {url.address}', _connect(url.address))
 
 
 def _connect(address: HostPort) -> socket.socket:
