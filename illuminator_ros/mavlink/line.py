@@ -27,9 +27,9 @@ import math
 import selectors
 
 from .connector import Connector
-from .fault_log import FaultLog
 from .frame import Frame
 from .link_state import LinkInput, LinkSnapshot, LinkState, LinkStatus
+from .link_thread import FaultLog
 from .messages import Address
 from .receiver import ReceivedFrame, Receiver
 from .transport import Channel, Peer

@@ -24,11 +24,11 @@ import selectors
 from .component import Endpoint
 from .dialect import decode, line_of
 from .duplicate_filter import DuplicateFilter
-from .fault_log import FaultLog
 from .frame import MAX_ID_V1
 from .frame_writer import FrameWriter
 from .line import ANNOUNCE_INTERVAL, Line, LineUser, SILENCE
 from .link_state import LinkSnapshot
+from .link_thread import FaultLog
 from .messages import Address
 from .receiver import ReceivedFrame, Receiver
 from .routing_table import grouped, Router

@@ -23,10 +23,9 @@ import selectors
 import time
 
 from .component import Endpoint
-from .fault_log import FaultLog
 from .lines import Lines
 from .link_state import LinkEvent, LinkInput, LinkSnapshot
-from .link_thread import LinkThread
+from .link_thread import FaultLog, LinkThread
 from .signing import Signing
 from .signing_files import TimestampStore
 from .url import Url

@@ -19,20 +19,52 @@ from __future__ import annotations
 from collections import deque
 from collections.abc import Callable
 import contextlib
+import logging
+import math
 import select
 import selectors
 import socket
 import threading
 
-from . import fault_log
-from .fault_log import FaultLog
-
 # s; the longest wait.
 MAX_WAIT = 10.0
+# s; the pause of a loop after an exception, and the shortest time between log lines.
+FAULT_PAUSE = 0.1
+FAULT_LOG_INTERVAL = 1.0
+
+_log = logging.getLogger(__name__)
 
 
 class LinkThreadError(RuntimeError):
     """The thread of a link cannot be started; the message names the link and says why."""
+
+
+class FaultLog:
+    """
+    Logs exceptions of the functions that a loop calls.
+
+    :ivar pause: the shortest next wait of the loop, s, so that a lasting fault does not use up
+        the processor.
+    """
+
+    def __init__(self, clock: Callable[[], float]) -> None:
+        self.pause = 0.0
+        self._clock = clock
+        self._due = -math.inf
+
+    def call(self, function: Callable[..., None], *arguments: object) -> None:
+        """Call a function; log its exception."""
+        try:
+            function(*arguments)
+        except Exception:
+            self.pause = FAULT_PAUSE
+            self.log()
+
+    def log(self) -> None:
+        """Log the exception that is handled."""
+        if self._clock() >= self._due:
+            self._due = self._clock() + FAULT_LOG_INTERVAL
+            _log.exception('internal error in the link')
 
 
 class LinkThread:
@@ -153,7 +185,7 @@ class LinkThread:
                 self.run_once()
             except Exception:
                 self._faults.log()
-                self._stopping.wait(fault_log.FAULT_PAUSE)
+                self._stopping.wait(FAULT_PAUSE)
         self._run_calls()
         self._faults.call(self._finish)
         self._release()

@@ -23,9 +23,9 @@ import struct
 
 from .conflating_queue import ConflatingQueue, StreamGroup
 from .dialect import line_of
-from .fault_log import FaultLog
 from .frame_writer import FrameWriter
 from .line import Line
+from .link_thread import FaultLog
 from .messages import Address, Heartbeat, Message, target_of
 from .routing_table import grouped, Peers, Router
 

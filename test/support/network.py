@@ -22,9 +22,9 @@ import selectors
 from typing import Any
 
 from illuminator_ros.mavlink.component import Endpoint
-from illuminator_ros.mavlink.fault_log import FaultLog
 from illuminator_ros.mavlink.line import Line
 from illuminator_ros.mavlink.lines import Lines
+from illuminator_ros.mavlink.link_thread import FaultLog
 from illuminator_ros.mavlink.messages import Address, Heartbeat, Message
 from illuminator_ros.mavlink.signing import Signing
 from illuminator_ros.mavlink.transport import Channel, Peer

@@ -25,10 +25,10 @@ import threading
 from typing import Any
 
 from illuminator_ros.mavlink import connector as connector_module
-from illuminator_ros.mavlink import fault_log, line
+from illuminator_ros.mavlink import line, link_thread
 from illuminator_ros.mavlink.dialect import decode
 from illuminator_ros.mavlink.frame import Decoder
-from illuminator_ros.mavlink.link import Link
+from illuminator_ros.mavlink.link import Link, STORE_INTERVAL
 from illuminator_ros.mavlink.link_state import LinkEvent
 from illuminator_ros.mavlink.link_thread import LinkThreadError
 from illuminator_ros.mavlink.messages import CommandLong
@@ -40,6 +40,7 @@ import pytest
 from support.frames import heartbeat_frame, LIGHT
 from support.live_link import (
     CONNECTOR,
+    Jump,
     LiveLink,
     resources,
     Run,
@@ -125,7 +126,7 @@ class Faulty(Talker):
 def faults(monkeypatch: pytest.MonkeyPatch,
            caplog: pytest.LogCaptureFixture) -> Callable[[], list[str]]:
     """Return a function that returns all logged faults; each is logged."""
-    monkeypatch.setattr(fault_log, 'FAULT_LOG_INTERVAL', 0.0)
+    monkeypatch.setattr(link_thread, 'FAULT_LOG_INTERVAL', 0.0)
 
     def logged() -> list[str]:
         assert all(record.levelno == logging.ERROR for record in caplog.records)
@@ -185,8 +186,8 @@ def test_lasting_fault_pauses_the_thread_and_does_not_fill_the_log(
         run: Run, caplog: pytest.LogCaptureFixture, monkeypatch: pytest.MonkeyPatch,
         method: str) -> None:
     endpoint = Faulty(method, math.inf, -math.inf)
-    monkeypatch.setattr(fault_log, 'FAULT_PAUSE', 0.001)
-    monkeypatch.setattr(fault_log, 'FAULT_LOG_INTERVAL', 60.0)
+    monkeypatch.setattr(link_thread, 'FAULT_PAUSE', 0.001)
+    monkeypatch.setattr(link_thread, 'FAULT_LOG_INTERVAL', 60.0)
     run(LiveLink(URL, endpoint))
     endpoint.failures.wait_for(lambda one: True, count=50)
     assert len(caplog.records) == 1
@@ -208,6 +209,33 @@ def test_time_stamps_that_cannot_be_stored_do_not_end_the_link(
     assert link.endpoint.wait_heard() == LIGHT
     link.stop()
     assert caplog.records
+
+
+# Unix time, s: 1970, as on a computer whose clock was not set, and 2023.
+@pytest.mark.parametrize('unix_time', [0.0, 1.7e9])
+def test_link_stores_its_time_stamps_at_once_every_30_s_and_when_it_ends(
+        run: Run, tmp_path: Path, unix_time: float) -> None:
+    store, clock = TimestampStore('key', 'test', tmp_path), Jump()
+    used = []
+    for wall_clock in (unix_time, unix_time + 2 * STORE_INTERVAL):
+        times = [wall_clock]
+        signing = Signing(SigningMode.SIGN, bytes(32), timestamp=store.begin(wall_clock))
+        link = run(LiveLink('memory://time_stamps', signing=signing, store=store, clock=clock,
+                            wall_clock=lambda times=times: times[0]))
+        link.wait_open()
+        link.ask(lambda now: None)
+        # The file that a crash would leave, now and after some time.
+        assert store.load() > signing.timestamp > 0
+        store.path.unlink()
+        times[0] += STORE_INTERVAL
+        clock.ahead += STORE_INTERVAL
+        link.ask(lambda now: None)
+        eventually(store.path.exists, 'stored again')
+        assert store.load() > signing.timestamp
+        link.stop()
+        assert store.load() == signing.timestamp
+        used.append(signing.timestamp)
+    assert used[1] > used[0]
 
 
 def test_fault_while_opening_is_logged_and_tried_again(

@@ -20,7 +20,7 @@ import math
 import socket
 
 from illuminator_ros.mavlink import component
-from illuminator_ros.mavlink.fault_log import FAULT_PAUSE
+from illuminator_ros.mavlink.link_thread import FAULT_PAUSE
 from illuminator_ros.mavlink.messages import Address
 from illuminator_ros.mavlink.receiver import STALL
 from illuminator_ros.mavlink.transport.udp import PEER_EXPIRY
