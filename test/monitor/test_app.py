@@ -17,9 +17,15 @@
 import asyncio
 from typing import cast
 
-from illuminator_ros.cli.monitor.app import ACTIONS, COMMON_KEYS, MonitorApp, QUESTION_LIFETIME
-from illuminator_ros.cli.monitor.ros_graph import Graph
-from illuminator_ros.ros.monitor_view import DONE, FAILED
+from illuminator_ros.cli.monitor.app import (
+    ACTIONS,
+    COMMON_KEYS,
+    INTERVAL,
+    MonitorApp,
+    QUESTION_LIFETIME,
+)
+from illuminator_ros.cli.monitor.ros_graph import Graph, TREND_POLLS
+from illuminator_ros.ros.monitor_view import DONE, FAILED, TREND_SIZE
 import pytest
 from support.monitor import camera, FakeGraph, gimbal, light, NOW, Screen, show
 from textual.color import Color
@@ -285,6 +291,10 @@ def test_answers_are_taken_between_the_keys() -> None:
             await screen.settle()
 
     show(test, light())
+
+
+def test_trend_is_that_of_2_minutes() -> None:
+    assert INTERVAL * TREND_POLLS * TREND_SIZE == 120
 
 
 def test_outcome_of_a_request_has_its_colour() -> None:

@@ -178,6 +178,17 @@ def test_device_that_leaves_is_gone_can_be_cleared_and_can_return(
     monitor.wait(lambda device: device.values.get('brightness') == 10.0, '/one')
 
 
+def test_trend_gets_one_value_in_each_interval(own_ros: Ros, monitor: Watching) -> None:
+    FakeBridge(own_ros, '/one')
+    device = monitor.wait(lambda device: device.state == 'ON', '/one')
+    before = len(device.trend)
+
+    for _ in range(ros_graph.TREND_POLLS):
+        monitor.graph.poll()
+
+    assert len(device.trend) == before + 1
+
+
 def test_hostile_graph_neither_stops_nor_fills_the_monitor(
     own_ros: Ros, monitor: Watching, monkeypatch: pytest.MonkeyPatch,
 ) -> None:
