@@ -292,6 +292,8 @@ def test_zero_is_sent_again_only_while_the_device_reports_that_it_turns(
     rig.run(10.0)
 
     assert [one.angular_velocity_z for _, one in setpoints(rig)] == [approx(-0.2)] + [0.0] * zeros
+    first, *later = [at for at, _ in setpoints(rig)[1:]]
+    assert all(at - first >= delay for at, delay in zip(later, REPEATS, strict=False))
 
 
 @pytest.mark.parametrize('names_frame', [True, False])
