@@ -916,6 +916,7 @@ def test_gm_22_the_manager_answers_for_a_device_without_mavlink() -> None:
     assert (manager.roll_max, manager.pitch_min, manager.yaw_max) == (0.0, -1.5, 2.0)
     assert not manager.cap_flags & mavlink.GIMBAL_DEVICE_CAP_FLAGS_HAS_ROLL_AXIS
     assert manager.cap_flags & mavlink.GIMBAL_DEVICE_CAP_FLAGS_HAS_PITCH_AXIS
+    assert manager.cap_flags & mavlink.GIMBAL_DEVICE_CAP_FLAGS_HAS_YAW_FOLLOW
     status = rig.messages(GimbalDeviceAttitudeStatus)[-1]
     assert (status.gimbal_device_id, status.q) == (1, HALF)
 
