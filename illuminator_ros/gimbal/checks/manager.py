@@ -131,13 +131,6 @@ class ManagerSession(GimbalSession):
         """Send MAV_CMD_DO_GIMBAL_MANAGER_CONFIGURE with four values."""
         return await self.command(CONFIGURE, *values, 0.0, 0.0, self.device_id, source=source)
 
-    async def shown(self, condition: Callable[[Control], bool]) -> Control:
-        """Return the control once it meets a condition, or after :data:`SHOWN_TIMEOUT`."""
-        end = self.now + SHOWN_TIMEOUT
-        while not condition(control := await self.control()) and self.now < end:
-            await self.pause(0.1)
-        return control
-
     async def take(self, primary: Address, secondary: Address = NO_COMPONENT) -> None:
         """Give control to two players; raise Failed if the manager refuses or does not show it."""
         one = await self.configure(*primary, *secondary)
@@ -145,7 +138,9 @@ class ManagerSession(GimbalSession):
 
     async def leads_to(self, one: Transaction, wanted: Callable[[Control], bool]) -> None:
         """Raise Failed if a command is refused or does not lead to the wanted control."""
-        control = await self.shown(wanted)
+        end = self.now + SHOWN_TIMEOUT
+        while not wanted(control := await self.control()) and self.now < end:
+            await self.pause(0.1)
         if not one.accepted or not wanted(control):
             raise one.failure(f'{one.answer}, and then {control_text(control)}')
 

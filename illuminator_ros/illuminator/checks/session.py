@@ -191,7 +191,7 @@ class LightSession(Session):
         low = Configuration(Mode.INTERNAL_CONTROL, LOW, 0.0, 0.0)
         status = await self.status()
         if status is None or status.enabled is not False:
-            await self._switch_off()
+            await self.command(ON_OFF, 0.0)
             status = await self.status()
         if status is None or differences(low, status):
             one = await self.command(CONFIGURE, *low.params())
@@ -199,10 +199,7 @@ class LightSession(Session):
                             if one.accepted else self.status())
         if status is not None and status.enabled:
             # A brightness above 0 switches some lights on.
-            await self._switch_off()
-
-    async def _switch_off(self) -> None:
-        await self.command(ON_OFF, 0.0)
+            await self.command(ON_OFF, 0.0)
 
     async def ensure_dim(self) -> None:
         """
@@ -218,7 +215,7 @@ class LightSession(Session):
         status = await self.status()
         if status is not None and status.enabled:
             # A brightness above 0 switches some lights on.
-            await self._switch_off()
+            await self.command(ON_OFF, 0.0)
         if change.transaction.accepted and not change.contradiction:
             return
         if reason := _risk(status):
@@ -256,7 +253,7 @@ class LightSession(Session):
         assert self._before is not None
         wanted, enabled = _saved(self._before), bool(self._before.enabled)
         # Switch off first, so that the changes are not visible.
-        await self._switch_off()
+        await self.command(ON_OFF, 0.0)
         await self.command(CONFIGURE, *wanted.params())
         # Then restore the switch, because the brightness switches some lights on.
         await self.command(ON_OFF, float(enabled))
