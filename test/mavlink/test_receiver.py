@@ -16,6 +16,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection
 import math
 
 from illuminator_ros.mavlink.dialect import CRC_EXTRA
@@ -32,8 +33,8 @@ FRAME = heartbeat_frame()
 FALSE_STARTS = [b'\xfe\xfa\x00\x01\x01\x6e', b'\xfd\xfa\x00\x00\x00\x01\x01\x6e\x00\x00']
 
 
-def make(signing: Signing) -> Receiver:
-    return Receiver(signing, CRC_EXTRA, FrameWriter(signing), lambda: UNIX, {})
+def make(signing: Signing, handled: Collection[int] = CRC_EXTRA) -> Receiver:
+    return Receiver(signing, handled, FrameWriter(signing), lambda: UNIX, {})
 
 
 @pytest.fixture
@@ -117,3 +118,13 @@ def test_closed_link_awaits_nothing(receiver: Receiver) -> None:
     receiver.clear()
     assert receiver.next_deadline() == math.inf
     assert receiver.take('a', FRAME[9:], 0.1) is None
+
+
+@pytest.mark.parametrize(('frames', 'seconds'), [(0, 0.0), (100, 0.0), (101, 0.02), (1280, 0.01)])
+def test_more_than_1000_foreign_frames_a_second_are_read_each_20_ms_or_128_frames(
+        frames: int, seconds: float) -> None:
+    receiver = make(Signing(), ())
+    receiver.take('a', FRAME, 0.0)
+    assert receiver.pause(1.0) == 0.0
+    receiver.take('a', FRAME * frames, 1.0)
+    assert receiver.pause(1.1) == pytest.approx(seconds)
