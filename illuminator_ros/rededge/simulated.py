@@ -56,6 +56,7 @@ UNKNOWN_SATELLITES = 0xFF
 # The camera's axes in the vehicle's FRD axes at a mount of 0/0/0: x down, y right, z back.
 _DOWN = Quaternion.from_euler(0.0, -math.pi / 2, 0.0)
 
+
 class Source(Enum):
     """The source of a value of an image."""
 

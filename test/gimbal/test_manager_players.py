@@ -93,6 +93,7 @@ class Player:
             configure(-1, -7), configure(*other, *own, confirmation=1), region(47.0, 8.0, 0.0),
             configure(-2, -2), pitch_yaw(0.0, yaw, device_id=33)])
 
+
 def mark(number: int) -> float:
     """Return the yaw that marks the setpoints of one address, rad."""
     return (number - 10) * 0.25

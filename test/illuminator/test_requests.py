@@ -423,6 +423,7 @@ def test_a_set_that_was_not_sent_in_time_says_so(fake: FakeLight, faked: Pair) -
 # s; the tries of two commands, and the messages that they request.
 REFRESH_LIMIT = 5.0
 
+
 def test_a_refresh_requests_status_and_identity_and_takes_both(
     fake: FakeLight, faked: Pair,
 ) -> None:

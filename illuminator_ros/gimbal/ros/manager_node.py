@@ -58,8 +58,8 @@ DEVICE_SETPOINT = Endpoint(
 DEVICE_ATTITUDE = Endpoint(
     'device/attitude', QuaternionStamped, 'the attitude that the driver measures')
 IMU = Endpoint('imu', Imu, 'attitude of the vehicle, FLU in ENU')
-ODOMETRY = Endpoint('odometry', Odometry, "attitude and velocity of the vehicle; the twist is in "
-                    "the body's axes")
+ODOMETRY = Endpoint('odometry', Odometry, 'attitude and velocity of the vehicle; the twist is in '
+                    'the axes of the body')
 FIX = Endpoint('fix', NavSatFix, 'position of the vehicle, for regions of interest; ignored '
                'without a fix')
 MANAGER_PARAMETERS = (
