@@ -17,11 +17,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable
+import contextlib
 from dataclasses import dataclass
 import math
 import threading
 from typing import Any, Generic, NamedTuple, TypeVar
 
+from rclpy.exceptions import InvalidHandle
 from rclpy.node import Node
 from rclpy.qos import QoSProfile, ReliabilityPolicy
 
@@ -141,7 +143,10 @@ class NodeInterface:
         :param value: the message, or ``data`` of a message of std_msgs.
         """
         type_ = self._types[name]
-        self._publishers[name].publish(value if isinstance(value, type_) else type_(data=value))
+        message = value if isinstance(value, type_) else type_(data=value)
+        # On a busy machine the nodes leave before the link's thread has ended.
+        with contextlib.suppress(InvalidHandle):
+            self._publishers[name].publish(message)
 
     def publish_to_subscribers(self, name: str, make: Callable[[], object]) -> None:
         """
