@@ -75,6 +75,8 @@ class GimbalManager(Payload):
     """
     The manager of one gimbal: messages and commands of players, and reports to them.
 
+    It has 16 fields: its parts, and the times of its reports.
+
     :param commands: sends everything, from the manager's address.
     :param draw: returns a random number, 0..1.
     :param reported: called with each report to all players that is sent.

@@ -315,6 +315,8 @@ class Attempt(Generic[S]):
     """
     One command of a change, and its confirmation.
 
+    It has 16 fields: the change with its limits, and a time for each step until the confirmation.
+
     :param ended: called once, with the result and the status that shows the change, None if none
         did; not called after :meth:`abandon`.
     :param wanted_at: when the change was first wanted, s.
