@@ -169,9 +169,9 @@ class Flight:
 
     def delay(self, pair: Pair, limit: float) -> tuple[float, float]:
         """
-        Return the delay, within a limit, that explains attitude and mount best.
+        Return the delay, within a limit, that explains the attitude, or a mount that fits worse.
 
-        If both came together, they are of one instant, so the delay must be the same for both.
+        The two need not be of one pair: the camera may have read the next attitude already.
 
         :return: the delay, s; and the error that it leaves, degrees.
         """
@@ -182,8 +182,6 @@ class Flight:
             truth = self.truth(pair.mount_time - delay)
             return math.degrees(pair.mount.angle_to(truth.vehicle.inverse() * truth.camera))
 
-        if pair.time == pair.mount_time:
-            return least(lambda delay: vehicle(delay) + mount(delay), limit)
         return max(least(vehicle, limit), least(mount, limit), key=lambda found: found[1])
 
 
