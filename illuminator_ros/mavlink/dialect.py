@@ -68,18 +68,19 @@ def register(cls: type[M]) -> type[M]:
     return cls
 
 
-def raw(message: mavlink.MAVLink_message, field: str) -> Any:
-    """Return the value of a field; of a string all bytes, which pymavlink keeps apart."""
-    return getattr(message, f'_{field}_raw', getattr(message, field))
-
-
 @cache
-def _wire_order(cls: type[mavlink.MAVLink_message]) -> tuple[list[str], bool]:
-    """Return the attributes of the fields as they are on the wire, and whether one is an array."""
+def _attributes(cls: type[mavlink.MAVLink_message]) -> dict[str, str]:
+    """Return the attributes of the fields as on the wire, in that order; strings have one more."""
     strings = {field for field, type_ in zip(cls.fieldnames, cls.fieldtypes, strict=True)
                if type_ == 'char'}
-    return [f'_{field}_raw' if field in strings else field for field in cls.ordered_fieldnames], (
-        max(cls.lengths) > 1)
+    return {field: f'_{field}_raw' if field in strings else field
+            for field in cls.ordered_fieldnames}
+
+
+def raw(message: mavlink.MAVLink_message, field: str) -> Any:
+    """Return the value of a field; of a string all bytes, which pymavlink keeps apart."""
+    cls: Any = type(message)  # its __hash__ confuses mypy
+    return getattr(message, _attributes(cls)[field])
 
 
 def encode(message: mavlink.MAVLink_message) -> bytes:
@@ -91,9 +92,8 @@ def encode(message: mavlink.MAVLink_message) -> bytes:
     :raises struct.error: if a value does not fit into its field.
     """
     cls: Any = type(message)  # its __hash__ confuses mypy
-    names, has_arrays = _wire_order(cls)
-    values = [getattr(message, name) for name in names]
-    if has_arrays:
+    values = [getattr(message, name) for name in _attributes(cls).values()]
+    if max(message.lengths) > 1:
         values = [one for value, length in zip(values, message.lengths, strict=True)
                   for one in (value if length > 1 else (value,))]
     return message.unpacker.pack(*values)
