@@ -101,14 +101,14 @@ class RemoteManager:
         self._status_time = 0
         self.target = Target(
             address, commands, kind='gimbal manager', status_id=GimbalManagerStatus.id,
-            status_name='GIMBAL_MANAGER_STATUS', needs_status=True)
+            status_name=GimbalManagerStatus.msgname, needs_status=True)
         # Control is changed after the gimbal has stopped.
         self.control_changes: Reconciler[GimbalManagerStatus] = Reconciler(
             self.target,
             earliest=lambda change: math.inf if self._stops.is_busy else -math.inf)
         self.pose_changes: Reconciler[GimbalDeviceAttitudeStatus] = Reconciler(Target(
             address, commands, kind='gimbal device', status_id=GimbalDeviceAttitudeStatus.id,
-            status_name='GIMBAL_DEVICE_ATTITUDE_STATUS', status_source=key.address,
+            status_name=GimbalDeviceAttitudeStatus.msgname, status_source=key.address,
             needs_status=True))
         unconfirmed = Target(address, commands, kind='gimbal manager')
         self.place_changes: Reconciler[None] = Reconciler(unconfirmed)

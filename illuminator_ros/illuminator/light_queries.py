@@ -20,7 +20,7 @@ from collections.abc import Callable
 import functools
 import math
 
-from .messages import STATUS_ID
+from .messages import IlluminatorStatus, STATUS_ID
 from ..mavlink.command_sender import CommandResult, format_seconds
 from ..mavlink.dialect import mavlink
 from ..mavlink.messages import ComponentInformationBasic
@@ -35,7 +35,7 @@ MESSAGE_TIMEOUT = 0.5
 MAX_QUESTIONS = 3
 # s from the first request until the identity counts as unknown.
 SETTLING_TIME = 2.0
-STATUS, IDENTITY = 'ILLUMINATOR_STATUS', 'COMPONENT_INFORMATION_BASIC'
+STATUS, IDENTITY = IlluminatorStatus.msgname, ComponentInformationBasic.msgname
 
 
 class MessageQuery:
