@@ -356,7 +356,7 @@ def clip(
     before: Sequence[Clipped] = (),
 ) -> tuple[Vector, tuple[Clipped, ...]]:
     """
-    Return the angles of a setpoint within the ranges, and those that were clipped.
+    Return the angles of a setpoint within the ranges, and the clipped angles.
 
     :param ahead: the direction from which the range of the yaw counts, rad in the frame of the
         setpoint; None where it is not known, which leaves the yaw as it is.

@@ -359,7 +359,7 @@ def _shown(status: Status) -> tuple[object, ...]:
 @dataclass
 class NewestStatus:
     """
-    The newest status of a light, for all that need it.
+    The newest status of a light, which its switch and its configuration read.
 
     :param report: None before the first.
     :param at: when it came, s.

@@ -54,7 +54,7 @@ def value_of(message: Any) -> object:
 
 
 def wait_and_clear(recorder: Recorder, value: object) -> None:
-    """Wait until a topic shows a value, and forget it with all that came before it."""
+    """Wait until a topic shows a value, then forget every message so far."""
     recorder.wait(lambda message: value_of(message) == pytest.approx(value))
     recorder.clear()
 
