@@ -36,7 +36,9 @@ from programs import free_port, running
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
+from rclpy.serialization import deserialize_message
 from ros_client import Failed, RosClient
+from std_msgs.msg import Bool
 from std_srvs.srv import Trigger
 
 # The wheels of ROS, which stand in for an installation, have the definitions here.
@@ -77,6 +79,8 @@ class Recorder:
         self._writer.start(profile='ros2')
         self._schemas: dict[str, int] = {}
         self.topics: set[str] = set()
+        # The newest message of each topic, serialized.
+        self._newest: dict[str, bytes] = {}
         self._lock = threading.Lock()
         self._node = Node('recorder')
         self._node.create_timer(SEARCH_INTERVAL, self._search)
@@ -110,10 +114,17 @@ class Recorder:
             now = time.time_ns()
             with self._lock:
                 self._writer.add_message(channel, now, data, now)
+                self._newest[topic] = data
 
         package, _, name = type_.split('/')
         self._node.create_subscription(
             getattr(import_module(f'{package}.msg'), name), topic, write, qos, raw=True)
+
+    def shows(self, topic: str, value: bool) -> bool:
+        """Return whether the newest recorded message of a topic of std_msgs/Bool has a value."""
+        with self._lock:
+            data = self._newest.get(topic)
+        return data is not None and deserialize_message(data, Bool).data is value
 
     def close(self) -> None:
         """Finish the file."""
@@ -122,7 +133,7 @@ class Recorder:
         self._writer.finish()
 
 
-def operate(ros: RosClient, seconds: float) -> None:
+def operate(ros: RosClient, recorder: Recorder, seconds: float) -> None:
     """
     Use the devices, so that their topics have something to show.
 
@@ -140,7 +151,8 @@ def operate(ros: RosClient, seconds: float) -> None:
         ros.call(Trigger, '/rededge/capture', Trigger.Request())
         time.sleep(0.2)
     ros.enable(False)
-    ros.wait('/illuminator/enabled False', lambda: ros.topic('enabled') is False)
+    ros.wait('recording of /illuminator/enabled False',
+             lambda: recorder.shows('/illuminator/enabled', False))
 
 
 def main() -> int:
@@ -166,7 +178,7 @@ def main() -> int:
         ros = stack.enter_context(contextlib.closing(RosClient()))
         recorder = stack.enter_context(contextlib.closing(Recorder(arguments.file)))
         try:
-            operate(ros, arguments.seconds)
+            operate(ros, recorder, arguments.seconds)
         except Failed as error:
             failure = str(error)
     failure = failure or ('' if recorder.topics else 'no topic was found')
