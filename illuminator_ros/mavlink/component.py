@@ -30,6 +30,8 @@ from .messages import (
     Address,
     AnyCommand,
     CommandAck,
+    CommandInt,
+    CommandLong,
     Heartbeat,
     heartbeat,
     Message,
@@ -183,9 +185,12 @@ class Component(Endpoint):
         self.commands = commands
         self.address = commands.address
         self._payloads = tuple(payloads)
-        # HEARTBEAT and COMMAND_ACK show an address conflict even where no payload needs them.
+        # HEARTBEAT and COMMAND_ACK show an address conflict even where no payload needs them. Each
+        # command to this component is acknowledged, so that its sender need not wait for a
+        # time-out (command protocol).
         self.messages = tuple(dict.fromkeys(
-            (Heartbeat, CommandAck, *(cls for one in payloads for cls in one.messages))))
+            (Heartbeat, CommandAck, CommandLong, CommandInt,
+             *(cls for one in payloads for cls in one.messages))))
         self.sends = tuple(dict.fromkeys(cls for one in payloads for cls in one.sends))
         self.streams = tuple(group for one in payloads for group in one.streams)
         self._receivers = {cls: tuple(one for one in payloads if cls in one.messages)

@@ -113,6 +113,22 @@ def test_a_command_is_answered_if_it_is_for_us(
     assert bool(rig.turner.executed) == (result == mavlink.MAV_RESULT_ACCEPTED)
 
 
+@pytest.mark.parametrize(('to', 'answers'), [
+    (OURS, 1), (mav.Address(1, 0), 0), (mav.Address(0, 194), 0), (mav.Address(0, 0), 0),
+    (mav.Address(1, 1), 0)])
+@pytest.mark.parametrize('make', [long, whole])
+def test_a_component_whose_payloads_take_no_commands_tells_their_sender_that(
+        make: Any, to: mav.Address, answers: int) -> None:
+    component = Component(CommandSender(OURS), [])
+    command = make(to=to)
+    assert type(command) in component.messages
+
+    component.receive(PILOT, command, 1.0)
+
+    assert list(component.outgoing) == [
+        (OURS, ack(mavlink.MAV_RESULT_UNSUPPORTED))] * answers
+
+
 # The second command that comes after long(), and whether it is executed.
 SECOND = {
     'a repetition': (long(confirmation=1), PILOT, 1.0, False),
