@@ -58,6 +58,8 @@ UNLIKELY_DELAY = 1.0
 class _Component:
     heard_at: float
     query: Repetition = field(default_factory=Repetition)
+    # Whether it has announced a gimbal with the id 0.
+    lacks_id: bool = False
 
 
 class GimbalClient(Payload):
@@ -109,7 +111,7 @@ class GimbalClient(Payload):
     def receive(self, source: Address, message: Message, now: float) -> None:
         """See :meth:`Payload.receive`."""
         if isinstance(message, GimbalDeviceAttitudeStatus):
-            if gimbal := self._sender(source, message.gimbal_device_id):
+            if gimbal := self._sender(source, message.gimbal_device_id, now):
                 gimbal.take_attitude(message, now)
         elif isinstance(message, Heartbeat):
             self._hear(source, message, now)
@@ -123,17 +125,21 @@ class GimbalClient(Payload):
         elif isinstance(message, GimbalManagerInformation):
             if gimbal := self._managed(source, message.gimbal_device_id):
                 gimbal.take_information(source, message, now)
-                if not any(one.lacks_information_of(source) for one in self._gimbals.values()):
-                    self._component(source, now).query.finish()
+                component = self._components.get(source)
+                if component is not None and not any(
+                        one.lacks_information_of(source) for one in self._gimbals.values()):
+                    component.query.finish()
                     self._queries.set(source, math.inf)
         elif (isinstance(message, GimbalDeviceInformation)
-                and (gimbal := self._sender(source, message.gimbal_device_id))):
+                and (gimbal := self._sender(source, message.gimbal_device_id, now))):
             gimbal.take_device_information(message)
 
     # Gimbals
 
     def _managed(self, manager: Address, device_id: int) -> Gimbal | None:
         """Return the gimbal that a manager announces, None if there are too many."""
+        if component := self._components.get(manager):
+            component.lacks_id = not device_id
         if not device_id:
             # PX4 announces 0 until it has found its device.
             return None
@@ -149,7 +155,7 @@ class GimbalClient(Payload):
             self.events.emit(GimbalFound(key))
         return gimbal
 
-    def _sender(self, source: Address, number: int) -> Gimbal | None:
+    def _sender(self, source: Address, number: int, now: float) -> Gimbal | None:
         """
         Return the gimbal that has sent a message of a device.
 
@@ -162,13 +168,23 @@ class GimbalClient(Payload):
         if found is None and not number:
             own = [one for key, one in self._gimbals.items() if key.address == source]
             found = own[0] if len(own) == 1 else None
+            if len(own) > 1:
+                for one in own:
+                    one.heard_without_id(now)
         return found
 
     # Discovery
 
-    def _component(self, address: Address, now: float) -> _Component:
+    def managers_without_id(self, now: float) -> list[Address]:
+        """Return the managers that are heard and announce a gimbal with the id 0."""
+        return [address for address, component in self._components.items()
+                if component.lacks_id and now < component.heard_at + RETURN_AFTER]
+
+    def _component(self, address: Address, now: float) -> _Component | None:
+        """Return a component that may be a manager, None if there are too many."""
         component = self._components.get(address)
-        if component is None:
+        if component is None and (
+                len(self._components) < MAX_COMPONENTS or self._forget_component(now)):
             component = self._components[address] = _Component(now)
         return component
 
@@ -178,13 +194,10 @@ class GimbalClient(Payload):
                 component.query = Repetition()
                 self._queries.set(source, now)
             component.heard_at = now
-            return
-        if len(self._components) >= MAX_COMPONENTS and not self._forget_component(now):
-            return
-        likely = (heartbeat.autopilot != mavlink.MAV_AUTOPILOT_INVALID
-                  or heartbeat.type == mavlink.MAV_TYPE_GIMBAL)
-        self._component(source, now)
-        self._queries.set(source, now if likely else now + UNLIKELY_DELAY)
+        elif self._component(source, now):
+            likely = (heartbeat.autopilot != mavlink.MAV_AUTOPILOT_INVALID
+                      or heartbeat.type == mavlink.MAV_TYPE_GIMBAL)
+            self._queries.set(source, now if likely else now + UNLIKELY_DELAY)
 
     def _forget_component(self, now: float) -> bool:
         address, component = min(self._components.items(), key=lambda item: item[1].heard_at)
@@ -197,6 +210,8 @@ class GimbalClient(Payload):
     def _reopen(self, manager: Address, now: float) -> None:
         """Request the information of a manager that has sent a status but no information."""
         component = self._component(manager, now)
+        if component is None:
+            return
         if component.query.due == math.inf:
             component.query = Repetition()
         if component.query.due == -math.inf:

@@ -74,11 +74,12 @@ class _Device:
     The reports of the device of a gimbal; times are s.
 
     :param interval: between its attitudes; 0 for its own.
+    :ivar without_id_at: when an attitude came that may be that of another gimbal.
     :ivar problem: why the last status has no attitude, '' if it has one.
     """
 
     def __init__(self, address: Address, interval: float) -> None:
-        self.heard_at = self.attitude_at = -math.inf
+        self.heard_at = self.attitude_at = self.without_id_at = -math.inf
         self._status_time = 0
         self.attitude: MountAttitude | None = None
         self.problem = ''
@@ -193,6 +194,10 @@ class Gimbal:
         if manager is not None or is_device:
             self._check(now)
 
+    def heard_without_id(self, now: float) -> None:
+        """Note a message of its device or of another gimbal of the same address."""
+        self._device.without_id_at = now
+
     @property
     def addresses(self) -> set[Address]:
         """Return the addresses of its device and of its managers."""
@@ -209,9 +214,12 @@ class Gimbal:
         if not manager.is_heard(now):
             return self._link_problem or silence(
                 f'manager {manager.address}', manager.heard_at, now)
-        if now >= self._device.heard_at + SILENCE_LIMIT:
-            return self._link_problem or silence(f'device {self.key}', self._device.heard_at, now)
-        return ''
+        if now < self._device.heard_at + SILENCE_LIMIT:
+            return ''
+        if now < self._device.without_id_at + SILENCE_LIMIT:
+            return (f'{self.key.address} has several gimbals and sends attitudes without '
+                    'gimbal_device_id, so they cannot be told apart')
+        return self._link_problem or silence(f'device {self.key}', self._device.heard_at, now)
 
     def _check(self, now: float) -> None:
         """Choose the manager, and report changes of connection and control."""

@@ -16,11 +16,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 from illuminator_ros.gimbal import client as limits
 from illuminator_ros.gimbal import events
 from illuminator_ros.gimbal.events import GimbalKey
 from illuminator_ros.mavlink.dialect import mavlink
-from illuminator_ros.mavlink.messages import Address, CommandLong, heartbeat
+from illuminator_ros.mavlink.messages import Address, CommandLong, heartbeat, Message
 import pytest
 from support.entries import entries
 from support.gimbals import ALL, AUTOPILOT, DEVICE, FakeManager, keys, NAN, OTHER, Rig
@@ -85,6 +87,20 @@ def test_attitude_of_an_older_device_without_an_id_is_that_of_the_only_gimbal() 
     assert rig.all_of(events.AttitudeReceived)[0].key == GimbalKey(AUTOPILOT, 1)
 
 
+def test_attitudes_without_an_id_of_two_gimbals_are_named_as_the_reason() -> None:
+    numbered = [FakeManager(device_id=number, attitude_number=0) for number in (1, 2)]
+    rig = Rig(*numbered).run(3.0)
+
+    assert {one.unreachable(rig.now) for one in rig.client.gimbals.values()} == {
+        '1/1 has several gimbals and sends attitudes without gimbal_device_id, so they cannot be '
+        'told apart'}
+
+    for manager in numbered:
+        manager.attitude_number = manager.device_id
+    rig.run(1.0)
+    assert {one.unreachable(rig.now) for one in rig.client.gimbals.values()} == {''}
+
+
 def test_attitude_of_a_device_that_sends_its_component_id_as_its_id_is_its_own() -> None:
     rig = Rig(FakeManager(attitude_number=DEVICE.component)).run(3.0)
 
@@ -95,6 +111,7 @@ def test_manager_that_announces_no_device_yet_is_asked_again_when_it_reports_one
     manager = FakeManager(device_id=0, device_alive=False)
     rig = Rig(manager).run(20.0)
     assert keys(rig) == []
+    assert rig.client.managers_without_id(rig.now) == [AUTOPILOT]
     asked = len(requests(rig))
 
     manager.device_id, manager.device_alive = 154, True
@@ -102,6 +119,7 @@ def test_manager_that_announces_no_device_yet_is_asked_again_when_it_reports_one
 
     assert asked < 8
     assert keys(rig) == [GimbalKey(DEVICE)]
+    assert rig.client.managers_without_id(rig.now) == []
 
 
 def test_gm_27_manager_that_tells_no_information_is_known_by_its_status() -> None:
@@ -178,6 +196,19 @@ def test_forged_components_take_no_memory_without_end() -> None:
     rig.run(60.1)
     assert keys(rig) == [GimbalKey(DEVICE)]
     assert not rig.client.limit_reached
+
+
+@pytest.mark.parametrize('announcement', [FakeManager.status, FakeManager.information])
+def test_managers_that_announce_gimbals_of_the_limit_take_no_memory_without_end(
+        announcement: Callable[[FakeManager], Message]) -> None:
+    rig = Rig().run(1.0)
+    sizes = []
+    for component in range(1, 256):
+        for system in range(1, limits.MAX_GIMBALS + 1):
+            rig.receive(Address(system, component), announcement(FakeManager()))
+        sizes.append(entries(rig.client, rig.events))
+
+    assert sizes[254] <= 1.1 * sizes[20]
 
 
 def test_wanted_gimbal_is_found_among_forged_ones() -> None:

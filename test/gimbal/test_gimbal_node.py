@@ -452,16 +452,19 @@ def test_node_of_a_gimbal_that_is_silent_for_long_is_removed(
             'no gimbal connected: no component announces a gimbal')
 
 
-@pytest.mark.parametrize(('is_heard', 'selected', 'reason'), [
-    (False, 0, 'device 1/154 has not been heard'),
-    (True, 9, 'gimbal_device_id selects another one')])
+@pytest.mark.parametrize(('fields', 'selected', 'reason'), [
+    ({'device_alive': False}, 0,
+     'gimbal 1/154 is announced, but device 1/154 has not been heard'),
+    ({}, 9, 'gimbal 1/154 is announced, but gimbal_device_id selects another one'),
+    ({'device_id': 0}, 0, 'manager 1/1 announces a gimbal with gimbal_device_id 0, which names '
+     'none: it may not have found its gimbal device')])
 def test_answer_without_a_gimbal_names_the_reason_for_each_that_is_announced(
-        is_heard: bool, selected: int, reason: str, own_ros: Ros) -> None:
-    port, manager = free_port(), FakeManager(device_alive=is_heard)
+        fields: dict[str, Any], selected: int, reason: str, own_ros: Ros) -> None:
+    port, manager = free_port(), FakeManager(**fields)
     with (ended(start_gimbal(own_ros, port, gimbal_device_id=selected)),
           served_gimbals(port, manager, link=SlowLink), time_passes()):
         eventually(lambda: trigger(own_ros, 'neutral').message
-                   == f'no gimbal connected: gimbal 1/154 is announced, but {reason}')
+                   == f'no gimbal connected: {reason}')
 
 
 @pytest.mark.parametrize(('name', 'reliability'), [

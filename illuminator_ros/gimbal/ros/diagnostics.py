@@ -16,7 +16,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import fields
 import math
 
@@ -25,6 +25,7 @@ from ..commands import Control
 from ..events import DeviceIdentity, GimbalKey, GimbalSnapshot
 from ...mavlink.command_sender import format_seconds
 from ...mavlink.dialect import entry_names, flag_names, mavlink
+from ...mavlink.messages import Address
 from ...payload.mount_attitude import AXES
 from ...ros import diagnostics
 from ...ros.command_sources import HOLDER_VALUES, holder_values
@@ -67,12 +68,14 @@ _CONDITIONS = (mavlink.GIMBAL_DEVICE_ERROR_FLAGS_AT_ROLL_LIMIT
 
 
 def why_no_gimbal(
-    link: diagnostics.LinkDiagnostics, heard: Mapping[GimbalKey, str], known: str,
+    link: diagnostics.LinkDiagnostics, heard: Mapping[GimbalKey, str],
+    without_id: Sequence[Address], known: str,
 ) -> str:
     """
     Return why a node has no gimbal, for people.
 
     :param heard: the announced gimbals, each with the reason why it is not connected, else ''.
+    :param without_id: the managers that announce a gimbal with the id 0.
     :param known: the reason that a manager in this process gives, else ''.
     """
     if link.failure:
@@ -83,27 +86,31 @@ def why_no_gimbal(
         return '; '.join(
             f'gimbal {key} is announced, but {why or "gimbal_device_id selects another one"}'
             for key, why in heard.items())
+    if without_id:
+        return (f'manager {", ".join(map(str, without_id))} announces a gimbal with '
+                'gimbal_device_id 0, which names none: it may not have found its gimbal device')
     return ('no component announces a gimbal: '
             f'{diagnostics.why_nothing_is_heard(link, "a gimbal manager")}')
 
 
 def reports(
     link: diagnostics.LinkDiagnostics, *, gimbal: GimbalSnapshot | None,
-    heard: Mapping[GimbalKey, str], known: str, limit_reached: bool, interval: float,
-    started: float,
+    heard: Mapping[GimbalKey, str], without_id: Sequence[Address], known: str,
+    limit_reached: bool, interval: float, started: float,
 ) -> list[diagnostics.Report]:
     """
     Return the reports of a node.
 
     :param gimbal: the node's gimbal, None if there is none yet.
-    :param known: see :func:`why_no_gimbal`.
+    :param without_id, known: see :func:`why_no_gimbal`.
     :param interval: the requested s between attitudes, 0 for the device's own interval.
     :param started: when the node was started, s on the link's clock.
     """
     manager = gimbal.managers[0] if gimbal else None
     made = [diagnostics.link_report(
-        link, manager, kind='gimbal', absence=why_no_gimbal(link, heard, known), started=started,
-        count=len(heard), limit_reached=limit_reached)]
+        link, manager, kind='gimbal', started=started,
+        absence=why_no_gimbal(link, heard, without_id, known), count=len(heard),
+        limit_reached=limit_reached)]
     if gimbal is not None:
         fine = 'in control' if gimbal.in_control else 'connected'
         hardware_id = (f'{gimbal.identity.uid:x}' if gimbal.identity and gimbal.identity.uid else

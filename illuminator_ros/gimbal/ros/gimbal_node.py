@@ -159,7 +159,8 @@ class GimbalNode:
     def absence(self, now: float) -> str:
         """Return why there is no gimbal, for people."""
         link = self._host.diagnostics.snapshot(now)
-        return f'no gimbal connected: {why_no_gimbal(link, self._heard(now), self._why_none())}'
+        return 'no gimbal connected: ' + why_no_gimbal(
+            link, self._heard(now), self._client.managers_without_id(now), self._why_none())
 
     def _heard(self, now: float) -> dict[events.GimbalKey, str]:
         """Return the announced gimbals, each with the reason why it is not connected."""
@@ -298,7 +299,8 @@ class GimbalNode:
         gimbal = self._gimbal()
         return functools.partial(
             reports, gimbal=gimbal.snapshot(now) if gimbal else None,
-            heard=self._heard(now), known=self._why_none(),
+            heard=self._heard(now), without_id=self._client.managers_without_id(now),
+            known=self._why_none(),
             limit_reached=self._client.limit_reached,
             interval=self._client.settings.attitude_interval, started=self._started)
 
