@@ -41,6 +41,8 @@ LEVEL = mavlink.GIMBAL_DEVICE_FLAGS_ROLL_LOCK | mavlink.GIMBAL_DEVICE_FLAGS_PITC
 RESOLUTION = 1e-6
 # rad/s above which an axis turns.
 TURNING = 0.01
+# rad/s, one turn a second; a player that sends a greater rate probably sends degrees.
+RATE_LIMIT = math.tau
 
 
 class Range(NamedTuple):
@@ -69,10 +71,36 @@ Ranges: TypeAlias = tuple[Range, Range, Range]
 UNLIMITED: Ranges = (Range(), Range(), Range())
 
 
+def read_capabilities(message: GimbalManagerInformation | GimbalDeviceInformation) -> int:
+    """Return the capabilities in a message, 0 where unknown."""
+    # The extension has those of managers, too.
+    return int(message.cap_flags | getattr(message, 'cap_flags2', 0))
+
+
 def read_ranges(message: GimbalManagerInformation | GimbalDeviceInformation) -> Ranges:
-    """Return the ranges in a message; an end that is not known is NaN or infinite."""
+    """Return the ranges in a message as they are; an unknown end may be NaN."""
     return (Range(message.roll_min, message.roll_max), Range(message.pitch_min, message.pitch_max),
             Range(message.yaw_min, message.yaw_max))
+
+
+def known_ranges(message: GimbalManagerInformation | GimbalDeviceInformation) -> Ranges:
+    """
+    Return the ranges in a message as far as they have a meaning; an axis that is lacking is at 0.
+
+    An end that is not finite is unknown. If the ends of a range are swapped, both are unknown, and
+    so are those of an axis with a range of 0 to 0: the device does not report its limits.
+    """
+    capabilities = read_capabilities(message)
+
+    def known(read: Range, flag: int) -> Range:
+        if capabilities and not capabilities & flag:
+            return Range(0.0, 0.0)
+        range_ = Range(read.low if math.isfinite(read.low) else -math.inf,
+                       read.high if math.isfinite(read.high) else math.inf)
+        return Range() if range_.low > range_.high or range_ == (0.0, 0.0) else range_
+
+    roll, pitch, yaw = map(known, read_ranges(message), HAS_AXIS)
+    return roll, pitch, yaw
 
 
 def range_fields(ranges: Ranges) -> dict[str, float]:

@@ -23,7 +23,7 @@ from typing import TypeVar
 
 from . import events
 from . import messages as gimbal
-from .axes import Ranges, read_ranges
+from .axes import known_ranges, Ranges
 from .commands import Flag, GimbalChange, NEUTRAL, point, RETRACT, setpoint_flags, YAW_LOCKS
 from .gimbal_control import GimbalControl, REQUEST_LIMIT
 from .remote_managers import (
@@ -97,7 +97,7 @@ class _Device:
 
     def take_information(self, message: gimbal.GimbalDeviceInformation) -> None:
         """Take its identity and its ranges."""
-        self.identity, self.ranges = events.DeviceIdentity.of(message), read_ranges(message)
+        self.identity, self.ranges = events.DeviceIdentity.of(message), known_ranges(message)
         self._identity_query.finish()
 
     def take_status(self, status: GimbalDeviceAttitudeStatus, now: float) -> bool:
@@ -585,7 +585,7 @@ class Gimbal:
         information = manager.information
         return events.GimbalSnapshot(
             self.key, self.unreachable(now), self._managers.addresses, self._capabilities(),
-            device.ranges or (read_ranges(information) if information else None),
+            device.ranges or (known_ranges(information) if information else None),
             device.identity, device.attitude, device.attitude_at, device.problem, device.flags,
             device.errors, self._control.known, self._control.since, self.in_control,
             manager.status_at, manager.enforces_control, self._setpoints.sent,

@@ -277,7 +277,11 @@ class GimbalManager(Payload):
             return mavlink.MAV_RESULT_DENIED if is_status else None
         if command.command not in gimbal.DEVICE_ID_PARAM:
             return None
-        if params[gimbal.DEVICE_ID_PARAM[command.command]] not in (0, self.tracker.device_id):
+        device_id = params[gimbal.DEVICE_ID_PARAM[command.command]]
+        if device_id not in (0, self.tracker.device_id):
+            self.events.emit(RequestRefused(
+                source, f'gimbal device id {device_id:g} is neither {self.tracker.device_id} nor '
+                '0 for all'))
             return mavlink.MAV_RESULT_DENIED
         if command.command == mavlink.MAV_CMD_DO_GIMBAL_MANAGER_CONFIGURE:
             return self._configure(source, params, now)
@@ -309,7 +313,8 @@ class GimbalManager(Payload):
             return self._inactive_result
         try:
             changes = self.control.configure(source, params, now)
-        except ValueError:
+        except ValueError as error:
+            self.events.emit(RequestRefused(source, str(error)))
             return mavlink.MAV_RESULT_DENIED
         self._control_changed(changes, now)
         return mavlink.MAV_RESULT_ACCEPTED

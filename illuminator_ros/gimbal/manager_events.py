@@ -27,7 +27,7 @@ from ..mavlink.messages import Address
 
 @dataclass(frozen=True)
 class RequestRefused:
-    """A setpoint or a place of a player was refused."""
+    """A setpoint or a command of a player was refused."""
 
     player: Address
     reason: str

@@ -28,7 +28,17 @@ import math
 from typing import NamedTuple
 
 from . import messages as gimbal
-from .axes import HAS_AXIS, HAS_LOCK, LEVEL, Range, Ranges, read_ranges, UNLIMITED
+from .axes import (
+    HAS_AXIS,
+    HAS_LOCK,
+    known_ranges,
+    LEVEL,
+    Range,
+    Ranges,
+    RATE_LIMIT,
+    read_capabilities,
+    UNLIMITED,
+)
 from .messages import rates_of
 from ..mavlink.command_sender import DEGREE_SCALE
 from ..mavlink.dialect import MAV_RESULT_COMMAND_UNSUPPORTED_MAV_FRAME, mavlink
@@ -72,22 +82,8 @@ class GimbalModel:
 
     @classmethod
     def from_information(cls, message: gimbal.GimbalDeviceInformation) -> GimbalModel:
-        """
-        Read the message of a device; an axis that it lacks stays at 0.
-
-        An end that is not finite is unknown. If the ends of a range are swapped, both are unknown.
-        """
-        capabilities = message.cap_flags | message.cap_flags2
-
-        def known(read: Range, flag: int) -> Range:
-            if capabilities and not capabilities & flag:
-                return Range(0.0, 0.0)
-            range_ = Range(read.low if math.isfinite(read.low) else -math.inf,
-                           read.high if math.isfinite(read.high) else math.inf)
-            return range_ if range_.low <= range_.high else Range()
-
-        roll, pitch, yaw = map(known, read_ranges(message), HAS_AXIS)
-        return cls(capabilities, (roll, pitch, yaw))
+        """Read the message of a device, see :func:`known_ranges`."""
+        return cls(read_capabilities(message), known_ranges(message))
 
     @classmethod
     def from_ranges(cls, ranges: Ranges) -> GimbalModel:
@@ -189,14 +185,14 @@ class Setpoint(NamedTuple):
         Return a request with the yaw frame that its flags name.
 
         :raises ValueError: if the flags name both frames, an angle is beyond half a turn, or a
-            rate is infinite.
+            rate is beyond :data:`~.axes.RATE_LIMIT`.
         """
         # The definitions of the angles have no larger values. So a larger one is an error, and to
         # subtract turns from it would turn the gimbal to a pose that no player has requested.
         if any(abs(angle) > math.pi + _TOLERANCE for angle in angles):
             raise ValueError('an angle is beyond 180 degrees')
-        if any(map(math.isinf, rates)):
-            raise ValueError('a rate is infinite')
+        if any(abs(rate) > RATE_LIMIT for rate in rates):
+            raise ValueError(f'a rate is beyond {RATE_LIMIT:.4f} rad/s')
         return cls(flags, yaw_frame(flags), angles, rates)
 
     @classmethod
@@ -456,7 +452,8 @@ def read_roi(command: AnyCommand) -> tuple[GeoPoint, bool]:
             raise Refused(f'the frame {command.frame} of the place is not supported',
                           MAV_RESULT_COMMAND_UNSUPPORTED_MAV_FRAME)
         latitude, longitude = latitude / DEGREE_SCALE, longitude / DEGREE_SCALE
-    if abs(latitude) <= 90 and abs(longitude) <= 180 and math.isfinite(altitude):
+    if (abs(latitude) <= 90 and abs(longitude) <= 180
+            and abs(altitude) <= gimbal.ALTITUDE_LIMIT):
         return GeoPoint(latitude, longitude, altitude), is_relative
     raise Refused(f'{latitude:g}, {longitude:g}, {altitude:g} is not a place')
 

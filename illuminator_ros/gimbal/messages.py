@@ -41,6 +41,8 @@ AutopilotStateForGimbalDevice = mavlink.MAVLink_autopilot_state_for_gimbal_devic
 NON_MAVLINK_IDS = range(1, 7)
 NO_COMPONENT = Address(0, 0)
 NO_PLAYER, UNCHANGED, SENDER, REMOVE_SENDER = 0, -1, -2, -3
+# m; some greater altitudes exceed the range of float32, their type in MAVLink.
+ALTITUDE_LIMIT = 100e3
 ABSOLUTE_FRAMES, RELATIVE_FRAMES = (0, 5), (3, 6)
 
 # The commands that a gimbal manager executes, and which param has the gimbal device id.

@@ -48,6 +48,9 @@ from ..payload.rotation import Vector
 # setpoints that follow a place, the vehicle or a rate.
 HOLD_INTERVAL = 0.9
 FOLLOW_INTERVAL = 0.05
+# s for which one step turns a setpoint at most, the shortest setpoint_timeout: the gimbal must not
+# leap after a pause of the process.
+MAX_STEP = 0.1
 HEADING_UNKNOWN = 'the heading of the vehicle is unknown'
 
 
@@ -221,9 +224,10 @@ class SetpointMixer:
 
     def _turn(self, now: float, offsets: Vector = STILL) -> None:
         """Turn the setpoint by the rates that the device does not follow, and by offsets."""
-        self.current = self.current and turned(
-            self.current, now, self._device.model.ranges, self._ahead(self.current, now), offsets,
-            self.clipped)
+        if (before := self.current) is not None:
+            self.current = turned(
+                before._replace(since=max(before.since, now - MAX_STEP)), now,
+                self._device.model.ranges, self._ahead(before, now), offsets, self.clipped)
 
     def _send(self, now: float) -> None:
         """Give the device the setpoint, with everything mixed and clipped."""

@@ -411,10 +411,15 @@ def test_each_kind_of_setpoint_reaches_the_device(case: str) -> None:
     GimbalManagerSetAttitude(*OURS, 0, 0, (0.0, 0.0, 0.0, 0.0), NAN, NAN, NAN),
     GimbalManagerSetAttitude(*OURS, 0, 0, (1.0, NAN, 0.0, 0.0), NAN, NAN, NAN),
     GimbalManagerSetAttitude(*OURS, 0, 0, UNSET_QUATERNION, math.inf, NAN, NAN),
+    GimbalManagerSetAttitude(*OURS, 0, 0, UNSET_QUATERNION, 0.0, 0.0, 1e30),
+    pitch_yaw(yaw_rate=-6.3), pitch_yaw(0.0, 0.0, pitch_rate=6.3),
     pitch_yaw(math.inf, 0.0), pitch_yaw(yaw_rate=-math.inf), pitch_yaw(0.0, 0.0, flags=32 | 64),
     GimbalManagerSetManualControl(*OURS, 0, 0, 1.5, 0.0, NAN, NAN),
     pitch_yaw_command(math.inf, 0.0), pitch_yaw_command(0.0, 0.0, flags=96),
     pitch_yaw_command(0.0, 0.0, math.inf), pitch_yaw_command(-400.0, 0.0),
+    pitch_yaw_command(NAN, NAN, 0.0, 361.0), pitch_yaw_command(0.0, 0.0, device_id=NAN),
+    region(47.1, 8.0, 0.0, device_id=NAN), region(47.1, 8.0, 1e30),
+    configure(*PILOT, device_id=NAN), long(mavlink.MAV_CMD_DO_SET_ROI_NONE, NAN),
     pitch_yaw_command(0.0, 0.0, flags=math.inf),
     pitch_yaw_command(NAN, 180.1), pitch_yaw(NAN, -3.15), pitch_yaw(4.0, NAN)], ids=str)
 def test_an_invalid_setpoint_is_refused_and_named(message: Any) -> None:
@@ -862,6 +867,19 @@ def test_gm_22_the_manager_turns_a_device_that_takes_no_rates() -> None:
 
     assert of(SetpointSent, rig.events)[-1].setpoint.angles == pytest.approx(
         (0.0, 0.1, 0.5), abs=0.03)
+
+
+def test_gm_22_a_rate_turns_a_device_without_mavlink_no_further_after_a_pause() -> None:
+    rig = in_control(device_id=1, ranges=(Range(), Range(-1.0, 1.0), Range()))
+    rig.give(PILOT, pitch_yaw(yaw_rate=0.3))
+    rig.run(1.0, each=rig.heartbeats(PILOT))
+    before = yaws(rig)[-1]
+
+    rig.now += 5.0
+    rig.run(0.0)
+
+    assert before == pytest.approx(0.3, abs=0.02)
+    assert yaws(rig)[-1] - before <= 0.3 * setpoint_mixer.MAX_STEP + 1e-9
 
 
 def test_gm_22_a_yaw_from_north_follows_each_heading_of_the_vehicle() -> None:

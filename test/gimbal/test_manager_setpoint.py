@@ -174,7 +174,8 @@ def test_a_turn_ends_at_a_stop_and_a_turn_back_begins_there(
 
 @pytest.mark.parametrize(('low', 'high', 'expected'), [
     (-0.5, 0.4, Range(-0.5, 0.4)), (math.inf, -math.inf, Range()), (0.5, -0.5, Range()),
-    (math.nan, 0.4, Range(high=0.4)), (-0.5, math.inf, Range(low=-0.5))])
+    (math.nan, 0.4, Range(high=0.4)), (-0.5, math.inf, Range(low=-0.5)), (0.0, 0.0, Range()),
+    (0.0, 0.4, Range(0.0, 0.4))])
 def test_gm_12_the_range_that_a_device_reports_is_unknown_where_it_has_no_meaning(
         low: float, high: float, expected: Range) -> None:
     model = GimbalModel.from_information(information(yaw_min=low, yaw_max=high))

@@ -226,7 +226,7 @@ def long(
 
 def configure(
     system: float, component: float, system2: float = -1, component2: float = -1, *,
-    device_id: int = 0, to: mav.Address = OURS, confirmation: int = 0,
+    device_id: float = 0, to: mav.Address = OURS, confirmation: int = 0,
 ) -> mav.CommandLong:
     """Return MAV_CMD_DO_GIMBAL_MANAGER_CONFIGURE."""
     return long(mavlink.MAV_CMD_DO_GIMBAL_MANAGER_CONFIGURE, system, component, system2,
@@ -234,7 +234,7 @@ def configure(
 
 
 def pitch_yaw_command(pitch: float, yaw: float, pitch_rate: float = NAN, yaw_rate: float = NAN,
-                      flags: float = 0, device_id: int = 0) -> mav.CommandLong:
+                      flags: float = 0, device_id: float = 0) -> mav.CommandLong:
     """Return MAV_CMD_DO_GIMBAL_MANAGER_PITCHYAW, deg and deg/s."""
     return long(mavlink.MAV_CMD_DO_GIMBAL_MANAGER_PITCHYAW, pitch, yaw, pitch_rate, yaw_rate,
                 flags, 0, device_id)
@@ -253,7 +253,7 @@ def request(message: type[mav.Message], to: mav.Address = OURS) -> mav.CommandLo
 
 
 def region(latitude: float, longitude: float, altitude: float, *, frame: int = 0,
-           device_id: int = 0) -> mav.CommandInt:
+           device_id: float = 0) -> mav.CommandInt:
     """Return MAV_CMD_DO_SET_ROI_LOCATION, deg and m."""
     return mav.CommandInt(
         *OURS, frame, mavlink.MAV_CMD_DO_SET_ROI_LOCATION, 0, 0, device_id, 0.0, 0.0, 0.0,

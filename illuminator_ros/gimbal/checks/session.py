@@ -117,8 +117,9 @@ class Limits(NamedTuple):
 
     @classmethod
     def from_message(cls, message: Information) -> Limits:
-        """Read an INFORMATION message."""
-        roll, pitch, yaw = (Range(*map(math.degrees, one)) for one in read_ranges(message))
+        """Read an INFORMATION message; a range of 0 to 0 is unknown."""
+        roll, pitch, yaw = (Range(*map(math.degrees, one)) if any(one) else Range(NAN, NAN)
+                            for one in read_ranges(message))
         return cls(roll, pitch, yaw, getattr(message, 'cap_flags2', 0) or message.cap_flags)
 
 

@@ -23,6 +23,8 @@ from geometry_msgs.msg import QuaternionStamped, Vector3, Vector3Stamped
 from sensor_msgs.msg import NavSatFix
 from std_msgs.msg import Header
 
+from ..axes import RATE_LIMIT
+from ..messages import ALTITUDE_LIMIT
 from ...payload.messages import GeoPoint
 from ...payload.mount_attitude import AXES, YawFrame
 from ...payload.rotation import Quaternion, Vector
@@ -38,10 +40,6 @@ FRAME_PARAMETERS = (
 # rounded angles.
 ANGLE_LIMITS = (math.pi, math.pi / 2, math.pi)
 ANGLE_TOLERANCE = 0.001
-# rad/s, one turn a second; greater rates are probably in degrees.
-RATE_LIMIT = 2 * math.pi
-# m; some greater altitudes exceed the range of float32, their type in MAVLink.
-ALTITUDE_LIMIT = 100e3
 
 
 @dataclass(frozen=True)
@@ -105,7 +103,7 @@ def read_rates(message: Vector3Stamped) -> Vector:
     """
     Return rates of roll, pitch and yaw, rad/s; the frame is not read.
 
-    :raises ValueError: if one is NaN or beyond :data:`RATE_LIMIT`.
+    :raises ValueError: if one is NaN or beyond :data:`~..axes.RATE_LIMIT`.
     """
     rates = read_vector(message.vector)
     for axis, rate in zip(AXES, rates, strict=True):

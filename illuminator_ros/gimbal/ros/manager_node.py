@@ -198,7 +198,7 @@ class ManagerNode(ServedPayload):
         elif isinstance(event, RoleHolderChanged):
             self._log.info(_control_text(event, self._manager.settings.control.lease), 'control')
         elif isinstance(event, manager_events.RequestRefused):
-            self._log.warning(f'a setpoint of {event.player} is refused: {event.reason}',
+            self._log.warning(f'a request of {event.player} is refused: {event.reason}',
                               'refused')
         elif isinstance(event, manager_events.SetpointClipped):
             for one in event.clipped:
