@@ -236,9 +236,6 @@ class GimbalClient(Payload):
     def may_send_at_end(self, sent: Command | Message) -> bool:
         """See :meth:`Payload.may_send_at_end`: a release of control, and rates of zero."""
         if isinstance(sent, Command):
-            if sent.command == mavlink.MAV_CMD_DO_GIMBAL_MANAGER_PITCHYAW:
-                pitch, yaw, *rates = sent.params[:4]
-                return math.isnan(pitch) and math.isnan(yaw) and rates == [0.0, 0.0]
             return (sent.command == mavlink.MAV_CMD_DO_GIMBAL_MANAGER_CONFIGURE
                     and sent.params[0] == REMOVE_SENDER)
         return (isinstance(sent, GimbalManagerSetAttitude)

@@ -123,14 +123,18 @@ class Flag(NamedTuple):
     is_set: bool = True
 
     def change(self, device_id: int) -> GimbalChange[GimbalDeviceAttitudeStatus]:
-        """Return the change, which leaves angles and rates as they are."""
-        is_locked = self.is_set and self.flag == mavlink.GIMBAL_DEVICE_FLAGS_YAW_LOCK
-        flags = setpoint_flags(YawFrame.EARTH if is_locked else YawFrame.VEHICLE)
+        """
+        Return the change by a flag of a pose.
+
+        Such a flag takes precedence over the angles and rates (GIMBAL_DEVICE_FLAGS), so they are
+        NaN, "unset" (MAV_CMD_DO_GIMBAL_MANAGER_PITCHYAW). Without it PX4 would turn to 0.
+        """
         return GimbalChange(
             mavlink.MAV_CMD_DO_GIMBAL_MANAGER_PITCHYAW,
-            (*(math.nan,) * 4, flags | (self.flag if self.is_set else 0), 0, device_id), self.goal,
+            (*(math.nan,) * 4, setpoint_flags(YawFrame.VEHICLE) | self.flag, 0, device_id),
+            self.goal,
             status_name=GimbalDeviceAttitudeStatus.msgname,
-            shown_by=lambda status: bool(status.flags & self.flag) is self.is_set,
+            shown_by=lambda status: bool(status.flags & self.flag),
             actual=lambda status: ', '.join(
                 flag_names('GIMBAL_DEVICE_FLAGS', status.flags)) or 'no flags')
 
@@ -144,16 +148,6 @@ YAW_LOCKS = {
                mavlink.GIMBAL_DEVICE_CAP_FLAGS_HAS_YAW_LOCK),
     False: Flag('unlock yaw', 'yaw follows the vehicle', mavlink.GIMBAL_DEVICE_FLAGS_YAW_LOCK,
                 0, is_set=False)}
-
-
-def stop(flags: int, device_id: int) -> GimbalChange[None]:
-    """
-    Return the change that stops the gimbal: unlike a setpoint of zero rates, it is acknowledged.
-
-    :param flags: as in the setpoint.
-    """
-    return GimbalChange(mavlink.MAV_CMD_DO_GIMBAL_MANAGER_PITCHYAW,
-                        (math.nan, math.nan, 0.0, 0.0, flags, 0.0, device_id), 'stopped')
 
 
 def point(device_id: int, place: GeoPoint | None) -> GimbalChange[None]:

@@ -33,8 +33,10 @@ from .remote_managers import (
     Repetition,
     silence,
     SILENCE_LIMIT,
+    STOP_LIMIT,
 )
 from .setpoint_stream import SetpointStream
+from .yaw_lock import YawLock
 from ..mavlink.command_sender import CommandResult, CommandSender
 from ..mavlink.dialect import mavlink, short_names
 from ..mavlink.messages import Address
@@ -159,6 +161,7 @@ class Gimbal:
         self._setpoints = SetpointStream(
             self._message, commands.send, settings.setpoint_timeout,
             lambda: self._manager.pose_frame())
+        self._yaw_lock = YawLock(self._setpoints.hold)
         self._sources = Sources(settings.sources)
         self._connected = False
         self._link_problem = ''
@@ -173,6 +176,7 @@ class Gimbal:
         """Record that some components cannot be reached, and the reason."""
         if self.key.address in lost or self._manager.address in lost:
             self._link_problem = reason
+            self._yaw_lock.cancel(reason, now)
         self._managers.components_lost(lost, now, reason)
         if self.key.address in lost:
             self._device.heard_at = min(self._device.heard_at, now - SILENCE_LIMIT)
@@ -238,6 +242,8 @@ class Gimbal:
         if control == self._control.known:
             return
         is_first = self._control.update(control, self._manager, now)
+        if not self.in_control:
+            self._yaw_lock.cancel(self.unavailable(now), now)
         if control is None:
             # The manager that had shown this component in control takes the zero.
             last = self._manager.control if self._manager.is_heard(now) else None
@@ -276,9 +282,13 @@ class Gimbal:
             return
         self._check(now)
         manager.confirm_pose(status, now)
+        self._yaw_lock.reported(status, now)
         self._setpoints.reported(status, device.attitude, now, may_send=(
             self.in_control
             and not (manager.pose_changes.is_busy or manager.place_changes.is_busy)))
+        if manager.is_releasing and self._setpoints.stands:
+            self._setpoints.forget()
+            manager.release_due = -math.inf
         self._emit(events.AttitudeReceived(
             self.key, device.attitude, device.flags, device.errors))
 
@@ -309,6 +319,8 @@ class Gimbal:
     def _begin(self, now: float) -> None:
         """Begin a request or a setpoint of a user, which may come before the poll that is due."""
         self.was_commanded = True
+        # A later setpoint or request must not be undone.
+        self._yaw_lock.stop_resending()
         self._check(now)
 
     def take_control(self, now: float, done: Done) -> None:
@@ -321,12 +333,22 @@ class Gimbal:
         self._begin(now)
         manager, setpoints = self._manager, self._setpoints
         # Nothing that comes after the zero may turn the gimbal, as ArduPilot would let it.
-        manager.cancel_moves('superseded by a release of control', now, superseded=True)
+        self._cancel_moves('superseded by a release of control', now, superseded=True)
         may_turn = setpoints.may_turn
         setpoints.end(now)
         if may_turn and manager.is_heard(now):
-            manager.stop(setpoints.stop(now), self.key.device_id, now, setpoints.forget)
-        self._request_control(False, now, done)
+            # No command stops a gimbal everywhere: PX4 reads unset angles as 0.
+            setpoints.stop(now)
+            manager.release_due = now + STOP_LIMIT
+
+        def released(result: Result, now: float) -> None:
+            manager.release_due = -math.inf
+            if result.success and setpoints.may_turn:
+                result = result._replace(
+                    message=f'{result.message}; no attitude shows that the gimbal stands')
+            done(result, now)
+
+        self._request_control(False, now, released)
 
     def _request_control(self, take: bool, now: float, done: Done) -> None:
         refusal = self._commands.refusal if take else ''
@@ -360,6 +382,7 @@ class Gimbal:
 
     def close(self, now: float) -> None:
         """Answer all requests; :meth:`release_control` is still possible."""
+        self._yaw_lock.cancel(self._commands.refusal, now, superseded=True)
         self._managers.close(self._commands.refusal, now)
 
     def change_settings(self, settings: GimbalSettings, now: float) -> None:
@@ -402,7 +425,7 @@ class Gimbal:
             return
         self._setpoints.end(now)
         if change.before is not None:
-            self._manager.cancel_moves(self.refusal(change.before), now)
+            self._cancel_moves(self.refusal(change.before), now)
         self._emit(events.GimbalHeld(self.key, change))
 
     # Requests
@@ -416,8 +439,14 @@ class Gimbal:
         self._set_flag(RETRACT, now, done)
 
     def set_yaw_lock(self, lock: bool, now: float, done: Done) -> None:
-        """Hold the yaw against the earth, or let it follow the vehicle (GM-3)."""
-        self._set_flag(YAW_LOCKS[lock], now, done)
+        """Stop; then hold the yaw against the earth, or let it follow the vehicle (GM-3)."""
+        self._begin(now)
+        flag = YAW_LOCKS[lock]
+        if reason := self.unavailable(now) or self._missing(flag.needed):
+            done(Result(False, reason), now)
+            return
+        self._manager.cancel_moves(f'superseded by {flag.goal}', now, superseded=True)
+        self._yaw_lock.want(flag, now, done)
 
     def _set_flag(self, flag: Flag, now: float, done: Done) -> None:
         self._begin(now)
@@ -425,6 +454,7 @@ class Gimbal:
             done(Result(False, reason), now)
             return
         self._end_place_changes(flag.goal, now)
+        self._yaw_lock.cancel(f'superseded by {flag.goal}', now, superseded=True)
         self._request(self._manager.pose_changes, flag.change(self.key.device_id), flag.wish, now,
                       self._setpoints.suspend(now, done))
 
@@ -525,6 +555,11 @@ class Gimbal:
         self._begin(now)
         return self.unavailable(now)
 
+    def _cancel_moves(self, message: str, now: float, *, superseded: bool = False) -> None:
+        """End the requests that may turn the gimbal, or stop it later."""
+        self._manager.cancel_moves(message, now, superseded=superseded)
+        self._yaw_lock.cancel(message, now, superseded=superseded)
+
     def _end_place_changes(self, newer: str, now: float) -> None:
         """Send no place again, which would undo a later setpoint or request."""
         self._manager.place_changes.cancel(f'superseded by {newer}', now, superseded=True)
@@ -547,6 +582,7 @@ class Gimbal:
         manager, control = self._manager, self._control
         for one in manager.reconcilers:
             one.poll(now)
+        self._yaw_lock.poll(now)
         if self.in_control:
             self._setpoints.poll(now)
         if not self._connected:
@@ -569,7 +605,7 @@ class Gimbal:
         is_known = self._control.known is not None
         if self._connected and is_known and self._control.take_due:
             return -math.inf
-        due = min(self._sources.next_deadline(),
+        due = min(self._sources.next_deadline(), self._yaw_lock.next_deadline(),
                   *(one.next_deadline() for one in manager.reconcilers))
         if is_known:
             due = min(due, manager.control_deadline())

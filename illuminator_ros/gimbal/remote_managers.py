@@ -22,23 +22,23 @@ import math
 from typing import Any
 
 from . import events
-from .commands import Control, stop
+from .commands import Control
 from .messages import GimbalManagerInformation, GimbalManagerStatus, REMOVE_SENDER
 from ..mavlink.command_sender import CommandSender, format_seconds
 from ..mavlink.dialect import mavlink
 from ..mavlink.messages import Address
-from ..payload.attempt import Result, StatusReport, Target
+from ..payload.attempt import StatusReport, Target
 from ..payload.messages import GimbalDeviceAttitudeStatus
 from ..payload.mount_attitude import yaw_frame, YawFrame
-from ..payload.reconciler import Desired, Reconciler
+from ..payload.reconciler import Reconciler
 
 # s of silence after which a manager or a device is lost.
 SILENCE_LIMIT = 3.0
 # s since the last GIMBAL_MANAGER_STATUS after which it is requested (ArduPilot does not stream it,
 # PX4 does every 2 s), and after which control is unknown.
 STATUS_REQUEST_DELAY, STATUS_LIMIT = 3.0, 6.0
-# s; the limit of the command that stops a gimbal before control is released.
-STOP_LIMIT = 0.3
+# s for which a release of control waits until the attitude shows that the gimbal stands.
+STOP_LIMIT = 0.4
 # ms by which a status may be older than the one before it; with a longer step back, its sender has
 # restarted.
 LATE_LIMIT = 1000
@@ -85,6 +85,7 @@ class RemoteManager:
 
     :ivar autopilot: MAV_AUTOPILOT, None while unknown; likewise ``information``.
     :ivar control: the components in control in its last status.
+    :ivar release_due: the time before which control is not changed: the gimbal is being stopped.
     :ivar control_changes: confirmed by its status.
     :ivar pose_changes: of the flags, confirmed by the status of the device: ArduPilot's manager
         does not report them.
@@ -99,25 +100,23 @@ class RemoteManager:
         self.control: Control | None = None
         self.status_query = Repetition()
         self._status_time = 0
+        self.release_due = -math.inf
         self.target = Target(
             address, commands, kind='gimbal manager', status_id=GimbalManagerStatus.id,
             status_name=GimbalManagerStatus.msgname, needs_status=True)
-        # Control is changed after the gimbal has stopped.
         self.control_changes: Reconciler[GimbalManagerStatus] = Reconciler(
-            self.target,
-            earliest=lambda change: math.inf if self._stops.is_busy else -math.inf)
+            self.target, earliest=lambda change: self.release_due)
         self.pose_changes: Reconciler[GimbalDeviceAttitudeStatus] = Reconciler(Target(
             address, commands, kind='gimbal device', status_id=GimbalDeviceAttitudeStatus.id,
             status_name=GimbalDeviceAttitudeStatus.msgname, status_source=key.address,
             needs_status=True))
-        unconfirmed = Target(address, commands, kind='gimbal manager')
-        self.place_changes: Reconciler[None] = Reconciler(unconfirmed)
-        self._stops: Reconciler[None] = Reconciler(unconfirmed)
+        self.place_changes: Reconciler[None] = Reconciler(
+            Target(address, commands, kind='gimbal manager'))
 
     @property
     def reconcilers(self) -> tuple[Reconciler[Any], ...]:
         """Return the reconcilers of all properties."""
-        return self._stops, self.control_changes, self.pose_changes, self.place_changes
+        return self.control_changes, self.pose_changes, self.place_changes
 
     def pose_frame(self) -> tuple[YawFrame | None, float]:
         """Return the yaw frame of the request for a pose, None for none; since when, s."""
@@ -171,19 +170,6 @@ class RemoteManager:
     def is_releasing(self) -> bool:
         """Whether a release of control is under way."""
         return self.control_changes.may_set(lambda change: change.params[0] == REMOVE_SENDER)
-
-    def stop(self, flags: int, device_id: int, now: float, stopped: Callable[[], None]) -> None:
-        """
-        Stop the gimbal; control is not changed before that has ended.
-
-        :param stopped: called when the manager has accepted it.
-        """
-        def ended(result: Result, now: float) -> None:
-            if result.success:
-                stopped()
-
-        self._stops.want(
-            Desired(stop(flags, device_id), since=now, limit=STOP_LIMIT), now, ended)
 
     def cancel_moves(self, message: str, now: float, *, superseded: bool = False) -> None:
         """End the requests that may turn the gimbal."""

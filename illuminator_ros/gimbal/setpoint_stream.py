@@ -64,6 +64,7 @@ class _Setpoint:
     :param due: when it is sent again, s; of a rate or a place, when it ends with a zero.
     :param ends_rate: whether it is an attitude that ends a rate, unless it is lost.
     :param is_over: whether the gimbal follows a later request.
+    :param stands: whether the last attitude after a zero shows that the gimbal stands.
     """
 
     kind: Kind
@@ -72,6 +73,7 @@ class _Setpoint:
     due: list[float] = field(default_factory=list)
     ends_rate: bool = False
     is_over: bool = False
+    stands: bool = False
 
     @property
     def moves(self) -> bool:
@@ -183,11 +185,21 @@ class SetpointStream:
 
         return ended
 
-    def stop(self, now: float) -> int:
-        """Send a zero; return the flags of its message."""
+    def hold(self, frame: YawFrame, now: float) -> None:
+        """Send a zero whose yaw frame sets the yaw lock: the gimbal stays where it points."""
+        self._attitude_frame, self._attitude_at = frame, now
         self.set_rates(STILL, now)
-        assert self._last is not None and self._last.message is not None
-        return self._last.message.flags
+
+    def stop(self, now: float) -> None:
+        """Send a zero, whose first check is sooner, since control will be released."""
+        self.set_rates(STILL, now)
+        assert self._last is not None
+        self._last.due.insert(0, now + ATTITUDE_SPACING)
+
+    @property
+    def stands(self) -> bool:
+        """Whether an attitude has shown since the last zero that the gimbal stands."""
+        return self._last is not None and self._last.stands
 
     def forget(self) -> None:
         """Note that the gimbal follows no setpoint any more: the last zero has arrived."""
@@ -251,6 +263,7 @@ class SetpointStream:
             return
         turns = self._turns(status, attitude, now)
         if turns is not None:
+            zero.stands = not turns
             del zero.due[0]
             self._seen = None
         if turns:

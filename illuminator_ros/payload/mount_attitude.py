@@ -34,7 +34,8 @@ from ..mavlink.dialect import mavlink
 
 # w, x, y, z of a message.
 Components = tuple[float, float, float, float]
-# Fields of a setpoint that the receiver must ignore.
+# Fields of a setpoint that the receiver must ignore. NaN is their only value for that ("set to NaN
+# according to use case", GIMBAL_MANAGER_SET_ATTITUDE and GIMBAL_DEVICE_SET_ATTITUDE).
 UNSET_QUATERNION: Components = (math.nan,) * 4
 UNSET_VECTOR: Vector = (math.nan,) * 3
 # The order of angles and rates, and rates of a mount that does not turn.

@@ -23,7 +23,7 @@ from illuminator_ros.gimbal.gimbal import GimbalSettings
 from illuminator_ros.gimbal.messages import DEVICE_ID_PARAM, GimbalManagerSetAttitude, rates_of
 from illuminator_ros.gimbal.setpoint_stream import REPEATS
 from illuminator_ros.mavlink.dialect import mavlink, replaced
-from illuminator_ros.mavlink.messages import Address, CommandAck, CommandInt, CommandLong
+from illuminator_ros.mavlink.messages import Address, CommandInt, CommandLong
 from illuminator_ros.payload.mount_attitude import from_mavlink, to_mavlink, YawFrame
 from illuminator_ros.payload.rotation import Quaternion, Vector
 import pytest
@@ -147,6 +147,7 @@ def turn(rig: Rig) -> None:
 
 def turn_and_release(rig: Rig) -> None:
     turn(rig)
+    rig.managers[0].rates = (0.0, 0.0, 0.0)
     rig.gimbal.release_control(rig.now, rig.done)
     rig.run(1.0)
     assert rig.results[0].success
@@ -157,16 +158,12 @@ def send_attitude(rig: Rig, lock: bool = False) -> None:
 
 
 @pytest.mark.parametrize('lock', [True, False])
-@pytest.mark.parametrize(('change', 'result', 'changes'), [
-    (request_lock, mavlink.MAV_RESULT_ACCEPTED, True),
-    (request_lock, mavlink.MAV_RESULT_DENIED, False),
-    (send_attitude, mavlink.MAV_RESULT_ACCEPTED, True)])
+@pytest.mark.parametrize('change', [request_lock, send_attitude])
 def test_gm_2_rate_leaves_a_yaw_lock_that_the_device_does_not_report_yet(
-        change: Callable[[Rig, bool], None], result: int, changes: bool,
-        lock: bool) -> None:
+        change: Callable[[Rig, bool], None], lock: bool) -> None:
     rig = in_control()
     rig.managers[0].flags = 0 if lock else mavlink.GIMBAL_DEVICE_FLAGS_YAW_LOCK
-    rig.managers[0].results[mavlink.MAV_CMD_DO_GIMBAL_MANAGER_PITCHYAW] = result
+    rig.managers[0].applies = False
     rig.run(1.0)
 
     change(rig, lock)
@@ -175,7 +172,7 @@ def test_gm_2_rate_leaves_a_yaw_lock_that_the_device_does_not_report_yet(
     rig.run(0.02)
 
     has_lock = bool(setpoints(rig)[-1][1].flags & mavlink.GIMBAL_DEVICE_FLAGS_YAW_LOCK)
-    assert has_lock is (lock is changes)
+    assert has_lock is lock
 
 
 @pytest.mark.parametrize('lock', [True, False])
@@ -201,7 +198,7 @@ def test_an_attitude_is_not_sent_again_after_a_request() -> None:
     send_attitude(rig)
     rig.run(0.1)
 
-    request_lock(rig, True)
+    rig.gimbal.set_neutral(rig.now, rig.done)
     rig.run(3.0)
 
     assert len(setpoints(rig)) == 1
@@ -254,7 +251,7 @@ def test_only_a_zero_of_a_rate_is_sent_when_a_closed_link_is_open_and_shows_cont
 
 @pytest.mark.parametrize(('start', 'sent', 'turns', 'zeros'), [
     (turn, 1, True, len(REPEATS)), (turn, 1, False, 0), (send_attitude, 1, True, 0),
-    # The zero before a release was acknowledged.
+    # The attitude has shown that the zero before a release has arrived.
     (turn_and_release, 2, True, 0)])
 def test_a_rate_that_another_player_has_ended_gets_its_zero_if_it_lasts_until_control_is_back(
         start: Callable[[Rig], object], sent: int, turns: bool, zeros: int) -> None:
@@ -355,29 +352,33 @@ def test_zero_of_a_release_while_the_manager_is_lost_is_sent_when_it_is_heard_ag
     assert manager.received[-1].angular_velocity_z == 0.0
 
 
-@pytest.mark.parametrize(('result', 'most'), [
-    (mavlink.MAV_RESULT_ACCEPTED, 0.05), (mavlink.MAV_RESULT_IN_PROGRESS, 0.35)])
-def test_control_is_released_once_the_manager_has_acknowledged_the_zero_or_after_300_ms(
-        result: int, most: float) -> None:
+@pytest.mark.parametrize(('lost', 'turning', 'most', 'note'), [
+    (0, 0.2, 0.35, ''), (1, 0.2, 0.45, ''),
+    (99, NAN, 0.45, ''), (99, 0.2, 0.45, '; no attitude shows that the gimbal stands')])
+def test_control_is_released_once_an_attitude_shows_that_the_gimbal_stands_or_after_400_ms(
+        lost: int, turning: float, most: float, note: str) -> None:
     rig = in_control()
+    manager = rig.managers[0]
+    manager.rates = (0.0, -turning, 0.0)
     rig.gimbal.set_rates((0.0, 0.2, 0.0), rig.now)
     rig.run(0.1)
-    rig.managers[0].results[mavlink.MAV_CMD_DO_GIMBAL_MANAGER_PITCHYAW] = result
-    asked_at = rig.now
+    asked_at, before = rig.now, len(manager.received)
 
     rig.gimbal.release_control(rig.now, rig.done)
-    rig.run(3.0)
+    while not rig.results:
+        if len(manager.received) > before + lost:
+            manager.rates = (0.0, 0.0, 0.0)
+        rig.run(0.02)
 
     assert rig.results[0].success
+    assert rig.results[0].message.partition(')')[2] == note
     sent = [(at, one) for at, one in rig.sent if isinstance(one, CommandLong)
             and one.command in DEVICE_ID_PARAM and at >= asked_at]
-    assert [one.command for _, one in sent] == [
-        mavlink.MAV_CMD_DO_GIMBAL_MANAGER_PITCHYAW, mavlink.MAV_CMD_DO_GIMBAL_MANAGER_CONFIGURE]
-    stop = sent[0][1]
-    assert [rates_of(one) for at, one in setpoints(rig) if at >= asked_at] == [(0.0, 0.0, 0.0)]
-    assert (stop.param3, stop.param4, stop.param7) == (0.0, 0.0, 154)
-    assert math.isnan(stop.param1) and math.isnan(stop.param2)
-    assert sent[1][0] - asked_at <= most
+    assert [one.command for _, one in sent] == [mavlink.MAV_CMD_DO_GIMBAL_MANAGER_CONFIGURE]
+    zeros = [one for at, one in setpoints(rig) if at >= asked_at]
+    assert {rates_of(one) for one in zeros} == {(0.0, 0.0, 0.0)}
+    assert len(zeros) >= 1 + min(lost, 1) * (turning == 0.2)
+    assert sent[0][0] - asked_at <= most
 
 
 MOVES: list[Callable[[Rig], object]] = [
@@ -388,7 +389,7 @@ MOVES: list[Callable[[Rig], object]] = [
     lambda rig: rig.gimbal.set_roi(PLACE, rig.now, rig.done)]
 
 
-def test_at_the_end_of_the_process_only_a_zero_its_command_and_the_release_are_sent() -> None:
+def test_at_the_end_of_the_process_only_a_zero_and_the_release_are_sent() -> None:
     rig = in_control()
     rig.gimbal.set_rates((0.0, 0.2, 0.0), rig.now)
     rig.run(0.02)
@@ -401,33 +402,10 @@ def test_at_the_end_of_the_process_only_a_zero_its_command_and_the_release_are_s
     sent = [one for _, one in rig.sent[begun:]]
     [zero] = [one for one in sent if isinstance(one, GimbalManagerSetAttitude)]
     assert zero.angular_velocity_y == 0.0
-    [stop, release] = [one for one in sent if isinstance(one, CommandLong | CommandInt)
-                       and one.command in DEVICE_ID_PARAM]
-    assert (stop.command, stop.param3, stop.param4) == (
-        mavlink.MAV_CMD_DO_GIMBAL_MANAGER_PITCHYAW, 0.0, 0.0)
+    [release] = [one for one in sent if isinstance(one, CommandLong | CommandInt)
+                 and one.command in DEVICE_ID_PARAM]
     assert (release.command, release.param1) == (mavlink.MAV_CMD_DO_GIMBAL_MANAGER_CONFIGURE, -3)
     assert rig.managers[0].primary == Address(0, 0)
-
-
-def test_the_acknowledgement_of_an_earlier_command_does_not_end_the_stop_before_a_release(
-) -> None:
-    rig = in_control()
-    command = mavlink.MAV_CMD_DO_GIMBAL_MANAGER_PITCHYAW
-    rig.managers[0].answers = False
-    rig.gimbal.set_neutral(rig.now, rig.done)
-    rig.gimbal.set_rates((0.0, 0.2, 0.0), rig.now)
-    rig.run(0.02)
-    asked_at = rig.now
-    rig.gimbal.release_control(rig.now, rig.done)
-    rig.run(0.02)
-
-    # The acknowledgement of the command for the neutral position.
-    rig.receive(rig.managers[0].address, CommandAck(
-        command, mavlink.MAV_RESULT_ACCEPTED, 0, 0, *OURS))
-    rig.run(0.02)
-
-    assert [one.command for at, one in rig.sent if at >= asked_at
-            and isinstance(one, CommandLong)] == [command, command]
 
 
 def test_nothing_moves_the_gimbal_while_its_control_is_released() -> None:
@@ -450,8 +428,8 @@ def test_nothing_moves_the_gimbal_while_its_control_is_released() -> None:
     moves = [one for at, one in rig.sent if at >= asked_at and (
         isinstance(one, GimbalManagerSetAttitude) and one.angular_velocity_y != 0
         or isinstance(one, CommandLong | CommandInt) and (
-            one.command == mavlink.MAV_CMD_DO_SET_ROI_LOCATION
-            or one.command == mavlink.MAV_CMD_DO_GIMBAL_MANAGER_PITCHYAW and one.param3 != 0))]
+            one.command in (mavlink.MAV_CMD_DO_SET_ROI_LOCATION,
+                            mavlink.MAV_CMD_DO_GIMBAL_MANAGER_PITCHYAW)))]
     assert moves == []
     # Without an answer this node may still have control.
     assert rig.gimbal.set_rates((0.0, 0.2, 0.0), rig.now) == ''

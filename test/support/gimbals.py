@@ -127,6 +127,11 @@ class FakeManager:
         if (isinstance(message, gm.GimbalManagerSetAttitude) and target == self.address
                 and message.gimbal_device_id == self.device_id):
             self.received.append(message)
+            if self.applies and self.primary == source:
+                # The frame that it names does not depend on the setpoint.
+                named = (mavlink.GIMBAL_DEVICE_FLAGS_YAW_IN_VEHICLE_FRAME
+                         | mavlink.GIMBAL_DEVICE_FLAGS_YAW_IN_EARTH_FRAME)
+                self.flags = self.flags & named | message.flags & ~named
         if not isinstance(message, mav.CommandLong | mav.CommandInt) or (
                 target not in (self.address, self.device)):
             return []
