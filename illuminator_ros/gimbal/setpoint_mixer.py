@@ -50,7 +50,7 @@ HOLD_INTERVAL = 0.9
 FOLLOW_INTERVAL = 0.05
 # s for which one step turns a setpoint at most, the shortest setpoint_timeout: the gimbal must not
 # leap after a pause of the process.
-MAX_STEP = 0.1
+STEP_LIMIT = 0.1
 HEADING_UNKNOWN = 'the heading of the vehicle is unknown'
 
 
@@ -226,7 +226,7 @@ class SetpointMixer:
         """Turn the setpoint by the rates that the device does not follow, and by offsets."""
         if (before := self.current) is not None:
             self.current = turned(
-                before._replace(since=max(before.since, now - MAX_STEP)), now,
+                before._replace(since=max(before.since, now - STEP_LIMIT)), now,
                 self._device.model.ranges, self._ahead(before, now), offsets, self.clipped)
 
     def _send(self, now: float) -> None:

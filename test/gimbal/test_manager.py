@@ -879,7 +879,7 @@ def test_gm_22_a_rate_turns_a_device_without_mavlink_no_further_after_a_pause() 
     rig.run(0.0)
 
     assert before == pytest.approx(0.3, abs=0.02)
-    assert yaws(rig)[-1] - before <= 0.3 * setpoint_mixer.MAX_STEP + 1e-9
+    assert yaws(rig)[-1] - before <= 0.3 * setpoint_mixer.STEP_LIMIT + 1e-9
 
 
 def test_gm_22_a_yaw_from_north_follows_each_heading_of_the_vehicle() -> None:

@@ -26,7 +26,7 @@ from .gimbal_node import GimbalNode
 from ..client import GimbalClient
 from ..events import GimbalConnected, GimbalEvent, GimbalForgotten, GimbalKey
 from ..gimbal import GimbalSettings
-from ..setpoint_mixer import MAX_STEP
+from ..setpoint_mixer import STEP_LIMIT
 from ...payload.attempt import Result
 from ...ros.command_sources import SOURCE_PARAMETERS, source_settings
 from ...ros.conversions import GEOID_SEPARATION
@@ -41,7 +41,7 @@ GIMBAL_PARAMETERS = (
     ParameterSpec('auto_take_control', False,
                   'take control of a gimbal that no component controls when it connects'),
     ParameterSpec('setpoint_timeout', 0.5, 'silence of ~/cmd/rate after which zero is sent', 's',
-                  MAX_STEP, 60.0, changeable=True),
+                  STEP_LIMIT, 60.0, changeable=True),
     *FRAME_PARAMETERS,
     PUBLISH_TF,
     GEOID_SEPARATION,
