@@ -138,6 +138,9 @@ class GimbalManager(Payload):
         """See :meth:`Payload.components_lost`."""
         if self.tracker.device in lost:
             self.tracker.link_closed(now)
+        elif self.control.primary.holder in lost:
+            # It may come back within its lease.
+            self._setpoints.stop(now)
 
     def receive(self, source: Address, message: mav.Message, now: float) -> None:
         """See :meth:`Payload.receive`."""
@@ -187,11 +190,13 @@ class GimbalManager(Payload):
                 self._report_commanded(now)
         if now >= self._setpoints.due:
             self._setpoints.poll(now)
+        self._setpoints.rate_stop.poll(now)
 
     def next_deadline(self) -> float:
         """See :meth:`Payload.next_deadline`."""
         return min(self.tracker.next_deadline(), self.control.next_deadline(),
-                   self._device.request_due, self._status_due, self._setpoints.due)
+                   self._device.request_due, self._status_due, self._setpoints.due,
+                   self._setpoints.rate_stop.due)
 
     def _state_changed(self, change: StateChanged, now: float) -> None:
         after = change.after
@@ -199,7 +204,7 @@ class GimbalManager(Payload):
         if after is ManagerState.ACTIVE:
             self._setpoints.activate(now)
         else:
-            self._setpoints.deactivate(forget=after is not ManagerState.LISTENING)
+            self._setpoints.deactivate(now, forget=after is not ManagerState.LISTENING)
         if after is ManagerState.LISTENING:
             # Another manager may send no status, but answers a request.
             self._commands.send(Command(
@@ -222,6 +227,11 @@ class GimbalManager(Payload):
         """See :meth:`Payload.close`: the device stays where it is, and follows nothing more."""
         self._setpoints.close(now)
 
+    @property
+    def is_stopping(self) -> bool:
+        """Whether a rate of zero is repeated until the device stands."""
+        return self._setpoints.rate_stop.is_running
+
     # The device and the vehicle, from the link or from ROS
 
     def take_attitude(self, status: GimbalDeviceAttitudeStatus, now: float) -> None:
@@ -231,6 +241,7 @@ class GimbalManager(Payload):
 
     def _take_attitude(self, status: GimbalDeviceAttitudeStatus, now: float) -> None:
         self._device.take_status(status, now)
+        self._setpoints.rate_stop.reported(status, now)
         if not self.tracker.has_mavlink and self.tracker.state is ManagerState.ACTIVE:
             setpoints = self._setpoints
             flags = 0 if setpoints.current is None else setpoints.current.operation
@@ -257,6 +268,9 @@ class GimbalManager(Payload):
 
     def take_setpoint(self, source: Address, message: AnySetpoint, now: float) -> None:
         """Take a setpoint of a player."""
+        if self._commands.refusal and source == self.address:
+            # The client in this process ends its own rate, which has ended already.
+            return
         if (message.target_system not in (0, self.address.system)
                 or message.target_component not in (0, self.address.component)
                 or message.gimbal_device_id not in (0, self.tracker.device_id)):

@@ -65,6 +65,17 @@ class ReferenceLost:
     unknown: str
 
 
+@dataclass(frozen=True)
+class RateStopped:
+    """
+    A rate has ended, since the manager gives no more setpoints.
+
+    :param stands: whether an attitude has shown in time that the device stands.
+    """
+
+    stands: bool
+
+
 ManagerEvent: TypeAlias = (
     StateChanged | RoleHolderChanged | RequestRefused | SetpointClipped | SetpointSent
-    | AddressShared | ReferenceLost)
+    | AddressShared | ReferenceLost | RateStopped)

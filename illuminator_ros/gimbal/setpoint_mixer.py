@@ -17,6 +17,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+import functools
 import math
 
 from . import manager_events as events
@@ -37,6 +38,7 @@ from .manager_setpoint import (
 )
 from .manager_state import ManagerState, StateTracker
 from .messages import GimbalDeviceSetAttitude
+from .rate_stop import RateStop
 from .vehicle_state import VehicleState
 from ..mavlink.command_sender import CommandSender
 from ..mavlink.dialect import mavlink, short_names
@@ -63,6 +65,7 @@ class SetpointMixer:
     :ivar sent: as the device got it.
     :ivar clipped: its angles that were clipped.
     :ivar due: when :meth:`poll` is due.
+    :ivar rate_stop: ends a rate when no more setpoints are given.
     """
 
     def __init__(
@@ -83,6 +86,7 @@ class SetpointMixer:
         # By axis, the request whose clipped angle was reported.
         self._reported: dict[str, object] = {}
         self._lost: set[str] = set()
+        self.rate_stop = RateStop(self._rate_stopped)
 
     # The state of the manager
 
@@ -92,12 +96,12 @@ class SetpointMixer:
         if self.current is None:
             self.current = self._device.end_of_motion(now)
 
-    def deactivate(self, *, forget: bool) -> None:
+    def deactivate(self, now: float, *, forget: bool) -> None:
         """
-        Send no setpoints.
+        Send no setpoints, but end a rate: the device continues until a manager stops it.
 
         :param forget: whether another manager may move the device, or the next device may be
-            another one. But a device that turns at a rate continues until a manager stops it.
+            another one.
         """
         self.due = math.inf
         if forget:
@@ -105,6 +109,20 @@ class SetpointMixer:
                             else None)
             self._roi, self._offsets = None, STILL
             self.clipped, self._reported = (), {}
+        self._end_rate(now)
+
+    def _end_rate(self, now: float, *, was_sent: bool = False) -> None:
+        """Send the current setpoint, if it is a rate of zero, until the device stands."""
+        zero = self.current
+        if zero is not None and zero.has_rates_only:
+            zero = (zero if zero.frame is YawFrame.VEHICLE or self._device.accepts_earth_frame(now)
+                    else in_vehicle_frame(zero, 0.0))
+            self.rate_stop.begin(functools.partial(self._give, zero), now, was_sent=was_sent)
+
+    def _rate_stopped(self, stands: bool) -> None:
+        if stands:
+            self.current = None
+        self._emit(events.RateStopped(stands))
 
     # Players
 
@@ -149,8 +167,10 @@ class SetpointMixer:
         self._send(now)
 
     def close(self, now: float) -> None:
-        """Stop, and send nothing more."""
+        """Stop, and send nothing more once the device stands."""
         self.stop(now)
+        if self._tracker.state is ManagerState.ACTIVE:
+            self._end_rate(now, was_sent=True)
         self.current, self.due = None, math.inf
 
     def point(self, place: GeoPoint, now: float, *, is_relative: bool) -> None:
@@ -252,10 +272,14 @@ class SetpointMixer:
             if ahead is None:
                 return
             sent = in_vehicle_frame(sent, ahead)
+        self._give(sent)
+
+    def _give(self, sent: Setpoint) -> None:
+        """Give the device a setpoint."""
         self.sent = sent
-        if self._tracker.device is None:
+        if not self._tracker.has_mavlink:
             self._emit(events.SetpointSent(sent))
-        else:
+        elif self._tracker.device is not None:
             self._commands.send(GimbalDeviceSetAttitude(
                 *self._tracker.device, sent.device_flags, sent.attitude or UNSET_QUATERNION,
                 *sent.rates))

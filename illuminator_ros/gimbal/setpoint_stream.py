@@ -21,8 +21,8 @@ from dataclasses import dataclass, field
 from enum import Enum
 import math
 
-from .axes import TURNING
-from .messages import GimbalManagerSetAttitude, rates_of
+from .messages import GimbalManagerSetAttitude
+from .rate_stop import ATTITUDE_SPACING, TurningDetector
 from ..mavlink.dialect import mavlink
 from ..payload.attempt import Done, Result
 from ..payload.messages import GimbalDeviceAttitudeStatus
@@ -41,9 +41,6 @@ from ..payload.rotation import flu_frd, Quaternion, Vector
 REPEATS = (0.2, 0.4, 0.8)
 # s after an attitude in which the device may still report the yaw lock that it had before.
 LOCK_DELAY = 1.0
-# s; the least time between two attitudes that show whether a device turns: one may be a copy of
-# the other.
-ATTITUDE_SPACING = 0.1
 
 
 class Kind(Enum):
@@ -114,8 +111,7 @@ class SetpointStream:
         self._last: _Setpoint | None = None
         self._reported_frame = YawFrame.VEHICLE
         self._attitude_frame, self._attitude_at = YawFrame.VEHICLE, -math.inf
-        # An attitude of a device that reports no rates, and its time; a later one is compared.
-        self._seen: tuple[MountAttitude, float] | None = None
+        self._detector = TurningDetector()
 
     def change_timeout(self, timeout: float, now: float) -> None:
         """Replace the time-out; a rate that lasts ends after it at the latest."""
@@ -261,31 +257,15 @@ class SetpointStream:
         if (not may_send or zero is None or zero.kind is not Kind.ZERO or not zero.due
                 or now < zero.due[0]):
             return
-        turns = self._turns(status, attitude, now)
+        turns = self._detector.turns(status, attitude, now)
         if turns is not None:
             zero.stands = not turns
             del zero.due[0]
-            self._seen = None
+            self._detector.reset()
         if turns:
             # The yaw lock may have changed since.
             zero.message = self._make(self._yaw_frame(now), UNSET_QUATERNION, STILL)
             self._send(zero)
-
-    def _turns(
-        self, status: GimbalDeviceAttitudeStatus, attitude: MountAttitude | None, now: float,
-    ) -> bool | None:
-        """Return whether the device turns, None if its next attitude will show that."""
-        rates = rates_of(status)
-        if any(abs(rate) > TURNING for rate in rates):
-            return True
-        if attitude is None or all(map(math.isfinite, rates)):
-            return False
-        if self._seen is None or self._seen[0].frame is not attitude.frame:
-            self._seen = attitude, now
-        before, at = self._seen
-        if now < at + ATTITUDE_SPACING:
-            return None
-        return before.rotation.angle_to(attitude.rotation) > TURNING * (now - at)
 
     def poll(self, now: float) -> None:
         """Send what is due; this component must have control."""
@@ -304,7 +284,8 @@ class SetpointStream:
         return last.due[0] if last and last.due and last.kind is not Kind.ZERO else math.inf
 
     def _set(self, setpoint: _Setpoint) -> None:
-        self._last, self._seen = setpoint, None
+        self._last = setpoint
+        self._detector.reset()
         self._send(setpoint)
 
     def _send(self, setpoint: _Setpoint) -> None:

@@ -17,6 +17,7 @@
 from __future__ import annotations
 
 import functools
+import logging
 import math
 
 from geometry_msgs.msg import QuaternionStamped
@@ -145,6 +146,8 @@ class ManagerNode(ServedPayload):
         self._log = host.log
         self._frames = Frames.of(host.values)
         self._clock = host.node.get_clock()
+        # Takes the results of the end of the process, None before.
+        self._report: ShutdownReport | None = None
         self._gimbals = Gimbals(both.client, host, lambda: manager.tracker.inactive_reason)
         self._interface = NodeInterface(
             host.node, host.link, host.log,
@@ -211,6 +214,8 @@ class ManagerNode(ServedPayload):
         elif isinstance(event, manager_events.ReferenceLost):
             self._log.warning(f'the {event.unknown} of the vehicle is unknown: the gimbal does '
                               'not follow its setpoint', f'lost {event.unknown}')
+        elif isinstance(event, manager_events.RateStopped):
+            self._rate_stopped(event)
 
     def _publish(self, event: manager_events.SetpointSent) -> None:
         setpoint = event.setpoint
@@ -219,6 +224,21 @@ class ManagerNode(ServedPayload):
         header = Header(stamp=self._clock.now().to_msg(),
                         frame_id=self._frames.name(setpoint.frame))
         self._interface.publish(DEVICE_SETPOINT.name, quaternion_message(header, attitude))
+
+    def _rate_stopped(self, event: manager_events.RateStopped) -> None:
+        if not event.stands:
+            self._log.warning(self._may_turn(), 'stop')
+        elif self._report is not None:
+            self._report('device', logging.INFO, f'{self._device()} stands')
+        else:
+            self._log.info(f'{self._device()} stands', 'stop')
+
+    def _device(self) -> str:
+        tracker = self._manager.tracker
+        return f'gimbal {tracker.device or tracker.device_id}'
+
+    def _may_turn(self) -> str:
+        return f'{self._device()} may still turn: no attitude has shown that it stands'
 
     def _state_changed(self, event: StateChanged) -> None:
         device = f'gimbal {event.device or event.device_id}'
@@ -238,7 +258,10 @@ class ManagerNode(ServedPayload):
         self._gimbals.poll(now)
 
     def shut_down(self, now: float, report: ShutdownReport) -> None:
-        """See :meth:`ServedPayload.shut_down`."""
+        """See :meth:`ServedPayload.shut_down`: wait until a gimbal that turned stands."""
+        if self._manager.is_stopping:
+            self._report = report
+            report('device', None, self._may_turn())
         self._gimbals.shut_down(now, report)
 
     # Diagnostics

@@ -1,0 +1,128 @@
+# Copyright 2026 The illuminator_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""The end of a rate: whether a device turns, and a zero that is repeated until it stands."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+import math
+
+from .axes import TURNING
+from .messages import rates_of
+from ..payload.messages import GimbalDeviceAttitudeStatus
+from ..payload.mount_attitude import MountAttitude
+
+# s; the least time between two attitudes that show whether a device turns, since one may be a copy
+# of the other; and from a zero to the first attitude that counts.
+ATTITUDE_SPACING = 0.1
+# s between zeros, and for which they are repeated.
+STOP_INTERVAL, STOP_LIMIT = 0.1, 1.0
+
+
+class TurningDetector:
+    """Finds out from the attitudes of a device whether it turns."""
+
+    def __init__(self) -> None:
+        # An attitude of a device that reports no rates, and its time; a later one is compared.
+        self._seen: tuple[MountAttitude, float] | None = None
+
+    def reset(self) -> None:
+        """Compare later attitudes only."""
+        self._seen = None
+
+    def turns(
+        self, status: GimbalDeviceAttitudeStatus, attitude: MountAttitude | None, now: float,
+    ) -> bool | None:
+        """
+        Return whether the device turns, None if that is not known yet.
+
+        :param attitude: in the status, None if it has none.
+        """
+        rates = rates_of(status)
+        if any(abs(rate) > TURNING for rate in rates):
+            return True
+        if all(map(math.isfinite, rates)):
+            return False
+        if attitude is None:
+            return None
+        if self._seen is None or self._seen[0].frame is not attitude.frame:
+            self._seen = attitude, now
+        before, at = self._seen
+        if now < at + ATTITUDE_SPACING:
+            return None
+        return before.rotation.angle_to(attitude.rotation) > TURNING * (now - at)
+
+
+class RateStop:
+    """
+    Sends a rate of zero to a device that may turn, until an attitude shows that it stands.
+
+    The message may be lost, and nothing else would end the rate: the process ends, another manager
+    has the device, or the link was lost. No I/O; times are s.
+
+    :param ended: called with whether an attitude has shown that, before the time was over.
+    :ivar due: when :meth:`poll` is due, infinity while nothing is sent.
+    """
+
+    def __init__(self, ended: Callable[[bool], None]) -> None:
+        self.due = math.inf
+        self._ended = ended
+        self._send: Callable[[], None] = lambda: None
+        self._begun = -math.inf
+        self._detector = TurningDetector()
+
+    @property
+    def is_running(self) -> bool:
+        """Whether the zero is being repeated."""
+        return self.due < math.inf
+
+    def begin(self, send: Callable[[], None], now: float, *, was_sent: bool) -> None:
+        """
+        Send the zero, and repeat it.
+
+        :param was_sent: whether it has just been sent for the first time.
+        """
+        self._send, self._begun = send, now
+        self.due = now + STOP_INTERVAL if was_sent else now
+        self._detector.reset()
+        self.poll(now)
+
+    def reported(self, status: GimbalDeviceAttitudeStatus, now: float) -> None:
+        """Take a status of the device; one from before the zero is no evidence."""
+        if not self.is_running or now < self._begun + ATTITUDE_SPACING:
+            return
+        try:
+            attitude = MountAttitude.from_status(status)
+        except ValueError:
+            attitude = None
+        turns = self._detector.turns(status, attitude, now)
+        if turns:
+            self._detector.reset()
+        elif turns is not None:
+            self._end(True)
+
+    def poll(self, now: float) -> None:
+        """Send the zero, or end, if that is due."""
+        if not self.due <= now:
+            return
+        if now >= self._begun + STOP_LIMIT:
+            self._end(False)
+        else:
+            self.due = now + STOP_INTERVAL
+            self._send()
+
+    def _end(self, stands: bool) -> None:
+        self.due = math.inf
+        self._ended(stands)
