@@ -25,8 +25,8 @@ from ..payload.messages import GimbalDeviceAttitudeStatus
 from ..payload.mount_attitude import MountAttitude
 
 # s; the least time between two attitudes that show whether a device turns, since one may be a copy
-# of the other; and from a zero to the first attitude that counts.
-ATTITUDE_SPACING = 0.1
+# of the other; and from a zero to the first attitude that counts. Many devices send one in 0.1 s.
+ATTITUDE_SPACING = 0.09
 # s between zeros, and for which they are repeated.
 STOP_INTERVAL, STOP_LIMIT = 0.1, 1.0
 
@@ -62,7 +62,10 @@ class TurningDetector:
         before, at = self._seen
         if now < at + ATTITUDE_SPACING:
             return None
-        return before.rotation.angle_to(attitude.rotation) > TURNING * (now - at)
+        turns = before.rotation.angle_to(attitude.rotation) > TURNING * (now - at)
+        if turns:
+            self._seen = attitude, now
+        return turns
 
 
 class RateStop:
@@ -100,17 +103,16 @@ class RateStop:
         self.poll(now)
 
     def reported(self, status: GimbalDeviceAttitudeStatus, now: float) -> None:
-        """Take a status of the device; one from before the zero is no evidence."""
-        if not self.is_running or now < self._begun + ATTITUDE_SPACING:
+        """Take a status of the device."""
+        if not self.is_running:
             return
         try:
             attitude = MountAttitude.from_status(status)
         except ValueError:
             attitude = None
         turns = self._detector.turns(status, attitude, now)
-        if turns:
-            self._detector.reset()
-        elif turns is not None:
+        # An earlier status may be older than the zero.
+        if turns is False and now >= self._begun + ATTITUDE_SPACING:
             self._end(True)
 
     def poll(self, now: float) -> None:

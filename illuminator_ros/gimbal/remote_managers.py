@@ -38,7 +38,7 @@ SILENCE_LIMIT = 3.0
 # PX4 does every 2 s), and after which control is unknown.
 STATUS_REQUEST_DELAY, STATUS_LIMIT = 3.0, 6.0
 # s for which a release of control waits until the attitude shows that the gimbal stands.
-STOP_LIMIT = 0.4
+STOP_LIMIT = 0.45
 # ms by which a status may be older than the one before it; with a longer step back, its sender has
 # restarted.
 LATE_LIMIT = 1000

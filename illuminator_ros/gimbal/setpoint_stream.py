@@ -254,10 +254,11 @@ class SetpointStream:
         is_locked = status.flags & mavlink.GIMBAL_DEVICE_FLAGS_YAW_LOCK
         self._reported_frame = YawFrame.EARTH if is_locked else YawFrame.VEHICLE
         zero = self._last
-        if (not may_send or zero is None or zero.kind is not Kind.ZERO or not zero.due
-                or now < zero.due[0]):
+        if not may_send or zero is None or zero.kind is not Kind.ZERO or not zero.due:
             return
         turns = self._detector.turns(status, attitude, now)
+        if now < zero.due[0]:
+            return
         if turns is not None:
             zero.stands = not turns
             del zero.due[0]

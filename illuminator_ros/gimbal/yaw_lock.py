@@ -97,8 +97,9 @@ class YawLock:
             name = GimbalDeviceAttitudeStatus.msgname
             shown = (f'no {name} came' if self._flags is None else f'{name} shows ' + (
                 ', '.join(flag_names('GIMBAL_DEVICE_FLAGS', self._flags)) or 'no flags'))
+            advice = '; the device may need the heading of the vehicle' if wanted.is_set else ''
             self._finish(Result(
-                False, f'{wanted.goal} not confirmed: {shown} within {LIMIT:g} s'), now)
+                False, f'{wanted.goal} not confirmed: {shown} within {LIMIT:g} s{advice}'), now)
         elif self._resend and now >= self._resend[0]:
             del self._resend[0]
             self._send(YawFrame.EARTH if wanted.is_set else YawFrame.VEHICLE, now)

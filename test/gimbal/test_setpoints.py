@@ -353,9 +353,9 @@ def test_zero_of_a_release_while_the_manager_is_lost_is_sent_when_it_is_heard_ag
 
 
 @pytest.mark.parametrize(('lost', 'turning', 'most', 'note'), [
-    (0, 0.2, 0.35, ''), (1, 0.2, 0.45, ''),
-    (99, NAN, 0.45, ''), (99, 0.2, 0.45, '; no attitude shows that the gimbal stands')])
-def test_control_is_released_once_an_attitude_shows_that_the_gimbal_stands_or_after_400_ms(
+    (0, 0.2, 0.35, ''), (1, 0.2, 0.45, ''), (99, NAN, 0.45, ''),
+    (99, 0.2, 0.5, '; no attitude shows that the gimbal stands')])
+def test_control_is_released_once_an_attitude_shows_that_the_gimbal_stands_or_after_450_ms(
         lost: int, turning: float, most: float, note: str) -> None:
     rig = in_control()
     manager = rig.managers[0]

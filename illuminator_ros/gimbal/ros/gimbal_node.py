@@ -75,8 +75,8 @@ REQUESTS: dict[Endpoint, Callable[[Gimbal, Any, float, Done], None]] = {
         lambda gimbal, _, *asked: gimbal.retract(*asked),
     Endpoint('clear_roi', Trigger, 'no longer point at a place'):
         lambda gimbal, _, *asked: gimbal.clear_roi(*asked),
-    Endpoint('set_yaw_lock', SetBool, 'hold yaw against the earth, or let it follow the vehicle; '
-             'refused where the gimbal lacks it'):
+    Endpoint('set_yaw_lock', SetBool, 'stop, and hold yaw against the earth or let it follow the '
+             'vehicle; refused where the gimbal lacks it'):
         lambda gimbal, message, *asked: gimbal.set_yaw_lock(message.data, *asked),
 }
 CMD_ATTITUDE = Endpoint(
