@@ -139,7 +139,7 @@ class GimbalManager(Payload):
         if self.tracker.device in lost:
             self.tracker.link_closed(now)
         elif self.control.primary.holder in lost:
-            # It may come back within its lease.
+            # Its control ends with its lease, unless it is heard again.
             self._setpoints.stop(now)
 
     def receive(self, source: Address, message: mav.Message, now: float) -> None:
