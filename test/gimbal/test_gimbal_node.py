@@ -98,9 +98,11 @@ def gimbal(ros: Ros, served: tuple[Program, FakeManager]) -> Iterator[FakeManage
     """Return the module's gimbal, which obeys and has received nothing yet."""
     manager = served[1]
     before = vars(manager).copy()
-    # Releasing control ends the repeated setpoints of the previous test.
+    # A release ends the repeated setpoints of the previous test if the gimbal then stands.
+    manager.rates = (0.0, 0.0, 0.0)
     for name in ('take_control', 'release_control'):
         assert trigger(ros, name).success
+    manager.rates = before['rates']
     manager.received.clear()
     manager.commands.clear()
     yield manager
