@@ -74,7 +74,7 @@ class Lines(LineUser):
         self._heard_at = -math.inf
         # When the endpoint announced itself on all lines because none was heard.
         self._announced_at = -math.inf
-        writer = FrameWriter(signing, mavlink_version)
+        writer = FrameWriter(signing, mavlink_version, self._duplicates)
         sources: dict[Address, SequenceCounter] = {}
         self._lines = [
             Line(url, self, Receiver(signing, self._classes, writer, wall_clock, sources,
@@ -97,9 +97,10 @@ class Lines(LineUser):
         """
         Return how many copies of frames have come, where some came lately.
 
-        They come in a loop, or over several lines from one component.
+        They come in a loop, or over several paths from one component.
 
-        :return: by the indexes of the lines of the original and of the copy.
+        :return: by the indexes of the lines of the original and of the copy; that of our own
+            frames is -1.
         """
         if self._duplicates is None:
             return {}

@@ -173,11 +173,11 @@ class Router:
 
     def targets(self, frame: Frame, peers: Peers, now: float) -> Peers:
         """
-        Return where to forward a frame; nowhere if it is for us alone, or seems to be ours.
+        Return where to forward a frame; nowhere if it is for us alone.
 
         :param peers: all but the one from which it came.
         """
-        if frame.source in self._own or frame.message_id in NEVER_FORWARDED:
+        if frame.message_id in NEVER_FORWARDED:
             return ()
         target = target_of(frame)
         if not target.system:

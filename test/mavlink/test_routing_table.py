@@ -108,7 +108,7 @@ def test_peers_count_while_they_are_heard_and_none_do_after_the_link_is_closed(
 
 # Several lines
 
-OWN = Address(1, 194)
+OWN = Address(1, 193)
 GIMBAL, AUTOPILOT, GROUND = Address(1, 154), Address(1, 1), Address(255, 190)
 # The light is on line 0, the autopilot on 0 and 1, the gimbal on 1, and the ground station on 2.
 # Another sender with our address is on 1.
@@ -156,7 +156,7 @@ SETUP_SIGNING = mavlink.MAVLink_setup_signing_message(1, 1, [0] * 32, 0)
     (frame_of(to(9, 0), source=GROUND), 2, set()),
     (frame_of(to(*GROUND), source=GROUND), 2, set()),
     (frame_of(to(*OWN), source=GROUND), 2, set()),
-    (frame_of(to(*LIGHT), source=OWN), 2, set()),
+    (frame_of(to(*LIGHT), source=OWN), 1, {0}),
     (frame_of(to(*GIMBAL), source=GROUND, version=1), 2, {1}),
     (frame_of(SETUP_SIGNING, source=GROUND), 2, set()),
     (raw_v2(UNKNOWN_TARGET, bytes((9, 9, 9)), source=GROUND), 2, {0, 1})])
