@@ -91,6 +91,9 @@ class Lines(LineUser):
 
     def snapshots(self, now: float) -> tuple[LinkSnapshot, ...]:
         """Return each line at this moment."""
+        complete = self._router.sole_sources(now)
+        for source, counter in self._sources.items():
+            counter.is_complete = source in complete
         return tuple(line.snapshot(now) for line in self._lines)
 
     def copies(self, now: float) -> Mapping[tuple[int, int], int]:

@@ -71,7 +71,8 @@ LINK_VALUES = {
     'lights': 'lights that are known; in `gimbal: link` there is `gimbals`',
     **dict.fromkeys(('frames_lost', 'frames_duplicate', 'frames_reordered'),
                     'of the device of this node, by its sequence numbers'),
-    'loss_percent': 'of this device, recently; WARN above 5 %',
+    'loss_percent': 'of this device, recently; WARN above 5 %; `unknown`, as `frames_lost` is, '
+                    'behind [a router](routers.md#effects-of-a-router)',
     **dict.fromkeys(('round_trip_p50_ms', 'round_trip_p95_ms'),
                     'from a command to its acknowledgement'),
     **dict.fromkeys(('commands_sent', 'commands_resent', 'commands_unanswered'),
@@ -123,6 +124,10 @@ def _text(value: Value) -> str:
     if isinstance(value, bool):
         return str(value).lower()
     return f'{value:.6g}' if isinstance(value, float) else str(value)
+
+
+def _known(value: Value) -> Value:
+    return 'unknown' if value is None else value
 
 
 @dataclass(frozen=True)
@@ -209,10 +214,10 @@ def link_diagnostics(
         trip = commands.round_trip(address)
         p50, p95 = trip.quantile(0.5), trip.quantile(0.95)
         devices[address] = {
-            'frames_lost': counter.lost,
+            'frames_lost': _known(counter.lost),
             'frames_duplicate': counter.duplicate,
             'frames_reordered': counter.reordered,
-            'loss_percent': counter.recent_loss,
+            'loss_percent': _known(counter.recent_loss),
             'round_trip_p50_ms': None if p50 is None else p50 * 1000,
             'round_trip_p95_ms': None if p95 is None else p95 * 1000,
         }
@@ -336,7 +341,7 @@ def link_report(
     if device in link.unanswering and link.state.signing.unchecked:
         findings.append((WARN, SIGNING_NEEDED))
     counts = link.state.traffic.sources.get(device) if device else None
-    if counts and counts.recent_loss > LOSS_WARNING:
+    if counts and (counts.recent_loss or 0.0) > LOSS_WARNING:
         findings.append((WARN, f'{counts.recent_loss:.0f} % of the frames lost'))
     if limit_reached:
         findings.append((WARN, f'more than {count} {kind}s, some ignored'))

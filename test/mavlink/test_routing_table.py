@@ -167,6 +167,22 @@ def test_a_frame_goes_to_the_other_lines_where_its_target_was_heard(
         assert lines_of(router().targets(only(frame), others, now)) == expected
 
 
+@pytest.mark.parametrize(('heard', 'sole'), [
+    ([(LIGHT, 0, 'a')], {LIGHT}),
+    ([(LIGHT, 0, 'a'), (GIMBAL, 0, 'b')], {LIGHT, GIMBAL}),
+    ([(LIGHT, 0, 'a'), (GIMBAL, 1, 'a')], {LIGHT, GIMBAL}),
+    ([(LIGHT, 0, 'a'), (GIMBAL, 0, 'a')], set()),
+    ([(LIGHT, 0, 'a'), (LIGHT, 0, 'b')], set()),
+    ([(LIGHT, 0, 'a'), (LIGHT, 1, 'a')], set())])
+def test_a_component_is_alone_if_one_peer_leads_to_it_and_to_no_other_one(
+        heard: list[tuple[Address, int, str]], sole: set[Address]) -> None:
+    tables = [RoutingTable(), RoutingTable()]
+    for address, line, peer in heard:
+        tables[line].heard(address, peer, 0.0)
+    router = Router(tables, {})
+    assert [router.sole_sources(now) for now in (0.0, EXPIRY + 1)] == [sole, set()]
+
+
 def test_a_frame_goes_where_its_target_was_heard_last_if_that_is_long_ago() -> None:
     tables = [RoutingTable(), RoutingTable()]
     router = Router(tables, {})

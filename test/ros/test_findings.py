@@ -171,6 +171,23 @@ def test_lost_frames_are_a_warning_unless_the_light_has_restarted() -> None:
     assert value(link, 'frames_lost') == '60'
 
 
+def test_loss_is_unknown_while_another_component_is_heard_over_the_same_peer() -> None:
+    reported = Reported()
+    reported.status()
+    reported.receive(FOREIGN)
+    for _ in range(20):
+        # A router sends the answers to another program only to that one.
+        reported.status(lost=1)
+    link = reported.statuses()['link']
+    assert found(link)[0] == OK
+    assert [value(link, key) for key in ('loss_percent', 'frames_lost')] == ['unknown'] * 2
+    # The other component is silent for 10 s; earlier gaps do not count.
+    for _ in range(110):
+        reported.status()
+    link = reported.statuses()['link']
+    assert [value(link, key) for key in ('loss_percent', 'frames_lost')] == ['0', '0']
+
+
 def test_another_sender_with_our_address_is_an_error_and_the_reason_for_a_missing_light() -> None:
     for message, sender in (
             (heartbeat(mavlink.MAV_TYPE_ONBOARD_CONTROLLER),
