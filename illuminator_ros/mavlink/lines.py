@@ -186,6 +186,15 @@ class Lines(LineUser):
             # A router on this line forwards nothing to us until it has heard us.
             line.write([*self._sender.heartbeats.values()], line.peers(now), now)
 
+    def behind(self, line: Line, peer: Peer, now: float) -> None:
+        """
+        See :meth:`LineUser.behind`.
+
+        Its clock follows newer time stamps, so it gets one; and nothing else, since any sender can
+        repeat an old frame.
+        """
+        line.write([*self._sender.heartbeats.values()], [peer], now)
+
     def receive(
         self, line: Line, peer: Peer, frames: Sequence[ReceivedFrame], now: float,
     ) -> None:

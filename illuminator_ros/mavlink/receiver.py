@@ -26,7 +26,7 @@ from .frame import Decoder, DecoderCounters, ForeignFrames, Frame
 from .frame_writer import FrameWriter
 from .messages import Address
 from .routing_table import RoutingTable
-from .signing import Signing
+from .signing import Signing, Verdict
 from .statistics import SequenceCounter, Traffic
 from .transport import Peer
 
@@ -84,6 +84,7 @@ class Receiver:
     :ivar routes: the peers over which components were heard.
     :ivar counters: totals over all peers since it was made.
     :ivar waits: the waits for rests of frames, by peer.
+    :ivar is_behind: whether the last bytes had a rightly signed frame with an old time stamp.
     :ivar leads_to: see :meth:`~.transport.base.Channel.leads_to`.
     """
 
@@ -96,6 +97,7 @@ class Receiver:
         self.routes = RoutingTable()
         self.counters = DecoderCounters()
         self.waits: dict[Peer, _Wait] = {}
+        self.is_behind = False
         self.leads_to: Callable[[Peer], Peer] = lambda peer: peer
         self.signing = signing
         self._signing_is_off = not signing.signs
@@ -195,6 +197,7 @@ class Receiver:
         own, duplicates = self._writer.sequences, self._duplicates
         # An unsigned frame is accepted where signing is off; this test saves a call.
         trusted = self._signing_is_off
+        self.is_behind = False
         for frame in frames:
             if isinstance(frame, ForeignFrames):
                 # Frames from our own address have returned, or show an address conflict.
@@ -208,12 +211,13 @@ class Receiver:
                 self.traffic.frames_received += 1
                 if frame.source in own:
                     continue
-            elif trusted and frame.signature is None or self.signing.accepts(
-                    frame, self._wall_clock()):
+            elif trusted and frame.signature is None or (verdict := self.signing.check(
+                    frame, self._wall_clock())) is Verdict.ACCEPTED:
                 accepted.append((frame, self.traffic.count(frame)))
                 if duplicates is not None:
                     duplicates.add(frame.data, stream.path, now)
             else:
+                self.is_behind |= verdict is Verdict.OLD
                 continue
             heard.add(frame.source)
         if not heard:
