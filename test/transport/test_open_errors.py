@@ -43,7 +43,8 @@ def test_port_in_use_is_named(scheme: str, loopback: str) -> None:
     with (bound_socket if scheme == 'udpin' else listening_socket)(loopback) as taken:
         port = taken.getsockname()[1]
         assert reason(f'{scheme}://{loopback}:{port}') == (
-            f'cannot listen on {loopback}:{port}: Address already in use')
+            f'cannot listen on {loopback}:{port}: Address already in use '
+            '(doc/routers.md: several programs on one link)')
 
 
 @pytest.mark.parametrize(('url', 'said'), [
