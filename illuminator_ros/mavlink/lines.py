@@ -24,6 +24,7 @@ import selectors
 from .component import Endpoint
 from .dialect import decode, line_of
 from .duplicate_filter import DuplicateFilter
+from .forwarded_commands import ForwardedCommands
 from .frame import MAX_ID_V1
 from .frame_writer import FrameWriter
 from .line import ANNOUNCE_INTERVAL, Line, LineUser, SILENCE
@@ -52,6 +53,7 @@ class Lines(LineUser):
     :param call: calls a function in the thread of the link, given the time, s.
     :param mavlink_version: 1 or 2, of the frames that are sent; both are received.
     :param wall_clock: s, Unix time, for the signing time stamps.
+    :ivar forwarded_commands: the commands of others that were forwarded lately.
     :raises ValueError: if MAVLink 1 cannot carry a message of the endpoint, or must be signed.
     """
 
@@ -71,6 +73,7 @@ class Lines(LineUser):
         self._clock = clock
         self._version = mavlink_version
         self._duplicates = DuplicateFilter() if len(urls) > 1 else None
+        self.forwarded_commands = ForwardedCommands()
         self._heard_at = -math.inf
         # When the endpoint announced itself on all lines because none was heard.
         self._announced_at = -math.inf
@@ -228,3 +231,6 @@ class Lines(LineUser):
             for other, receivers in zip(self._lines, towards, strict=False):
                 if receivers:
                     other.forward(some, receivers, now)
+            if any(towards):
+                for frame in some:
+                    self.forwarded_commands.add(frame, now)
