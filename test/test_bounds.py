@@ -16,6 +16,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Callable, Iterator, Mapping
 import functools
 import itertools
@@ -36,6 +37,7 @@ from illuminator_ros.mavlink.command_sender import CommandSender, MAX_TARGETS
 from illuminator_ros.mavlink.component import Component, Endpoint
 from illuminator_ros.mavlink.deadline_queue import SPARE
 from illuminator_ros.mavlink.duplicate_filter import MAX_FRAMES
+from illuminator_ros.mavlink.forward_queue import ForwardQueue, MAX_QUEUED
 from illuminator_ros.mavlink.forwarded_commands import MAX_COMMANDS
 from illuminator_ros.mavlink.messages import Address, CommandLong, heartbeat, Message
 from illuminator_ros.mavlink.receiver import MAX_DECODERS
@@ -55,14 +57,14 @@ import pytest
 from support.client import Client
 from support.entries import stores
 from support.fake_light import status_message
-from support.frames import frame_of, LIGHT
+from support.frames import frame_of, LIGHT, only
 from support.gimbal_manager import ManagerRig
 from support.network import Leaf, Network, Router
 from support.signers import checker, signed_frame
 from support.simulated_link import SimulatedLink
 
 OURS = Address(1, 193)
-# More than any bound, except that of the frames that copies are compared with.
+# More than any bound but MAX_FRAMES.
 COUNT = 1500
 # Smaller stores belong to one device, or hold tables of the program.
 SMALL = 40
@@ -135,6 +137,13 @@ def forwarded(count: int, message: Message) -> object:
     return router.lines
 
 
+def waiting_frames() -> object:
+    queue = ForwardQueue(Counter())
+    for source in senders():
+        queue.put(only(frame_of(heartbeat(6), 0, source)), 0.0)
+    return queue
+
+
 def commanded() -> object:
     network = Network()
     ports = [network.port(name) for name in ('first', 'second')]
@@ -183,6 +192,21 @@ def ros_requests(limit: int) -> object:
     for _ in range(COUNT):
         calls.ask(lambda now, answer: None, Mock(), str)
     return calls
+
+
+def monitored() -> object:
+    pytest.importorskip('rclpy')
+    from illuminator_ros.cli.monitor.ros_graph import Graph
+    from illuminator_ros.illuminator.ros.monitor_view import VIEW
+    from illuminator_ros.ros.graph import type_name
+    node = Mock()
+    node.get_topic_names_and_types.return_value = [
+        (f'/light_{number}/{name}', [type_name(topic.type)])
+        for number in range(COUNT) for name, topic in VIEW.topics.items()]
+    node.create_subscription.return_value.handle.take_message.return_value = None
+    graph = Graph(node, [VIEW], clock=lambda: 0.0)
+    graph.poll()
+    return graph
 
 
 def log_lines() -> object:
@@ -246,6 +270,8 @@ ROWS = {
     'forwarded commands': Row(
         commanded, {'ForwardedCommands.sent': MAX_COMMANDS},
         {'DuplicateFilter.arrivals': MAX_FRAMES}),
+    'frames for a slow line': Row(
+        waiting_frames, {'ForwardQueue.held[]': MAX_QUEUED // len(frame_of(heartbeat(6)))}),
     'commands of players': Row(
         functools.partial(players, COMMAND), {'CommandReceiver.executed': MAX_RESULTS}),
     'heartbeats of players': Row(functools.partial(players, heartbeat(6)), {}),
@@ -268,6 +294,7 @@ ROWS = {
         {**SENT, **dict.fromkeys(('DeadlineQueue.heap', 'DeadlineQueue.entered'),
                                  2 * simulated.MAX_DELAYED + SPARE)}),
     'requests of ROS': Row(functools.partial(ros_requests, 64), {'LinkCalls.waiting': 64}),
+    'devices of the monitor': Row(monitored, {'Graph.devices': 256}),
     'kinds of log lines': Row(log_lines, {'NodeLog.kinds': 256}),
 }
 

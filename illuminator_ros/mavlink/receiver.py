@@ -207,7 +207,7 @@ class Receiver:
             elif frame.source in own and self._writer.is_loopback(frame, now):
                 continue
             elif duplicates is not None and duplicates.is_copy(frame.data, stream.path, now):
-                # A copy is no replay, and its late sequence number not that of another sender.
+                # Neither a replay nor a frame of another sender, though its number may be late.
                 self.traffic.frames_received += 1
                 if frame.source in own:
                     continue

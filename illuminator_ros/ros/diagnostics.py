@@ -188,7 +188,7 @@ def loops(
     """
     def text(first: int, second: int) -> str:
         if first == OWN.line:
-            return (f'our own frames come back over {urls[second]}: there is a loop, or another '
+            return (f'our own frames return over {urls[second]}: there is a loop, or another '
                     'sender uses our address')
         if first == second:
             return (f'copies of frames come over two senders on {urls[first]}: there is a loop, '

@@ -110,7 +110,7 @@ def test_each_further_line_has_a_status_and_a_loop_is_a_warning_that_names_both_
     assert (third.level, value(third, 'copies_received')) == (WARN, '6')
     for text in (f'copies of frames from {urls[0]} come over {urls[2]}: there is a loop',
                  f'copies of frames come over two senders on {urls[2]}: there is a loop',
-                 f'our own frames come back over {urls[2]}: there is a loop'):
+                 f'our own frames return over {urls[2]}: there is a loop'):
         assert text in third.message
 
 

@@ -39,7 +39,7 @@ def stores(root: object, *others: object) -> dict[str, int]:
     """
     Return the sizes of all containers that an object holds, by the class and attribute with them.
 
-    Of several with one name, such as the stores of each device, it is that of the largest.
+    The largest counts of several with one name, such as the stores of each device.
 
     :param others: objects that are left out, with everything that only they hold.
     """

@@ -269,7 +269,7 @@ def test_frames_of_another_sender_with_our_address_are_forwarded_and_ours_are_no
     pair.meet()
     other = pair.ground.send(to(LIGHT), source=OWN)
     assert pair.light.received == [other]
-    # Ours come back through a slow ring.
+    # A slow ring returns ours.
     for after in (0.0, 2.0, 2.9):
         pair.network.now += after
         pair.ground.send_bytes(ours)
