@@ -39,7 +39,7 @@ from ..devices import Side
 from ..rig import alternate, Bench, bridge, peer, udp, wait_until
 from ..rows import at_most, Row, times
 
-MANAGER, DEVICE = mav.Address(1, 194), mav.Address(1, 154)
+MANAGER, DEVICE = mav.Address(1, 193), mav.Address(1, 154)
 PLAYERS = [mav.Address(255, 100 + number) for number in range(20)]
 RATE, SECONDS = 1000, 10.0
 # s between setpoints, as players send them. Without pauses the ratio depends on the processors

@@ -167,7 +167,7 @@ class Lights:
 
     def __init__(self, number: int, warm_up: int) -> None:
         # The lights do not answer, and the client soon gives up its first requests.
-        client = Client(Address(1, 194), Settings(), command_timeout=0.05, command_retries=0)
+        client = Client(Address(1, 193), Settings(), command_timeout=0.05, command_retries=0)
         client.events.subscribe(self._count)
         self._link = SimulatedLink(client, lambda data, peer: None)
         self._frames = frames(number)

@@ -108,7 +108,7 @@ def over(bench: Bench, topic: str, type_: type[Any], place: str) -> Row:
         [times(found['ours'], found['bare'], 1.6, 'p50')])
 
 
-MANAGER, BRIDGE = mav.Address(1, 1), mav.Address(1, 194)
+MANAGER, BRIDGE = mav.Address(1, 1), mav.Address(1, 193)
 NAN = math.nan
 
 

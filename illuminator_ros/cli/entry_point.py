@@ -35,7 +35,15 @@ _REMEDIES = {
     'yaml': 'sudo apt install python3-yaml, or pip install pyyaml',
     'visualization_msgs': 'sudo apt install ros-jazzy-visualization-msgs',
 }
-
+_MONITOR = _REMEDIES['textual']
+# The oldest version of each package that works, by the module that it has, and the remedy.
+_OLDEST = {
+    'pymavlink': ('pymavlink', '2.4.50', "pip install 'pymavlink>=2.4.50'"),
+    'rclpy': ('rclpy', '7.1', 'install ROS 2 Jazzy or newer'),
+    'serial': ('pyserial', '3.5', "pip install 'pyserial>=3.5'"),
+    'textual': ('textual', '8', _MONITOR),
+    'textual_serve': ('textual_serve', '1.1', _MONITOR),
+}
 
 # The beginning of an error, once the arguments have been parsed.
 CANNOT_CREATE = 'cannot create the node'
@@ -73,18 +81,41 @@ def escape_output() -> None:
 
 
 def explained(name: str, run: Callable[[], int]) -> int:
-    """Run a program and return its exit status; name the package that is missing, or a refusal."""
+    """Run a program and return its exit status; name a refusal, or a missing or old package."""
     try:
         return run()
-    except Refusal as refusal:
-        print(f'{name}: {one_line(refusal)}', file=sys.stderr)
-        return 2
-    except ModuleNotFoundError as error:
-        package = (error.name or '').partition('.')[0]
-        if package not in _REMEDIES:
+    except Exception as error:
+        status, reason = 1, _missing_package(error) or _old_package()
+        if not reason and isinstance(error, Refusal):
+            status, reason = 2, one_line(error)
+        if not reason:
             raise
-        print(f'{name}: {package} is not installed: {_REMEDIES[package]}', file=sys.stderr)
-        return 1
+        print(f'{name}: {reason}', file=sys.stderr)
+        return status
+
+
+def _missing_package(error: Exception) -> str:
+    """Return which package an error says is missing, with the remedy; '' if none is."""
+    module = isinstance(error, ModuleNotFoundError) and (error.name or '').partition('.')[0]
+    # A package without one of its modules is an old one.
+    if not module or module not in _REMEDIES or sys.modules.get(module):
+        return ''
+    return f'{module} is not installed: {_REMEDIES[module]}'
+
+
+def _old_package() -> str:
+    """Return which imported package is too old, with the remedy; '' if none is."""
+    # Slow to import.
+    from importlib.metadata import PackageNotFoundError, version
+
+    def numbers(text: str) -> list[int]:
+        return [int(number) for number in re.findall(r'\d+', text)]
+
+    for module, (package, oldest, remedy) in _OLDEST.items():
+        with contextlib.suppress(PackageNotFoundError):
+            if module in sys.modules and numbers(found := version(package)) < numbers(oldest):
+                return f'{package} {found} is too old; {oldest} or newer is needed: {remedy}'
+    return ''
 
 
 def print_output(complain: Callable[[str], object], *texts: str, end: str = '\n') -> bool:

@@ -24,7 +24,7 @@ import math
 from .command_receiver import CommandReceiver
 from .command_sender import Command, CommandSender, CommandStatus
 from .conflating_queue import StreamGroup
-from .dialect import mavlink
+from .dialect import enum_name, mavlink
 from .frame import Frame
 from .messages import (
     Address,
@@ -198,10 +198,17 @@ class Component(Endpoint):
         self._received = CommandReceiver(self.address)
         self._heartbeat = HeartbeatTimer(self.address, mav_type, self.outgoing)
         self._conflict_at = -math.inf
+        # The last heartbeat from another sender with our address.
+        self._conflicting: Heartbeat | None = None
 
-    def address_conflict(self, now: float) -> bool:
-        """Return whether another sender has lately used our address."""
-        return now - self._conflict_at < CONFLICT_MEMORY
+    def address_conflict(self, now: float) -> str:
+        """Return what another sender is that has lately used our address; '' without one."""
+        if now - self._conflict_at >= CONFLICT_MEMORY:
+            return ''
+        if self._conflicting is None:
+            return 'a component without a HEARTBEAT'
+        return (f'{enum_name("MAV_TYPE", self._conflicting.type)}, '
+                f'{enum_name("MAV_AUTOPILOT", self._conflicting.autopilot)} by its HEARTBEAT')
 
     def close(self, now: float) -> None:
         """Change no device any more, except as the payloads do at the end of the process."""
@@ -237,6 +244,10 @@ class Component(Endpoint):
             return
         if source == self.address:
             # The link has already dropped our own frames that returned.
+            if isinstance(message, Heartbeat):
+                self._conflicting = message
+            elif now - self._conflict_at >= CONFLICT_MEMORY:
+                self._conflicting = None
             self._conflict_at = now
             for payload in self._receivers.get(type(message), ()):
                 payload.receive_conflicting(message, now)

@@ -24,6 +24,9 @@ from typing import Generic, TypeVar
 
 K = TypeVar('K', bound=Hashable)
 
+# Entries of the heap that may be obsolete, beside one for each key.
+SPARE = 8
+
 
 class DeadlineQueue(Generic[K]):
     """
@@ -66,6 +69,11 @@ class DeadlineQueue(Generic[K]):
     def _enter(self, key: K, deadline: float) -> None:
         self._entered[key] = deadline
         heapq.heappush(self._heap, (deadline, next(self._order), key))
+        if len(self._heap) > 2 * len(self._deadlines) + SPARE:
+            # Most entries are of keys without a deadline, or were replaced.
+            self._entered = dict(self._deadlines)
+            self._heap = [(at, next(self._order), one) for one, at in self._deadlines.items()]
+            heapq.heapify(self._heap)
 
     def next_deadline(self) -> float:
         """Return the earliest deadline, infinity if there is none."""

@@ -51,6 +51,12 @@ for _value, _name in ((6, 'MAV_RESULT_CANCELLED'), (10, 'MAV_RESULT_NOT_IN_CONTR
         mavlink.enums['MAV_RESULT'][_value] = mavlink.EnumEntry(_name, '')
 
 
+def enum_name(enum: str, value: int) -> str:
+    """Return the name of a value of an enum, such as MAV_TYPE_GCS; the value where it has none."""
+    entry = mavlink.enums[enum].get(value)
+    return entry.name if entry else f'{enum} {value}'
+
+
 def register(cls: type[M]) -> type[M]:
     """
     Add a message to the dialect, in place of another message with its id.

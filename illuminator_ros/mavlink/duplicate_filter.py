@@ -12,27 +12,55 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Copies of frames that return in a loop, or that come over two lines; no I/O, no clock."""
+"""Copies of frames that return in a loop, or that come over several paths; no I/O, no clock."""
 
 from __future__ import annotations
 
-from collections import deque
+from collections import OrderedDict
+from typing import NamedTuple
 
-from .frame import Frame
-from .messages import Address
+from .transport import Peer
 
-# s for which a frame is remembered.
-MEMORY = 0.5
-# Frames that are remembered: 0.5 s of 16,000 a second.
-MAX_FRAMES = 8192
-MAX_SOURCES = 256
-# Sequence numbers wrap after 256 frames. A fast sender may then send an equal frame.
-WRAP = 128
+# s for which a frame is remembered: a loop through a radio is slow.
+MEMORY = 5.0
+# Frames that are remembered: 5 s of 6,500 a second. Each takes up to 300 bytes.
+MAX_FRAMES = 32768
+
+
+class Path(NamedTuple):
+    """The index of a line, and the neighbour on it; see :meth:`~.transport.Channel.leads_to`."""
+
+    line: int
+    neighbour: Peer
+
+
+# The path of the frames that we send.
+OWN = Path(-1, None)
+
+
+class _Arrival(NamedTuple):
+    """
+    The last arrival of a frame.
+
+    :param other: the last one over another path, None if there was none.
+    """
+
+    at: float
+    path: Path
+    other: _Arrival | None = None
+
+    def copied_from(self, path: Path, now: float) -> Path | None:
+        """Return the other path over which the frame came lately, None if it came over none."""
+        other = self if path != self.path else self.other
+        return other.path if other is not None and now - other.at < MEMORY else None
 
 
 class DuplicateFilter:
     """
-    Remembers the frames that were accepted lately, and the line of each.
+    Remembers the frames that were accepted lately, and over which paths they came.
+
+    A frame is a copy if it came over another path lately, byte for byte. Equal frames over one
+    path are several frames: some devices send each frame with the same sequence number.
 
     :ivar copies: how many copies have come and when the last came, s, by the indexes of
         the lines of the original and of the copy.
@@ -40,39 +68,35 @@ class DuplicateFilter:
 
     def __init__(self) -> None:
         self.copies: dict[tuple[int, int], tuple[int, float]] = {}
-        # By the hash: when it came (s), how many of its source had come by then, and its line.
-        self._frames: dict[int, tuple[float, int, int]] = {}
-        self._order: deque[tuple[int, tuple[float, int, int]]] = deque()
-        self._counts: dict[Address, int] = {}
+        # By the hash of the frame, in the order of arrival; the front of a dict is slow to remove.
+        self._arrivals: OrderedDict[int, _Arrival] = OrderedDict()
 
     def __len__(self) -> int:
-        return len(self._frames)
+        return len(self._arrivals)
 
-    def has(self, frame: Frame, now: float) -> bool:
-        """Return whether a frame is a copy of an accepted frame."""
-        found = self._frames.get(hash(frame.data))
-        return (found is not None and now - found[0] < MEMORY
-                and self._counts.get(frame.source, 0) - found[1] < WRAP)
+    def is_copy(self, frame: bytes, path: Path, now: float) -> bool:
+        """Return whether a frame is a copy of an accepted or sent frame, and count it if so."""
+        key = hash(frame)
+        last = self._arrivals.get(key)
+        original = last.copied_from(path, now) if last else None
+        if original is None:
+            return False
+        self._add(key, path, now)
+        pair = original.line, path.line
+        count, _ = self.copies.get(pair, (0, 0.0))
+        self.copies[pair] = count + 1, now
+        return True
 
-    def is_copy(self, frame: Frame, line: int, now: float) -> bool:
-        """Count a frame if it is a copy, and remember it otherwise; return whether it is one."""
-        key = hash(frame.data)
-        if key in self._frames and self.has(frame, now):
-            pair = self._frames[key][2], line
-            count, _ = self.copies.get(pair, (0, 0.0))
-            self.copies[pair] = count + 1, now
-            return True
-        order, frames, counts = self._order, self._frames, self._counts
-        while order and (now - order[0][1][0] >= MEMORY or len(order) >= MAX_FRAMES):
-            old, entry = order.popleft()
-            if frames.get(old) is entry:
-                del frames[old]
-        count = counts.pop(frame.source, 0) + 1
-        # The source that was silent for longest is forgotten.
-        if len(counts) >= MAX_SOURCES:
-            del counts[next(iter(counts))]
-        counts[frame.source] = count
-        entry = now, count, line
-        frames[key] = entry
-        order.append((key, entry))
-        return False
+    def add(self, frame: bytes, path: Path, now: float) -> None:
+        """Remember a frame that is accepted or sent."""
+        self._add(hash(frame), path, now)
+        arrivals = self._arrivals
+        while len(arrivals) > MAX_FRAMES or now - next(iter(arrivals.values())).at >= MEMORY:
+            arrivals.popitem(last=False)
+
+    def _add(self, key: int, path: Path, now: float) -> None:
+        last = self._arrivals.pop(key, None)
+        if last is not None:
+            other = last if path != last.path else last.other
+            last = other and other._replace(other=None)
+        self._arrivals[key] = _Arrival(now, path, last)

@@ -20,6 +20,7 @@ from collections import deque
 import random
 
 from .dialect import base_size, encode
+from .duplicate_filter import DuplicateFilter, OWN
 from .frame import encode_frame, Frame
 from .messages import Address, Message
 from .signing import Signing, stamp_of
@@ -66,11 +67,13 @@ class FrameWriter:
     Makes frames of messages, and recognises them when they return.
 
     :param version: 1 or 2, of all frames.
+    :param duplicates: remembers the frames, None where none are forwarded.
     :ivar sequences: the next sequence number of each address that was sent from.
     :raises ValueError: if the frames must be signed and MAVLink 1 cannot.
     """
 
-    def __init__(self, signing: Signing, version: int = 2) -> None:
+    def __init__(self, signing: Signing, version: int = 2,
+                 duplicates: DuplicateFilter | None = None) -> None:
         if version not in (1, 2):
             raise ValueError(f'MAVLink version {version} is neither 1 nor 2')
         if version == 1 and signing.signs:
@@ -80,6 +83,7 @@ class FrameWriter:
         self._signing = signing
         self._signs = signing.signs
         self._version = version
+        self._duplicates = duplicates
         self._loopback = LoopbackFilter()
 
     def frame(self, source: Address, message: Message, now: float, unix_time: float) -> bytes:
@@ -104,6 +108,8 @@ class FrameWriter:
         if self._signs:
             frame = self._signing.sign(frame, unix_time)
             self._loopback.signed(self._signing.timestamp)
+        if self._duplicates is not None:
+            self._duplicates.add(frame, OWN, now)
         return frame
 
     def is_loopback(self, frame: Frame, now: float) -> bool:

@@ -69,6 +69,10 @@ class LineUser(ABC):
         """Note that no peer is heard over an open line; repeated."""
 
     @abstractmethod
+    def behind(self, line: Line, peer: Peer, now: float) -> None:
+        """Note that the signing clock of a sender that is not a peer is behind."""
+
+    @abstractmethod
     def receive(
         self, line: Line, peer: Peer, frames: Sequence[ReceivedFrame], now: float,
     ) -> None:
@@ -283,6 +287,9 @@ class Line:
                     frames = self.receiver.take(peer, data, now)
                     if frames is not None:
                         self._handle(channel, peer, frames, now)
+                    if (self.receiver.is_behind and channel.has_clients
+                            and peer not in channel.peers(now)):
+                        self._user.behind(self, peer, now)
         except OSError as error:
             self._lost(error)
 

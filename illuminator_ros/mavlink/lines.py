@@ -24,6 +24,7 @@ import selectors
 from .component import Endpoint
 from .dialect import decode, line_of
 from .duplicate_filter import DuplicateFilter
+from .forwarded_commands import ForwardedCommands
 from .frame import MAX_ID_V1
 from .frame_writer import FrameWriter
 from .line import ANNOUNCE_INTERVAL, Line, LineUser, SILENCE
@@ -52,6 +53,7 @@ class Lines(LineUser):
     :param call: calls a function in the thread of the link, given the time, s.
     :param mavlink_version: 1 or 2, of the frames that are sent; both are received.
     :param wall_clock: s, Unix time, for the signing time stamps.
+    :ivar forwarded_commands: the commands of others that were forwarded lately.
     :raises ValueError: if MAVLink 1 cannot carry a message of the endpoint, or must be signed.
     """
 
@@ -71,10 +73,11 @@ class Lines(LineUser):
         self._clock = clock
         self._version = mavlink_version
         self._duplicates = DuplicateFilter() if len(urls) > 1 else None
+        self.forwarded_commands = ForwardedCommands()
         self._heard_at = -math.inf
         # When the endpoint announced itself on all lines because none was heard.
         self._announced_at = -math.inf
-        writer = FrameWriter(signing, mavlink_version)
+        writer = FrameWriter(signing, mavlink_version, self._duplicates)
         sources: dict[Address, SequenceCounter] = {}
         self._lines = [
             Line(url, self, Receiver(signing, self._classes, writer, wall_clock, sources,
@@ -91,15 +94,19 @@ class Lines(LineUser):
 
     def snapshots(self, now: float) -> tuple[LinkSnapshot, ...]:
         """Return each line at this moment."""
+        complete = self._router.sole_sources(now)
+        for source, counter in self._sources.items():
+            counter.is_complete = source in complete
         return tuple(line.snapshot(now) for line in self._lines)
 
     def copies(self, now: float) -> Mapping[tuple[int, int], int]:
         """
         Return how many copies of frames have come, where some came lately.
 
-        They come in a loop, or over several lines from one component.
+        They come in a loop, or over several paths from one component.
 
-        :return: by the indexes of the lines of the original and of the copy.
+        :return: by the indexes of the lines of the original and of the copy; that of our own
+            frames is -1.
         """
         if self._duplicates is None:
             return {}
@@ -182,6 +189,15 @@ class Lines(LineUser):
             # A router on this line forwards nothing to us until it has heard us.
             line.write([*self._sender.heartbeats.values()], line.peers(now), now)
 
+    def behind(self, line: Line, peer: Peer, now: float) -> None:
+        """
+        See :meth:`LineUser.behind`.
+
+        Its clock follows newer time stamps, so it gets one; and nothing else, since any sender can
+        repeat an old frame.
+        """
+        line.write([*self._sender.heartbeats.values()], [peer], now)
+
     def receive(
         self, line: Line, peer: Peer, frames: Sequence[ReceivedFrame], now: float,
     ) -> None:
@@ -215,3 +231,6 @@ class Lines(LineUser):
             for other, receivers in zip(self._lines, towards, strict=False):
                 if receivers:
                     other.forward(some, receivers, now)
+            if any(towards):
+                for frame in some:
+                    self.forwarded_commands.add(frame, now)

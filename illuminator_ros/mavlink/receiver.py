@@ -21,12 +21,12 @@ import math
 from typing import NamedTuple
 
 from .dialect import CRC_EXTRA
-from .duplicate_filter import DuplicateFilter
+from .duplicate_filter import DuplicateFilter, Path
 from .frame import Decoder, DecoderCounters, ForeignFrames, Frame
 from .frame_writer import FrameWriter
 from .messages import Address
 from .routing_table import RoutingTable
-from .signing import Signing
+from .signing import Signing, Verdict
 from .statistics import SequenceCounter, Traffic
 from .transport import Peer
 
@@ -55,9 +55,10 @@ class _Wait(NamedTuple):
 
 
 class _Stream:
-    """The bytes of one peer."""
+    """The bytes of one peer, and the path over which they come."""
 
-    def __init__(self, counters: DecoderCounters) -> None:
+    def __init__(self, path: Path, counters: DecoderCounters) -> None:
+        self.path = path
         self.decoder = Decoder(counters=counters)
         # Whether a frame of another component was ever accepted.
         self.good = False
@@ -75,14 +76,15 @@ class Receiver:
     :param writer: has written our frames.
     :param wall_clock: s, Unix time, for the signing time stamps.
     :param sources: see :class:`~.statistics.Traffic`.
-    :param duplicates: the frames that any of several lines has accepted, None if there is one
-        line. A copy of one of these shows a route, but is not returned. Frames of messages that
-        are not handled are then returned, and not only counted.
+    :param duplicates: the frames that any of several lines has accepted or sent, None if there is
+        one line. A copy of one of these shows a route, but is not returned. Frames of messages
+        that are not handled are then returned, and not only counted.
     :param line: the index of the line.
     :ivar traffic: of the line; the sending side counts here, too.
     :ivar routes: the peers over which components were heard.
     :ivar counters: totals over all peers since it was made.
     :ivar waits: the waits for rests of frames, by peer.
+    :ivar is_behind: whether the last bytes had a rightly signed frame with an old time stamp.
     :ivar leads_to: see :meth:`~.transport.base.Channel.leads_to`.
     """
 
@@ -95,6 +97,7 @@ class Receiver:
         self.routes = RoutingTable()
         self.counters = DecoderCounters()
         self.waits: dict[Peer, _Wait] = {}
+        self.is_behind = False
         self.leads_to: Callable[[Peer], Peer] = lambda peer: peer
         self.signing = signing
         self._signing_is_off = not signing.signs
@@ -175,7 +178,8 @@ class Receiver:
                           next(iter(self._streams)))
             del self._streams[oldest]
             self.waits.pop(oldest, None)
-        self._streams[peer] = stream = _Stream(self.counters)
+        self._streams[peer] = stream = _Stream(
+            Path(self._line, self.leads_to(peer)), self.counters)
         return stream
 
     def _watch(self, peer: Peer, decoder: Decoder, now: float) -> None:
@@ -193,30 +197,32 @@ class Receiver:
         own, duplicates = self._writer.sequences, self._duplicates
         # An unsigned frame is accepted where signing is off; this test saves a call.
         trusted = self._signing_is_off
+        self.is_behind = False
         for frame in frames:
             if isinstance(frame, ForeignFrames):
                 # Frames from our own address have returned, or show an address conflict.
                 if frame.source in own:
                     continue
                 self.traffic.count_run(frame.source, frame.sequences)
-            elif not (trusted and frame.signature is None or self._is_authentic(frame, now)) or (
-                    frame.source in own and self._writer.is_loopback(frame, now)):
+            elif frame.source in own and self._writer.is_loopback(frame, now):
                 continue
-            elif duplicates is not None and duplicates.is_copy(frame, self._line, now):
-                # Its sequence number, if late, would look like that of another sender.
+            elif duplicates is not None and duplicates.is_copy(frame.data, stream.path, now):
+                # Neither a replay nor a frame of another sender, though its number may be late.
                 self.traffic.frames_received += 1
-            else:
+                if frame.source in own:
+                    continue
+            elif trusted and frame.signature is None or (verdict := self.signing.check(
+                    frame, self._wall_clock())) is Verdict.ACCEPTED:
                 accepted.append((frame, self.traffic.count(frame)))
+                if duplicates is not None:
+                    duplicates.add(frame.data, stream.path, now)
+            else:
+                self.is_behind |= verdict is Verdict.OLD
+                continue
             heard.add(frame.source)
         if not heard:
             return None
         stream.good = True
-        neighbour = self.leads_to(peer)
         for source in heard:
-            self.routes.heard(source, neighbour, now)
+            self.routes.heard(source, stream.path.neighbour, now)
         return accepted
-
-    def _is_authentic(self, frame: Frame, now: float) -> bool:
-        # A copy of an accepted frame is not a replay.
-        return (self._duplicates is not None and self._duplicates.has(frame, now)
-                or self.signing.accepts(frame, self._wall_clock()))

@@ -16,7 +16,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Container, Iterable, Sequence
+from collections import Counter
+from collections.abc import Container, Iterable, Iterator, Sequence
 import math
 from typing import TypeVar
 
@@ -55,12 +56,16 @@ class RoutingTable:
 
     def peer_count(self, now: float) -> int:
         """Return how many peers lead to any component."""
-        return len({peer for route in self._routes.values()
-                    for peer, heard in route.items() if now - heard <= EXPIRY})
+        return len({peer for _, peer in self.routes(now)})
 
     def peer_count_of(self, source: Address, now: float) -> int:
         """Return over how many peers a component was heard in the last :data:`EXPIRY`."""
         return sum(now - heard <= EXPIRY for heard in self._routes.get(source, {}).values())
+
+    def routes(self, now: float) -> Iterator[tuple[Address, Peer]]:
+        """Return the components that were heard in the last :data:`EXPIRY`, with the peers."""
+        return ((Address(*source), peer) for source, route in self._routes.items()
+                for peer, heard in route.items() if now - heard <= EXPIRY)
 
     def heard(self, source: Address, peer: Peer, now: float) -> None:
         """Note that a component was heard over a peer."""
@@ -173,11 +178,11 @@ class Router:
 
     def targets(self, frame: Frame, peers: Peers, now: float) -> Peers:
         """
-        Return where to forward a frame; nowhere if it is for us alone, or seems to be ours.
+        Return where to forward a frame; nowhere if it is for us alone.
 
         :param peers: all but the one from which it came.
         """
-        if frame.source in self._own or frame.message_id in NEVER_FORWARDED:
+        if frame.message_id in NEVER_FORWARDED:
             return ()
         target = target_of(frame)
         if not target.system:
@@ -187,6 +192,21 @@ class Router:
         found = self._known(target, peers, now)
         # A silent component is still where it was heard last.
         return found if any(found) else self._known(target, peers, now, math.inf)
+
+    def sole_sources(self, now: float) -> set[Address]:
+        """
+        Return the components that are heard over one peer only, which leads to no other one.
+
+        A peer that leads to several may be a router. It sends what is for one of them to that one
+        only, so a frame that did not come is not lost.
+        """
+        if any(table.is_full(now) for table in self._tables):
+            return set()
+        routes = [(source, (line, peer)) for line, table in enumerate(self._tables)
+                  for source, peer in table.routes(now)]
+        ways = Counter(source for source, _ in routes)
+        behind = Counter(path for _, path in routes)
+        return {source for source, path in routes if ways[source] == behind[path] == 1}
 
     def is_reachable(self, source: Address, now: float) -> bool:
         """Return whether a component was lately heard over any line."""

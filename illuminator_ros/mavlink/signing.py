@@ -64,6 +64,14 @@ class SigningMode(Enum):
     REQUIRE = 'require'
 
 
+class Verdict(Enum):
+    """The result of the check of a frame; ``OLD``: rightly signed, with an old time stamp."""
+
+    ACCEPTED = 'accepted'
+    OLD = 'old'
+    REFUSED = 'refused'
+
+
 @dataclass(slots=True)
 class SigningCounters:
     """Received frames by the result of the check of their signature."""
@@ -136,22 +144,26 @@ class Signing:
 
     def accepts(self, frame: Frame, unix_time: float) -> bool:
         """Return whether a frame is accepted."""
+        return self.check(frame, unix_time) is Verdict.ACCEPTED
+
+    def check(self, frame: Frame, unix_time: float) -> Verdict:
+        """Check the signature of a frame, and its time stamp."""
         if self.mode is SigningMode.OFF:
             self.counters.unchecked += frame.signature is not None
-            return True
+            return Verdict.ACCEPTED
         if frame.signature is None:
             self.counters.unsigned += 1
-            return self.mode is SigningMode.SIGN
+            return Verdict.ACCEPTED if self.mode is SigningMode.SIGN else Verdict.REFUSED
         assert len(frame.signature) == SIGNATURE
         expected = signature(self.key, frame.data[:-SIGNATURE] + frame.signature[:7])
         if not self._is_equal(expected, frame.signature[7:]):
             self.counters.bad += 1
-            return False
+            return Verdict.REFUSED
         if not self._fresh(frame, unix_time):
             self.counters.replayed += 1
-            return False
+            return Verdict.OLD
         self.counters.good += 1
-        return True
+        return Verdict.ACCEPTED
 
     def _fresh(self, frame: Frame, unix_time: float) -> bool:
         """Return whether the time stamp is new for its stream, and remember it if so."""

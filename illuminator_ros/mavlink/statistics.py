@@ -61,14 +61,15 @@ class SourceCounts(NamedTuple):
     """
     Frames of one source; see :class:`SequenceCounter`.
 
+    :param lost: None where it is unknown, and ``recent_loss``.
     :param recent_loss: share of frames lost recently, %.
     """
 
     received: int
-    lost: int
+    lost: int | None
     duplicate: int
     reordered: int
-    recent_loss: float
+    recent_loss: float | None
 
 
 class _Place(NamedTuple):
@@ -87,11 +88,12 @@ class SequenceCounter:
     Frames of one source by their sequence numbers (0..255, wrapping).
 
     A frame that comes twice is a duplicate and one that comes late is reordered; neither is a
-    loss. Messages that a router leaves out look lost.
+    loss. A missing number is a loss only where each frame of the source should have come.
 
     Two senders with one address count independently, so the numbers jump back and forth, or frames
     with the same number differ.
 
+    :ivar is_complete: whether each frame should have come, so that a missing one is lost.
     :ivar sender: the number of the sender of the newest frame. A sender that was heard before
         keeps its number; a sender that loses many frames gets a new one.
     """
@@ -100,6 +102,7 @@ class SequenceCounter:
     lost: int = 0
     duplicate: int = 0
     reordered: int = 0
+    is_complete: bool = True
     sender: int = 0
     _senders: int = 1
     _left: _Place | None = None
@@ -208,9 +211,13 @@ class SequenceCounter:
 
     def snapshot(self, now: float) -> SourceCounts:
         """Update the recent loss and return the counts."""
+        if not self.is_complete:
+            self.lost = 0
+            self.reset_loss()
+            return SourceCounts(self.received, None, self.duplicate, self.reordered, None)
         _, lost, received = self._recent.growth(now, self.lost, self.received - self.duplicate)
         return SourceCounts(
-            self.received, self.lost, self.duplicate, self.reordered,
+            self.received, max(self.lost, 0), self.duplicate, self.reordered,
             100.0 * max(lost, 0) / (lost + received) if lost + received > 0 else 0.0)
 
 

@@ -32,6 +32,7 @@ from diagnostic_msgs.msg import DiagnosticStatus, KeyValue
 from ..mavlink import link_state
 from ..mavlink.command_sender import format_seconds
 from ..mavlink.component import Component
+from ..mavlink.duplicate_filter import OWN
 from ..mavlink.link import Link
 from ..mavlink.message_traits import name_of
 from ..mavlink.messages import Address
@@ -65,12 +66,13 @@ LINK_VALUES = {
         'frames from other links that were sent, or wait to be sent, over this one',
     'frames_not_forwarded': 'forwarded frames that the line replaced by newer ones or dropped',
     'not_forwarded': 'the most frequent messages of these, with their numbers',
-    'copies_received': 'frames that had come over another link less than 0.5 s before; WARN names '
+    'copies_received': 'frames that had come over another link less than 5 s before; WARN names '
                        'both links',
     'lights': 'lights that are known; in `gimbal: link` there is `gimbals`',
     **dict.fromkeys(('frames_lost', 'frames_duplicate', 'frames_reordered'),
                     'of the device of this node, by its sequence numbers'),
-    'loss_percent': 'of this device, recently; WARN above 5 %',
+    'loss_percent': 'of this device, recently; WARN above 5 %; `unknown`, as `frames_lost` is, '
+                    'behind [a router](routers.md#effects-of-a-router)',
     **dict.fromkeys(('round_trip_p50_ms', 'round_trip_p95_ms'),
                     'from a command to its acknowledgement'),
     **dict.fromkeys(('commands_sent', 'commands_resent', 'commands_unanswered'),
@@ -124,6 +126,10 @@ def _text(value: Value) -> str:
     return f'{value:.6g}' if isinstance(value, float) else str(value)
 
 
+def _known(value: Value) -> Value:
+    return 'unknown' if value is None else value
+
+
 @dataclass(frozen=True)
 class LinkDiagnostics:
     """
@@ -131,6 +137,7 @@ class LinkDiagnostics:
 
     :param lines: each of its lines, the first one first.
     :param loops: the texts on copies of frames that come over each line.
+    :param address_conflict: see :meth:`~..mavlink.component.Component.address_conflict`.
     :param unanswering: the devices whose last command got no acknowledgement.
     :param values: the values of the status of each line that are the same for all devices.
     :param devices: values of single devices, by address.
@@ -140,7 +147,7 @@ class LinkDiagnostics:
     loops: Sequence[Sequence[str]]
     taken_at: float
     address: Address
-    address_conflict: bool
+    address_conflict: str
     unanswering: frozenset[Address]
     values: Sequence[Mapping[str, Value]]
     devices: Mapping[Address, Mapping[str, Value]]
@@ -177,12 +184,19 @@ def loops(
     """
     Return texts on copies of frames, for people.
 
-    :param copies: their numbers, by the indexes of the lines of the original and of the copy.
+    :param copies: see :meth:`~..mavlink.lines.Lines.copies`.
     """
-    return {
-        (first, second): f'copies of frames from {urls[first]} come over {urls[second]}: there is '
-                         'a loop, or a component is on both'
-        for first, second in copies}
+    def text(first: int, second: int) -> str:
+        if first == OWN.line:
+            return (f'our own frames return over {urls[second]}: there is a loop, or another '
+                    'sender uses our address')
+        if first == second:
+            return (f'copies of frames come over two senders on {urls[first]}: there is a loop, '
+                    'or a component is behind both')
+        return (f'copies of frames from {urls[first]} come over {urls[second]}: there is a loop, '
+                'or a component is on both')
+
+    return {lines: text(*lines) for lines in copies}
 
 
 def link_diagnostics(
@@ -200,10 +214,10 @@ def link_diagnostics(
         trip = commands.round_trip(address)
         p50, p95 = trip.quantile(0.5), trip.quantile(0.95)
         devices[address] = {
-            'frames_lost': counter.lost,
+            'frames_lost': _known(counter.lost),
             'frames_duplicate': counter.duplicate,
             'frames_reordered': counter.reordered,
-            'loss_percent': counter.recent_loss,
+            'loss_percent': _known(counter.recent_loss),
             'round_trip_p50_ms': None if p50 is None else p50 * 1000,
             'round_trip_p95_ms': None if p95 is None else p95 * 1000,
         }
@@ -269,6 +283,11 @@ def line_findings(link: LinkDiagnostics, index: int) -> list[Finding]:
             *((WARN, text) for text in link.loops[index])]
 
 
+def _clash(link: LinkDiagnostics) -> str:
+    return (f'another sender uses our address {link.address} ({link.address_conflict}): set the '
+            'parameter component_id to an id that is free')
+
+
 def why_nothing_is_heard(link: LinkDiagnostics, device: str) -> str:
     """
     Return the likeliest reason why no device is found on an open link, for people.
@@ -277,8 +296,7 @@ def why_nothing_is_heard(link: LinkDiagnostics, device: str) -> str:
     """
     signing, frames, bytes_ = link.state.signing, link.frames_received, link.bytes_received
     if link.address_conflict:
-        return (f'another sender uses our address {link.address}: set component_id to a free one '
-                'here or there')
+        return _clash(link)
     if signing.replayed and signing.replayed >= max(signing.bad, signing.unsigned):
         return (f'{signing.replayed} frames refused as replayed: their time stamps are not newer '
                 'than the last; compare the clocks')
@@ -313,7 +331,7 @@ def link_report(
     """
     findings = line_findings(link, 0)
     if link.address_conflict:
-        findings.append((ERROR, f'another sender uses our address {link.address}'))
+        findings.append((ERROR, _clash(link)))
     waited = link.taken_at - started
     if device is None:
         findings.append((
@@ -323,7 +341,7 @@ def link_report(
     if device in link.unanswering and link.state.signing.unchecked:
         findings.append((WARN, SIGNING_NEEDED))
     counts = link.state.traffic.sources.get(device) if device else None
-    if counts and counts.recent_loss > LOSS_WARNING:
+    if counts and (counts.recent_loss or 0.0) > LOSS_WARNING:
         findings.append((WARN, f'{counts.recent_loss:.0f} % of the frames lost'))
     if limit_reached:
         findings.append((WARN, f'more than {count} {kind}s, some ignored'))

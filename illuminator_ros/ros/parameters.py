@@ -150,7 +150,7 @@ LINK_PARAMETERS = (
     ParameterSpec('forward_urls', [], 'further links; frames are forwarded between all links'),
     ParameterSpec('payloads', ['illuminator'], 'kinds of devices that the bridge serves'),
     ParameterSpec('system_id', 1, 'our MAVLink system id', low=1, high=255),
-    ParameterSpec('component_id', 194, 'our MAVLink component id', low=1, high=255),
+    ParameterSpec('component_id', 193, 'our MAVLink component id', low=1, high=255),
     ParameterSpec('mavlink_version', 2, 'MAVLink version of sent frames; both are received',
                   low=1, high=2),
     ParameterSpec('command_timeout', 0.5, 'longest wait for one acknowledgement', 's', 0.05,

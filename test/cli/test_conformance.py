@@ -174,7 +174,7 @@ def test_closed_standard_streams_are_no_error(url: str, simulate: Start, redirec
     ('udpin://{url}', False, 1, 'no light was heard within 0.5 s'),
     ('tcp://127.0.0.1:1', False, 1, 'link not open: tcp://127.0.0.1:1: '),
     # This computer cannot open the link, which does not concern the light.
-    ('udpin://{url}', True, 2, 'Address already in use; nothing was checked'),
+    ('udpin://{url}', True, 2, 'several programs on one link); nothing was checked'),
     ('serial:///nowhere/tty:57600', False, 2, 'nothing was checked')])
 def test_without_a_light_or_a_link_the_reason_is_reported_with_its_status(
         url: str, start: Start, simulate: Start, link: str, used: bool, status: int, reason: str,

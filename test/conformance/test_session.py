@@ -118,7 +118,7 @@ def test_a_manager_without_its_status_is_found_by_its_information() -> None:
 
 
 def test_the_attitude_of_a_manager_is_that_of_the_device_that_it_names() -> None:
-    session, managed = manager.CHECKS.session(Conditions(OURS)), Address(1, 194)
+    session, managed = manager.CHECKS.session(Conditions(OURS)), Address(1, 193)
     session.receive(managed, gimbal.GimbalManagerStatus(0, 0, 154, 0, 0, 0, 0), 1.0)
     for component in (154, 171):
         session.receive(Address(1, component), AttitudeStatus(

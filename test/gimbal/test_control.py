@@ -78,7 +78,7 @@ def test_gm_16_control_is_taken_and_released_as_the_status_shows(secondary: mav.
     assert message.startswith('control taken, confirmed by GIMBAL_MANAGER_STATUS')
     assert (rig.managers[0].primary, rig.managers[0].secondary) == (OURS, secondary)
     # Explicit ids, never -2; the secondary component is left unchanged.
-    assert commands(rig, CONFIGURE) == [(1, 194, -1, -1, 0, 0, 154)]
+    assert commands(rig, CONFIGURE) == [(1, 193, -1, -1, 0, 0, 154)]
     success, message = asked(rig, Gimbal.release_control)
     assert success, message
     assert commands(rig, CONFIGURE)[1:] == [(-3, -3, -3, -3, 0, 0, 154)]
@@ -239,7 +239,7 @@ def test_gm_16_release_includes_secondary_control(primary: mav.Address) -> None:
     rig.managers[0].secondary, rig.managers[0].applies = OURS, False
     success, message = asked(rig.run(1.0), Gimbal.release_control, 6.0)
     assert not success
-    assert 'secondary 1/194' in message
+    assert 'secondary 1/193' in message
 
 
 def test_gm_17_lost_control_is_told_and_not_taken_back() -> None:

@@ -168,11 +168,11 @@ def test_controller_is_named_and_lost_control_is_logged_and_not_taken_back(
     gimbal.primary = OTHER
     controller.wait_value('primary 1/195, secondary none')
     take_control(ros, gimbal)
-    controller.wait_value('primary 1/194, secondary none')
+    controller.wait_value('primary 1/193, secondary none')
     lost = program.count(LOST)
 
     gimbal.primary, gimbal.secondary = OTHER, OURS
-    controller.wait_value('primary 1/195, secondary 1/194')
+    controller.wait_value('primary 1/195, secondary 1/193')
 
     program.wait_for(LOST, count=lost + 1)
     ros.subscribe(Bool, '/gimbal/in_control').wait_value(False)
@@ -316,7 +316,7 @@ def test_diagnostics_name_flags_limits_identity_and_control(
     shown = {one.key: one.value for one in status.values}
     assert (status.level, status.hardware_id) == (DiagnosticStatus.OK, '4d')
     assert {'vendor': 'Maker', 'model': 'Turn', 'firmware_version': '1.2.3',
-            'controller': 'primary 1/194, secondary none', 'manager': '1/1',
+            'controller': 'primary 1/193, secondary none', 'manager': '1/1',
             'yaw_frame': 'vehicle', 'pitch_rad': '0.785398', 'pitch_min_rad': '-0.5',
             'pitch_max_rad': '1.5'}.items() <= shown.items()
     assert 'has yaw lock' in shown['capabilities']

@@ -48,7 +48,7 @@ from mavsdk import mavsdk  # noqa: E402, I100
 from mavsdk.plugins.gimbal import gimbal as plugin  # noqa: E402
 
 OURS, FIRST, SECOND, DEVICE = (
-    Address(1, 194), Address(1, 195), Address(1, 196), Address(1, 154))
+    Address(1, 193), Address(1, 195), Address(1, 196), Address(1, 154))
 GIMBAL = 1
 # MAVSDK's name of MAV_RESULT_DENIED.
 DENIED = 'ERROR'
@@ -105,7 +105,7 @@ def test_mavsdk_lists_controls_and_releases_and_a_second_one_is_denied() -> None
     manager, device, vehicle = managed_vehicle(ControlSettings(lease=LEASE), 0.0)
     with served(vehicle) as port, player(FIRST, port) as gimbal, player(SECOND, port) as second:
         [item] = gimbal.gimbal_list().gimbals
-        assert (item.gimbal_device_id, item.gimbal_manager_component_id) == (154, 194)
+        assert (item.gimbal_device_id, item.gimbal_manager_component_id) == (154, 193)
         assert item.model_name == 'simulator'
         follow, lock = plugin.GimbalMode.YAW_FOLLOW, plugin.GimbalMode.YAW_LOCK
         once, stream = plugin.SendMode.ONCE, plugin.SendMode.STREAM

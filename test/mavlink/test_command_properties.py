@@ -47,7 +47,7 @@ class CommandSenderMachine(RuleBasedStateMachine):
             self.deadlines.append((run, self.rig.now + limit))
 
     @rule(source=COMPONENTS, command=COMMANDS, result=RESULTS, progress=st.integers(0, 255),
-          addressee=st.sampled_from([Address(1, 194), Address(0, 0), Address(9, 9)]))
+          addressee=st.sampled_from([Address(1, 193), Address(0, 0), Address(9, 9)]))
     def acknowledge(self, source: Address, command: int, result: int, progress: int,
                     addressee: Address) -> None:
         self.rig.ack(result, command, source=source, progress=progress, target=addressee)

@@ -27,7 +27,7 @@ from illuminator_ros.mavlink.dialect import mavlink
 from illuminator_ros.mavlink.messages import AnyCommand
 import pytest
 
-OURS, PILOT, OTHER = mav.Address(1, 194), mav.Address(255, 190), mav.Address(255, 191)
+OURS, PILOT, OTHER = mav.Address(1, 193), mav.Address(255, 190), mav.Address(255, 191)
 SUPPORTED = 1000
 
 
@@ -100,7 +100,7 @@ def test_a_command_is_acknowledged_before_the_messages_that_it_causes(make: Any)
     (mav.Address(1, 0), 31000, None),
     (mav.Address(0, 0), 31000, None),
     (mav.Address(1, 1), SUPPORTED, None),
-    (mav.Address(2, 194), SUPPORTED, None),
+    (mav.Address(2, 193), SUPPORTED, None),
 ])
 @pytest.mark.parametrize('make', [long, whole])
 def test_a_command_is_answered_if_it_is_for_us(

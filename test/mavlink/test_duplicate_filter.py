@@ -12,59 +12,54 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Copies of frames are recognised for half a second, whatever else comes."""
+"""Frames that come over two paths within 5 s are copies; those of one path are not."""
 
 from __future__ import annotations
 
-from illuminator_ros.mavlink.duplicate_filter import (
-    DuplicateFilter,
-    MAX_FRAMES,
-    MAX_SOURCES,
-    MEMORY,
-    WRAP,
-)
-from illuminator_ros.mavlink.frame import Frame
-from illuminator_ros.mavlink.messages import Address
+from illuminator_ros.mavlink.duplicate_filter import DuplicateFilter, MAX_FRAMES, MEMORY, Path
 import pytest
-from support.frames import heartbeat_frame, LIGHT, only
+
+FIRST, SECOND = Path(0, 'a'), Path(1, 'b')
 
 
-def frame(sequence: int = 0, source: Address = LIGHT) -> Frame:
-    return only(heartbeat_frame(source, sequence))
+def copies(filter_: DuplicateFilter, *arrivals: tuple[float, Path]) -> list[bool]:
+    """Return for each arrival of the same bytes whether it is a copy."""
+    found = []
+    for now, path in arrivals:
+        found.append(filter_.is_copy(b'frame', path, now))
+        if not found[-1]:
+            filter_.add(b'frame', path, now)
+    return found
 
 
-@pytest.mark.parametrize(('other', 'after', 'is_copy'), [
-    (frame(), 0.0, True), (frame(), MEMORY - 0.01, True), (frame(), MEMORY, False),
-    (frame(1), 0.0, False), (frame(source=Address(1, 244)), 0.0, False)])
-def test_only_the_same_bytes_within_half_a_second_are_a_copy(
-        other: Frame, after: float, is_copy: bool) -> None:
+@pytest.mark.parametrize(('arrivals', 'expected'), [
+    # A device may send each frame with the same sequence number.
+    ([(0.0, FIRST), (0.0, FIRST), (1.0, FIRST)], [False] * 3),
+    ([(0.0, FIRST), (0.0, SECOND)], [False, True]),
+    ([(0.0, FIRST), (4.9, SECOND)], [False, True]),
+    ([(0.0, FIRST), (MEMORY, SECOND)], [False, False]),
+    # Two senders on one line are two paths.
+    ([(0.0, FIRST), (0.1, Path(0, 'b'))], [False, True]),
+    # A ring goes both ways round: the frame returns over the line of the original, too.
+    ([(0.0, FIRST), (0.1, SECOND), (0.2, FIRST), (5.0, FIRST), (5.2, FIRST)],
+     [False, True, True, True, False])])
+def test_a_frame_is_a_copy_if_it_came_over_another_path_less_than_5_s_before(
+        arrivals: list[tuple[float, Path]], expected: list[bool]) -> None:
     filter_ = DuplicateFilter()
-    assert not filter_.is_copy(frame(), 0, 1.0)
-    assert filter_.has(other, 1.0 + after) is is_copy
-    assert filter_.is_copy(other, 1, 1.0 + after) is is_copy
-    assert filter_.copies == ({(0, 1): (1, 1.0 + after)} if is_copy else {})
+    assert not filter_.is_copy(b'other', SECOND, arrivals[-1][0])
+    assert copies(filter_, *arrivals) == expected
 
 
-def test_a_copy_does_not_prolong_the_memory_of_its_original() -> None:
+def test_copies_are_counted_by_the_lines_of_the_original_and_of_the_copy() -> None:
     filter_ = DuplicateFilter()
-    assert [filter_.is_copy(frame(), 0, now) for now in (0.0, 0.4, 0.6, 1.0)] == [
-        False, True, False, True]
+    copies(filter_, (0.0, FIRST), (1.0, SECOND), (2.0, SECOND))
+    assert filter_.copies == {(0, 1): (2, 2.0)}
 
 
-def test_equal_frames_of_a_sender_whose_sequence_numbers_have_wrapped_are_no_copies() -> None:
+def test_memory_is_bounded_against_any_number_of_frames_and_ends_after_5_s() -> None:
     filter_ = DuplicateFilter()
-    found = [filter_.is_copy(frame(number & 0xFF), 0, 0.0) for number in range(1024)]
-    assert not any(found)
-    # The newest ones still have copies.
-    newest = [filter_.has(frame((1023 - back) & 0xFF), 0.0) for back in (0, WRAP - 1, WRAP)]
-    assert newest == [True, True, False]
-
-
-def test_memory_is_bounded_against_any_number_of_frames_and_senders() -> None:
-    filter_ = DuplicateFilter()
-    for number in range(3 * MAX_FRAMES):
-        filter_.is_copy(frame(number // 60000, Address(number >> 8 & 0xFF, number & 0xFF)), 0, 0.0)
-    assert len(filter_) == len(filter_._order) == MAX_FRAMES
-    assert len(filter_._counts) == MAX_SOURCES
-    filter_.is_copy(frame(9), 0, MEMORY)
-    assert len(filter_) == len(filter_._order) == 1
+    for number in range(2 * MAX_FRAMES):
+        filter_.add(number.to_bytes(4, 'little'), FIRST, 0.0)
+    assert len(filter_) == MAX_FRAMES
+    filter_.add(b'later', FIRST, MEMORY)
+    assert len(filter_) == 1

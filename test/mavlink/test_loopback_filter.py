@@ -26,7 +26,7 @@ import pytest
 from support.frames import LIGHT, only
 from support.messages import STATUS
 
-OURS = Address(1, 194)
+OURS = Address(1, 193)
 FRAME = Frame(2, 7, OURS, 0, b'\x01\x02')
 
 

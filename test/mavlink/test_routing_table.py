@@ -108,7 +108,7 @@ def test_peers_count_while_they_are_heard_and_none_do_after_the_link_is_closed(
 
 # Several lines
 
-OWN = Address(1, 194)
+OWN = Address(1, 193)
 GIMBAL, AUTOPILOT, GROUND = Address(1, 154), Address(1, 1), Address(255, 190)
 # The light is on line 0, the autopilot on 0 and 1, the gimbal on 1, and the ground station on 2.
 # Another sender with our address is on 1.
@@ -156,7 +156,7 @@ SETUP_SIGNING = mavlink.MAVLink_setup_signing_message(1, 1, [0] * 32, 0)
     (frame_of(to(9, 0), source=GROUND), 2, set()),
     (frame_of(to(*GROUND), source=GROUND), 2, set()),
     (frame_of(to(*OWN), source=GROUND), 2, set()),
-    (frame_of(to(*LIGHT), source=OWN), 2, set()),
+    (frame_of(to(*LIGHT), source=OWN), 1, {0}),
     (frame_of(to(*GIMBAL), source=GROUND, version=1), 2, {1}),
     (frame_of(SETUP_SIGNING, source=GROUND), 2, set()),
     (raw_v2(UNKNOWN_TARGET, bytes((9, 9, 9)), source=GROUND), 2, {0, 1})])
@@ -165,6 +165,22 @@ def test_a_frame_goes_to_the_other_lines_where_its_target_was_heard(
     others = peers(*{0, 1, 2} - {origin})
     for now in (0.0, 10 * EXPIRY):
         assert lines_of(router().targets(only(frame), others, now)) == expected
+
+
+@pytest.mark.parametrize(('heard', 'sole'), [
+    ([(LIGHT, 0, 'a')], {LIGHT}),
+    ([(LIGHT, 0, 'a'), (GIMBAL, 0, 'b')], {LIGHT, GIMBAL}),
+    ([(LIGHT, 0, 'a'), (GIMBAL, 1, 'a')], {LIGHT, GIMBAL}),
+    ([(LIGHT, 0, 'a'), (GIMBAL, 0, 'a')], set()),
+    ([(LIGHT, 0, 'a'), (LIGHT, 0, 'b')], set()),
+    ([(LIGHT, 0, 'a'), (LIGHT, 1, 'a')], set())])
+def test_a_component_is_alone_if_one_peer_leads_to_it_and_to_no_other_one(
+        heard: list[tuple[Address, int, str]], sole: set[Address]) -> None:
+    tables = [RoutingTable(), RoutingTable()]
+    for address, line, peer in heard:
+        tables[line].heard(address, peer, 0.0)
+    router = Router(tables, {})
+    assert [router.sole_sources(now) for now in (0.0, EXPIRY + 1)] == [sole, set()]
 
 
 def test_a_frame_goes_where_its_target_was_heard_last_if_that_is_long_ago() -> None:

@@ -110,7 +110,7 @@ def test_any_content_is_a_key_of_32_bytes_or_refused_without_showing_it(
 
 @pytest.fixture
 def store(tmp_path: Path) -> TimestampStore:
-    return TimestampStore('signing.key', 'bridge 1/194', tmp_path / 'state')
+    return TimestampStore('signing.key', 'bridge 1/193', tmp_path / 'state')
 
 
 def run(store: TimestampStore, unix_time: float) -> int:
@@ -211,12 +211,12 @@ def test_each_key_file_and_component_has_one_state_file_in_the_ros_home(
     monkeypatch.chdir(tmp_path)
     (tmp_path / 'link').symlink_to(tmp_path / 'key')
     names = ('key', './key', '~/key', str(tmp_path / 'key'), 'link')
-    (one,) = {TimestampStore(name, 'bridge 1/194').path for name in names}
+    (one,) = {TimestampStore(name, 'bridge 1/193').path for name in names}
     assert one.parent == tmp_path / '.ros' / 'illuminator_ros'
     monkeypatch.setenv('ROS_HOME', str(tmp_path / 'ros'))
     assert TimestampStore('key', 'x').path.parent == tmp_path / 'ros' / 'illuminator_ros'
     assert len({TimestampStore(key, name).path for key in ('key', 'other')
-                for name in ('bridge 1/194', 'bridge 1/195')}) == 4
+                for name in ('bridge 1/193', 'bridge 1/195')}) == 4
 
 
 def test_missing_home_directory_is_named(monkeypatch: pytest.MonkeyPatch) -> None:

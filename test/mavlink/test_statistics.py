@@ -112,7 +112,9 @@ def test_counts_agree_with_numbers_that_do_not_wrap(journey: tuple[list[int], Co
 
 def recent_loss(counter: statistics.SequenceCounter, now: float) -> float:
     """Sample the recent loss, %."""
-    return counter.snapshot(now).recent_loss
+    loss = counter.snapshot(now).recent_loss
+    assert loss is not None
+    return loss
 
 
 @given(runs=st.lists(st.tuples(

@@ -58,7 +58,7 @@ def test_screen_shows_each_kind_with_its_states_values_and_findings() -> None:
     async def test(screen: Screen) -> None:
         for text in ('2 lights: 1 ON, 1 off', '/bow off 40 % 41.5 C steady internal', '12 %',
                      '1 camera: 1 ok', '/camera ok 7 12 ms fix 47.300000 8.500000 480.0 m',
-                     '1 gimbal: 1 ours', '/gimbal ours 28.6 down 14.3 right primary 1/194',
+                     '1 gimbal: 1 ours', '/gimbal ours 28.6 down 14.3 right primary 1/193',
                      'WARN: dimmed because it is hot', 'held by safety for 61 s'):
             assert text in screen.text
 

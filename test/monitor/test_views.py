@@ -147,7 +147,7 @@ def test_arrows_add_up_turn_on_beyond_half_a_turn_and_stop_straight_down(
 
 
 @pytest.mark.parametrize(('one', 'reason'), [
-    (gimbal(in_control=False), 'not in control (primary 1/194): t takes control'),
+    (gimbal(in_control=False), 'not in control (primary 1/193): t takes control'),
     (gimbal(angles=('map', 0.0, None, 0.0)), 'its angles are unknown')])
 def test_arrow_is_refused_where_the_node_would_ignore_it(one: shared.Device, reason: str) -> None:
     assert ask(one, 'up') == reason
@@ -189,7 +189,7 @@ def test_keys_of_the_camera_are_its_services() -> None:
     (light(error_flags=1), ['40 % (agreed: 90 %)', 'maker torch', 'no. T-1', 'up 5 min',
                             '30.0 to 41.5 in 2 min']),
     (light(strobe_period=0.5, strobe_duty_cycle=20.0), ['0.5 s 20 %']),
-    (gimbal(), ['28.6 down', '14.3 right', 'ours: primary 1/194']),
+    (gimbal(), ['28.6 down', '14.3 right', 'ours: primary 1/193']),
     (camera(), ['7, at 47.300000 8.500000 480.0 m', 'fix ok 0 s', 'imu stale 9 s',
                 'mount missing']),
     (camera(fix=(-1, 0.0, 0.0, 0.0)), ['7, at -'])])
@@ -206,10 +206,10 @@ def test_control_and_image_from_before_the_monitor_are_those_of_the_diagnostics(
     del shot.values['image/index']
     shot.diagnoses['camera'] = shared.Diagnosis(0, 'connected', {'image_index': '6'})
 
-    assert ('control', ['ours: ', 'primary 1/194', ' for 90 s']) in turned.view.details(turned)
+    assert ('control', ['ours: ', 'primary 1/193', ' for 90 s']) in turned.view.details(turned)
     assert ('image', ['6, at 47.300000 8.500000 480.0 m']) in shot.view.details(shot)
     turned.changed_at['controller'] = NOW - 1
-    assert ('control', ['ours: ', 'primary 1/194', ' for 1 s']) in turned.view.details(turned)
+    assert ('control', ['ours: ', 'primary 1/193', ' for 1 s']) in turned.view.details(turned)
 
 
 def test_nothing_known_is_shown_as_unknown() -> None:

@@ -33,7 +33,7 @@ from illuminator_ros.payload.attempt import Result, StatusReport, Target
 from illuminator_ros.payload.reconciler import decide, Desired, Reconciler
 import pytest
 
-US, DEVICE = Address(1, 194), Address(1, 7)
+US, DEVICE = Address(1, 193), Address(1, 7)
 SET_LEVEL, OTHER_COMMAND, STATUS_ID = 31000, 31001, 40000
 ACCEPTED, DENIED = mavlink.MAV_RESULT_ACCEPTED, mavlink.MAV_RESULT_DENIED
 

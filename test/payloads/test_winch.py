@@ -31,7 +31,7 @@ from payloads.winch import WINCH, WinchClient, WinchReport
 import pytest
 
 PAYLOAD_TYPES = {**PAYLOADS, 'winch': WINCH}
-BRIDGE, LIGHT, DECK = Address(1, 194), Address(1, 243), Address(1, 169)
+BRIDGE, LIGHT, DECK = Address(1, 193), Address(1, 243), Address(1, 169)
 
 
 def simulated(*arguments: str, file: object = None) -> SimulatedComponents[Any]:

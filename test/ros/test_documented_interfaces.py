@@ -297,6 +297,15 @@ def test_foxglove_layout_plots_published_fields(running: Running) -> None:
             assert topic in running.topics
 
 
+def test_bag_qos_has_the_latched_topics_of_all_nodes(running: Running) -> None:
+    profiles = yaml.safe_load((CONFIG / 'bag_qos.yaml').read_text())
+
+    latched = {topic for topic, (_, durability) in running.qos.items()
+               if durability is DurabilityPolicy.TRANSIENT_LOCAL}
+    # publish_tf is off here; each node has the other one, whose QoS is that of ROS.
+    assert {*profiles} == latched - {'/rosout'} | {'/tf_static'}
+
+
 def test_plotjuggler_layout_selects_and_plots_published_numbers(running: Running) -> None:
     diagnosed = {f'{name}/{key}' for name, keys in running.reported.items() for key in keys}
 

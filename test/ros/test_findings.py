@@ -33,7 +33,7 @@ from illuminator_ros.illuminator.ros.diagnostics import (
 )
 from illuminator_ros.mavlink.dialect import mavlink
 from illuminator_ros.mavlink.link_state import LinkState
-from illuminator_ros.mavlink.messages import Address, heartbeat
+from illuminator_ros.mavlink.messages import Address, CommandAck, heartbeat
 from illuminator_ros.mavlink.signing import Signing, SigningMode
 from illuminator_ros.ros.diagnostics import line_reports, link_diagnostics
 import pytest
@@ -43,7 +43,7 @@ from support.frames import frame_of, spoilt
 from support.signers import KEY, signed_frame, WRONG_KEY
 from support.simulated_link import SimulatedLink
 
-BRIDGE, AUTOPILOT = Address(1, 194), Address(1, 1)
+BRIDGE, AUTOPILOT = Address(1, 193), Address(1, 1)
 PEER = ('127.0.0.1', 14550)
 OK, WARN, ERROR = DiagnosticStatus.OK, DiagnosticStatus.WARN, DiagnosticStatus.ERROR
 
@@ -97,7 +97,7 @@ def test_each_further_line_has_a_status_and_a_loop_is_a_warning_that_names_both_
                         not_forwarded={30: 2, 36: 5, 8: 1})
     link = Mock()
     link.lines.snapshots.return_value = one, lost, one
-    link.lines.copies.return_value = {(0, 2): 3, (2, 2): 1}
+    link.lines.copies.return_value = {(0, 2): 3, (2, 2): 1, (-1, 2): 2}
     urls = ['udpin://', 'serial:///dev/light:57600', 'tcp://router:5760']
     second, third = (report.message('/illuminator') for report in line_reports(
         link_diagnostics(link, reported.client, urls, reported.link.now)))
@@ -107,9 +107,11 @@ def test_each_further_line_has_a_status_and_a_loop_is_a_warning_that_names_both_
     assert [value(second, key) for key in (
         'frames_forwarded', 'frames_not_forwarded', 'not_forwarded', 'copies_received')] == [
             '7', '8', 'SERVO_OUTPUT_RAW 5, ATTITUDE 2, 8 1', '0']
-    assert (third.level, value(third, 'copies_received')) == (WARN, '4')
-    for first in (urls[0], urls[2]):
-        assert f'copies of frames from {first} come over {urls[2]}' in third.message
+    assert (third.level, value(third, 'copies_received')) == (WARN, '6')
+    for text in (f'copies of frames from {urls[0]} come over {urls[2]}: there is a loop',
+                 f'copies of frames come over two senders on {urls[2]}: there is a loop',
+                 f'our own frames return over {urls[2]}: there is a loop'):
+        assert text in third.message
 
 
 @pytest.mark.parametrize(('fields', 'level', 'text'), [
@@ -169,14 +171,36 @@ def test_lost_frames_are_a_warning_unless_the_light_has_restarted() -> None:
     assert value(link, 'frames_lost') == '60'
 
 
-def test_another_sender_with_our_address_is_an_error_and_the_reason_for_a_missing_light() -> None:
+def test_loss_is_unknown_while_another_component_is_heard_over_the_same_peer() -> None:
     reported = Reported()
-    reported.receive(frame_of(heartbeat(mavlink.MAV_TYPE_ONBOARD_CONTROLLER), 100, BRIDGE))
-    assert reported.statuses()['link'].message.endswith(
-        'another sender uses our address 1/194: set component_id to a free one here or there')
     reported.status()
-    assert found(reported.statuses()['link']) == (
-        ERROR, 'another sender uses our address 1/194')
+    reported.receive(FOREIGN)
+    for _ in range(20):
+        # A router sends the answers to another program only to that one.
+        reported.status(lost=1)
+    link = reported.statuses()['link']
+    assert found(link)[0] == OK
+    assert [value(link, key) for key in ('loss_percent', 'frames_lost')] == ['unknown'] * 2
+    # The other component is silent for 10 s; earlier gaps do not count.
+    for _ in range(110):
+        reported.status()
+    link = reported.statuses()['link']
+    assert [value(link, key) for key in ('loss_percent', 'frames_lost')] == ['0', '0']
+
+
+def test_another_sender_with_our_address_is_an_error_and_the_reason_for_a_missing_light() -> None:
+    for message, sender in (
+            (heartbeat(mavlink.MAV_TYPE_ONBOARD_CONTROLLER),
+             'MAV_TYPE_ONBOARD_CONTROLLER, MAV_AUTOPILOT_INVALID by its HEARTBEAT'),
+            (heartbeat(253), 'MAV_TYPE 253, MAV_AUTOPILOT_INVALID by its HEARTBEAT'),
+            (CommandAck(405, 0, 0, 0, 0, 0), 'a component without a HEARTBEAT')):
+        reported = Reported()
+        reported.receive(frame_of(message, 100, BRIDGE))
+        text = (f'another sender uses our address 1/193 ({sender}): set the parameter '
+                'component_id to an id that is free')
+        assert reported.statuses()['link'].message.endswith(text)
+        reported.status()
+        assert found(reported.statuses()['link']) == (ERROR, text)
 
 
 FOREIGN = frame_of(heartbeat(2), 0, AUTOPILOT)

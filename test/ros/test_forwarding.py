@@ -27,7 +27,7 @@ from support.slow import CLOCK
 
 GROUND = Address(255, 190)
 OK, WARN, ERROR = DiagnosticStatus.OK, DiagnosticStatus.WARN, DiagnosticStatus.ERROR
-ON_OFF = 405
+ON_OFF, CONFIGURE = 405, 406
 
 
 def levels(**expected: bytes) -> Callable[[DiagnosticArray], bool]:
@@ -62,7 +62,12 @@ def test_light_on_a_further_link_serves_ros_and_a_ground_station_on_the_first_li
                 answers += [message for source, message in codec.messages(ground.recv(65536))
                             if source == LIGHT and isinstance(message, CommandAck)]
             assert (answers[0].command, answers[0].result) == (ON_OFF, 0)
-            bridge.wait_for('light 1/243 was switched off by another sender')
+            bridge.wait_for('light 1/243 was switched off by another sender 255/190')
+            # A later change is not an effect of our ON.
+            CLOCK.forward(2.0)
+            dim = CommandLong(*LIGHT, CONFIGURE, 0, 1, 40, 0, 0, 0, 0, 0)
+            ground.sendto(codec.frame(GROUND, dim), ('127.0.0.1', near))
+            bridge.wait_for('light 1/243 was changed: brightness 40 % by 255/190')
 
         # The light is lost with its link, and not after its heartbeat timeout.
         bridge.wait_for('link lost: tcp to 127.0.0.1')

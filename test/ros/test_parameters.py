@@ -49,7 +49,7 @@ def test_parameters_of_the_light_are_described_and_not_listed_before_its_first_s
     # ros2 param dump would write null, which cannot be loaded.
     assert not set(DEVICE) & set(alone.names())
     assert [one.type for one in alone.describe(*DEVICE)] == [STRING, DOUBLE, DOUBLE, DOUBLE]
-    assert alone.get('connection_url', 'component_id') == ['memory://none', 194]
+    assert alone.get('connection_url', 'component_id') == ['memory://none', 193]
 
 
 def test_parameters_of_the_light_have_its_values_and_the_described_types(

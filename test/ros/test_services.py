@@ -155,7 +155,8 @@ def test_requests_fail_at_once_and_say_why_while_the_link_is_not_open(
         with running_bridge(own_ros.domain, port, until='link not open'):
             assert no_light_messages(own_ros) == {
                 f'no light connected: udpin://127.0.0.1:{port} is not open: '
-                f'cannot listen on 127.0.0.1:{port}: Address already in use'}
+                f'cannot listen on 127.0.0.1:{port}: Address already in use '
+                '(doc/routers.md: several programs on one link)'}
 
 
 MakeClient = Callable[[str], Client]

@@ -27,7 +27,7 @@ from support.ros import Parameters, Ros, running_bridge, running_simulator, STRE
 from support.shared_address import SharedAddress
 from support.slow import CLOCK, SlowLink, SPEED
 
-CLASH = 'another sender uses our address 1/194'
+CLASH = 'another sender uses our address 1/193'
 SHARED = 'several lights answer as 1/1: each needs an address of its own'
 
 
@@ -43,7 +43,7 @@ def test_two_bridges_of_different_addresses_share_the_lights_and_do_not_clash(
     url = f'udpin://127.0.0.1:{port}'
     with contextlib.ExitStack() as stack:
         stack.enter_context(running_simulator(url, '--count', '2'))
-        for name, component in (('first', 194), ('second', 195)):
+        for name, component in (('first', 193), ('second', 195)):
             bridge = stack.enter_context(running_bridge(
                 own_ros.domain, port, '-r', f'__node:={name}', component_id=component,
                 connection_url=url.replace('udpin', 'udpout'), target_component=243))

@@ -123,5 +123,5 @@ def test_the_first_message_of_a_peer_is_one_line() -> None:
           Bridge(f'udpin:127.0.0.1:{port}') as bridge):
         for on in (True, False):
             eventually(lambda on=on: bridge.enable(on).success)  # type: ignore[misc]
-        program.wait_for(f'peer {Address(1, 194)}: first message')
+        program.wait_for(f'peer {Address(1, 193)}: first message')
     assert program.count('first message') == 1

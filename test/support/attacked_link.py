@@ -35,7 +35,7 @@ from support.entries import entries
 from support.frames import Codec
 from support.simulated_link import SimulatedLink
 
-BRIDGE = Address(1, 194)
+BRIDGE = Address(1, 193)
 GENUINE = Address(1, 243)
 GENUINE_PEER = ('127.0.0.1', 20_000)
 # s after which every request has been answered.

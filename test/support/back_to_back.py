@@ -36,7 +36,7 @@ from support.faulty_wire import Faults, FaultyWire
 from support.frames import Codec
 from support.records import Answer, Recorder
 
-BRIDGE = mav.Address(1, 194)
+BRIDGE = mav.Address(1, 193)
 ONE_LIGHT = (IlluminatorProperties(),)
 # s; the initial time of a pair: not 0, so that a wrong use of 0 as a time shows.
 START = 1000.0

@@ -26,7 +26,7 @@ from illuminator_ros.mavlink import command_sender
 from illuminator_ros.mavlink.dialect import mavlink
 from illuminator_ros.mavlink.messages import Address, CommandAck, CommandInt
 
-OURS = Address(1, 194)
+OURS = Address(1, 193)
 LIGHT = Address(1, 243)
 # s from a frame to its acknowledgement.
 DELAY = 0.02

@@ -41,7 +41,7 @@ from illuminator_ros.payload.messages import (
 from illuminator_ros.payload.mount_attitude import AXES
 from illuminator_ros.payload.rotation import Quaternion
 
-OURS, DEVICE, AUTOPILOT = mav.Address(1, 194), mav.Address(1, 154), mav.Address(1, 1)
+OURS, DEVICE, AUTOPILOT = mav.Address(1, 193), mav.Address(1, 154), mav.Address(1, 1)
 PILOT, GUEST = mav.Address(255, 190), mav.Address(255, 191)
 NAN = float('nan')
 FULL = (mavlink.GIMBAL_DEVICE_CAP_FLAGS_HAS_RETRACT | mavlink.GIMBAL_DEVICE_CAP_FLAGS_HAS_NEUTRAL

@@ -34,7 +34,7 @@ from illuminator_ros.payload.attempt import Result
 from illuminator_ros.payload.messages import GeoPoint, GimbalDeviceAttitudeStatus
 from support.live_link import EndpointLink
 
-OURS, AUTOPILOT, DEVICE, OTHER = (mav.Address(1, component) for component in (194, 1, 154, 195))
+OURS, AUTOPILOT, DEVICE, OTHER = (mav.Address(1, component) for component in (193, 1, 154, 195))
 NAN = math.nan
 ALL = sum(entry_names('GIMBAL_DEVICE_CAP_FLAGS'))
 LEVEL = (1.0, 0.0, 0.0, 0.0)

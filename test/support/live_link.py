@@ -37,7 +37,7 @@ from support.client import Client
 from support.messages import HANDLED
 from support.waiting import eventually, Log, PATIENCE
 
-BRIDGE = Address(1, 194)
+BRIDGE = Address(1, 193)
 CONNECTOR = 'mavlink-open'
 E = TypeVar('E', bound=Endpoint)
 L = TypeVar('L', bound='EndpointLink[Any]')

@@ -34,7 +34,7 @@ EVERY_MESSAGE = (
     mav.Heartbeat(44, 8, 1, 77, 4, 3),
     mav.CommandInt(1, 243, 2, 405, 1, 1, 1.0, 2.0, 3.0, 4.0, -5, 6, 7.0),
     mav.CommandLong(1, 243, 406, 2, 1.0, 50.0, 0.25, 40.0, 5.0, 6.0, 7.0),
-    mav.CommandAck(405, 5, 30, -2, 1, 194),
+    mav.CommandAck(405, 5, 30, -2, 1, 193),
     STATUS,
     INFORMATION,
 )

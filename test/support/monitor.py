@@ -34,7 +34,7 @@ PRESENT: dict[str, dict[str, Any]] = {
     'light': {'connected': True, 'enabled': False, 'brightness': 40.0, 'mode': 'internal_control',
               'strobe_period': 0.0, 'strobe_duty_cycle': 0.0, 'error_flags': 0, 'uptime': 300.0,
               'temperature': 41.5},
-    'gimbal': {'connected': True, 'in_control': True, 'controller': 'primary 1/194',
+    'gimbal': {'connected': True, 'in_control': True, 'controller': 'primary 1/193',
                'yaw_lock': False, 'angles': ('base_link_stabilized', 0.0, 0.5, -0.25)},
     'camera': {'connected': True, 'image/index': 7}}
 

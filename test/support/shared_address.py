@@ -31,7 +31,7 @@ from support.fake_light import FakeLight
 from support.frames import Codec, LIGHT
 from support.simulated_link import SimulatedLink
 
-BRIDGE = Address(1, 194)
+BRIDGE = Address(1, 193)
 
 
 class TwoDevices:

@@ -163,6 +163,36 @@ def test_missing_package_is_one_line_with_its_remedy_and_status_1(
         1, f'{name}: {package} is not installed: {remedy}\n')
 
 
+PYMAVLINK = 'pymavlink', '2.4.49', '2.4.50', "pip install 'pymavlink>=2.4.50'"
+RCLPY = 'rclpy', '3.3.9', '7.1', 'install ROS 2 Jazzy or newer'
+
+
+@pytest.mark.parametrize(('command', 'package'), [
+    *((command, PYMAVLINK) for command in (
+        'bridge', 'bridge --help', 'gimbal', 'rededge', 'simulator', 'conformance udpin://:1')),
+    ('bridge', RCLPY), ('monitor', RCLPY),
+    ('monitor --web', ('textual_serve', '1.0', '1.1', MONITOR_REMEDY))])
+def test_old_package_is_one_line_with_its_version_and_remedy_and_status_1(
+    command: str, package: tuple[str, str, str, str], tmp_path: Path,
+) -> None:
+    name, version, oldest, remedy = package
+    for folder in ('', 'dialects', 'dialects/v20') if name == 'pymavlink' else ('',):
+        (tmp_path / name / folder).mkdir()
+        (tmp_path / name / folder / '__init__.py').touch()
+    if name == 'pymavlink':
+        (tmp_path / name / 'dialects/v20/ardupilotmega.py').touch()
+    information = tmp_path / f'{name}-{version}.dist-info'
+    information.mkdir()
+    (information / 'METADATA').write_text(
+        f'Metadata-Version: 2.1\nName: {name}\nVersion: {version}\n')
+    program, *arguments = command.split()
+    outcome = run(f'illuminator_ros.{program}', *arguments, env={
+        'PYTHONPATH': f'{tmp_path}:{ROOT}'})
+
+    assert (outcome.returncode, outcome.stderr) == (
+        1, f'{program}: {name} {version} is too old; {oldest} or newer is needed: {remedy}\n')
+
+
 @pytest.mark.parametrize(('program', 'option', 'unbuffered'), [
     *((program, '--help', '') for program in ('bridge', 'simulator', 'conformance', 'monitor')),
     ('bridge', '--version', ''), ('simulator', '--version', '1'), ('monitor', '--help', '1')])

@@ -98,7 +98,7 @@ def test_two_programs_use_the_gimbal_on_a_serial_line_of_the_manager(tmp_path: P
         with program(1, 196, port) as two:
             second = plugin.Gimbal(two.get_systems()[0])
             for player in (first, second):
-                assert listed(player) == (154, 194)
+                assert listed(player) == (154, 193)
             assert result(second.take_control, GIMBAL, PRIMARY) == 'SUCCESS'
             assert result(second.set_angles, GIMBAL, 0.0, -20.0, 10.0, FOLLOW, ONCE) == 'SUCCESS'
             # The first program hears the device itself.

@@ -61,7 +61,7 @@ def test_bridge_signs_on_from_the_time_stamp_that_the_run_before_has_stored(
     own_ros: Ros, key_file: KeyFile,
 ) -> None:
     key, later = key_file(SECRET), ticks(4e9)
-    TimestampStore(key, 'bridge 1/194').store(later, 0.0, last=True)
+    TimestampStore(key, 'bridge 1/193').store(later, 0.0, last=True)
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as light:
         light.bind(('127.0.0.1', 0))
         light.settimeout(PATIENCE)

@@ -37,7 +37,7 @@ from support.network import Leaf, Network, Router
 from support.open_channel import bound_socket, has_nothing
 from support.ports import free_port
 
-OWN, LIGHT, GROUND = Address(1, 194), Address(1, 243), Address(255, 190)
+OWN, LIGHT, GROUND = Address(1, 193), Address(1, 243), Address(255, 190)
 ALIVE = heartbeat(18)
 
 
@@ -105,7 +105,7 @@ class Mesh:
         # One line alone would not forward.
         for index, some in enumerate(ports):
             some.append(self.network.port(f'unused {index}'))
-        self.routers = [Router(self.network, some, Address(100 + index, 194))
+        self.routers = [Router(self.network, some, Address(100 + index, 193))
                         for index, some in enumerate(ports)]
 
     def receivers(self, frame: bytes) -> list[int]:
@@ -132,7 +132,7 @@ class Mesh:
             router.send(to(self.leaves[0].address))
             self.network.settle()
             received = [leaf.codec.decoder.feed(b''.join(leaf.received)) for leaf in self.leaves]
-            own = Address(100 + index, 194)
+            own = Address(100 + index, 193)
             assert [sum(frame.source == own for frame in some) for some in received] == [
                 int(leaf is self.leaves[0]) for leaf in self.leaves]
 
@@ -260,12 +260,62 @@ def test_a_frame_for_us_and_a_signing_key_are_not_forwarded(message: Message) ->
     assert pair.light.received == []
 
 
-def test_a_frame_that_pretends_to_be_ours_is_not_forwarded() -> None:
+def test_frames_of_another_sender_with_our_address_are_forwarded_and_ours_are_not() -> None:
     pair = Pair()
-    pair.router.send(ALIVE)
+    for _ in range(10):
+        pair.router.send(ALIVE)
+    pair.network.settle()
+    ours = pair.light.received[-1]
     pair.meet()
-    pair.ground.send(to(LIGHT), source=OWN)
-    assert pair.light.received == []
+    other = pair.ground.send(to(LIGHT), source=OWN)
+    assert pair.light.received == [other]
+    # A slow ring returns ours.
+    for after in (0.0, 2.0, 2.9):
+        pair.network.now += after
+        pair.ground.send_bytes(ours)
+    assert pair.light.received == [other]
+    assert pair.router.lines.copies(pair.network.now) == {(-1, 1): 2}
+
+
+@pytest.mark.parametrize('same_line', [False, True])
+@pytest.mark.parametrize('delay', [0.01, 0.6, 2.4, 4.9])
+def test_a_frame_passes_once_through_a_ring_that_is_slower_than_its_traffic(
+        delay: float, same_line: bool) -> None:
+    network = Network()
+    ports = [network.port(name, has_clients=True) for name in ('first', 'second')]
+    router, heard = Router(network, ports, OWN), []
+    # The rest of the ring repeats each frame at its other end; one server has both ends, or not.
+    carried: list[tuple[float, bytes, str]] = []
+    ends = {'left': ports[0], 'right': ports[0 if same_line else 1]}
+    for end, port in ends.items():
+        def carry(frame: bytes, end: str = end) -> None:
+            carried.append((network.now, frame, end))
+
+        port.wires[end] = carry
+    for number in range(3):
+        frame = frame_of(ALIVE, number, LIGHT)
+        carried += [(network.now, frame, 'left'), (network.now, frame, 'right')]
+    while carried and network.now < 1060.0:
+        at, frame, end = carried.pop(0)
+        network.now = at + delay
+        other = 'right' if end == 'left' else 'left'
+        heard.append(frame)
+        ends[other].take(other, frame)
+        network.settle()
+    assert len(heard) == 9
+    lines = {(0, 0)} if same_line else {(1, 0), (0, 1)}
+    assert set(router.lines.copies(network.now)) <= lines
+    assert len(router.endpoint.heard) == 3
+
+
+def test_equal_frames_of_one_sender_are_each_forwarded() -> None:
+    pair = Pair()
+    frame = frame_of(ALIVE, 0, LIGHT)
+    for _ in range(3):
+        pair.light.send_bytes(frame)
+    assert pair.ground.received == [frame] * 3
+    assert len(pair.router.endpoint.heard) == 3
+    assert pair.router.lines.copies(pair.network.now) == {}
 
 
 def test_a_lost_line_takes_only_the_components_that_are_heard_on_no_other_one() -> None:

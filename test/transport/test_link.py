@@ -88,7 +88,7 @@ def test_frames_are_logged_in_a_line_each_at_debug_level_only(
         link.stop()
         lines = [record.getMessage() for record in caplog.records]
         for said in ('received from 1/243: HEARTBEAT type=MAV_TYPE_ILLUMINATOR ',
-                     'sent from 1/194: HEARTBEAT '):
+                     'sent from 1/193: HEARTBEAT '):
             assert any(line.startswith(said) for line in lines) == (level == logging.DEBUG)
 
 

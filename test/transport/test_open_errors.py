@@ -21,6 +21,7 @@ from pathlib import Path
 import re
 import socket
 import sys
+from types import SimpleNamespace
 from typing import Any
 
 from illuminator_ros.mavlink.transport import open_channel, tcp
@@ -43,7 +44,8 @@ def test_port_in_use_is_named(scheme: str, loopback: str) -> None:
     with (bound_socket if scheme == 'udpin' else listening_socket)(loopback) as taken:
         port = taken.getsockname()[1]
         assert reason(f'{scheme}://{loopback}:{port}') == (
-            f'cannot listen on {loopback}:{port}: Address already in use')
+            f'cannot listen on {loopback}:{port}: Address already in use '
+            '(doc/routers.md: several programs on one link)')
 
 
 @pytest.mark.parametrize(('url', 'said'), [
@@ -73,6 +75,13 @@ def test_error_names_address_or_device_and_reason(
 def test_missing_pyserial_is_named_with_the_remedy(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(sys.modules, 'serial', None)
     assert 'apt install python3-serial' in reason('serial:///dev/ttyLIGHT:57600')
+
+
+def test_old_pyserial_is_named_with_its_version_and_the_remedy(
+        monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(sys.modules, 'serial', SimpleNamespace(__version__='3.4'))
+    with pytest.raises(OSError, match="pyserial 3.4 is too old; .* pip install 'pyserial>=3.5'"):
+        open_channel(parse_url('serial:///dev/ttyLIGHT:57600'))
 
 
 def test_serial_device_is_closed_for_other_programs_while_it_is_open(device: PtyDevice) -> None:

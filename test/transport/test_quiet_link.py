@@ -18,17 +18,21 @@ from __future__ import annotations
 
 import math
 import socket
+from typing import Any
 
 from illuminator_ros.mavlink import component
+from illuminator_ros.mavlink.frame import Decoder, Frame
 from illuminator_ros.mavlink.link_thread import FAULT_PAUSE
-from illuminator_ros.mavlink.messages import Address
+from illuminator_ros.mavlink.messages import Address, CommandLong
 from illuminator_ros.mavlink.receiver import STALL
+from illuminator_ros.mavlink.signing import stamp_of, ticks
 from illuminator_ros.mavlink.transport.udp import PEER_EXPIRY
 import pytest
 from support.frames import heartbeat_frame, raw_v2
-from support.live_link import LiveLink, Run, Talker
+from support.live_link import BRIDGE, LiveLink, Run, Talker
 from support.ports import free_port
 from support.ptys import PtyDevice
+from support.signers import checker, SECOND, signed_frame, WRONG_KEY
 from support.simulated_link import SimulatedLink
 from support.waiting import eventually
 
@@ -137,6 +141,28 @@ def test_foreign_frames_keep_a_peer_and_are_counted() -> None:
     counter = link.state().traffic.sources[AUTOPILOT]
     assert (counter.received, counter.lost, counter.duplicate) == (34, 2, 1)
     assert (link.state().traffic.frames_received, len(endpoint.heard)) == (34, 0)
+
+
+def test_a_signer_whose_clock_is_behind_gets_heartbeats_and_nothing_else() -> None:
+    endpoint, sent = Talker(), list[tuple[Any, Frame]]()
+    link = SimulatedLink(endpoint, lambda data, peer: sent.extend(
+        (peer, frame) for frame in Decoder().feed(data)), signing=checker())
+    link.run(1.5)
+    stamp = ticks(1.7e9 + link.now) - 70 * SECOND
+    link.receive((signed_frame(stamp, key=WRONG_KEY), PEER))
+    assert sent == []
+    link.receive((signed_frame(stamp), PEER))
+    ((to, answer),) = sent
+    assert (to, answer.message_id, answer.source) == (PEER, 0, BRIDGE)
+    assert stamp_of(answer.signature or b'') > stamp + 68 * SECOND
+    # It is not a peer, and its frame is not valid.
+    endpoint.outgoing.append((BRIDGE, CommandLong(1, 243, 405, 0, 1, 0, 0, 0, 0, 0, 0)))
+    link.run(1.5)
+    assert (len(sent), len(endpoint.heard), link.state().peers) == (1, 0, 0)
+    assert link.state().traffic.sources == {}
+    # The clock has followed.
+    link.receive((signed_frame(stamp_of(answer.signature or b'') + 1), PEER))
+    assert (len(endpoint.heard), link.state().peers) == (1, 1)
 
 
 def rests(link: LiveLink) -> bool:

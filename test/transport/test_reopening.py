@@ -176,7 +176,8 @@ def test_port_in_use_is_opened_once_it_is_free(run: live_link.Run) -> None:
         link = run(live_link.LiveLink(f'udpin://127.0.0.1:{port}'))
         link.wait_lost()
         assert (link.state().is_open, link.state().reason, link.state().openings) == (
-            False, f'cannot listen on 127.0.0.1:{port}: Address already in use', 0)
+            False, f'cannot listen on 127.0.0.1:{port}: Address already in use '
+            '(doc/routers.md: several programs on one link)', 0)
         stack.close()
         link.wait_open()
         assert link.history() == [False, True]

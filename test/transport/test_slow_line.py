@@ -198,7 +198,7 @@ def test_our_own_message_waits_for_few_forwarded_bytes_in_a_tcp_connection_that_
         other = stack.enter_context(server.accept()[0])
         for number in range(1000):
             channel.forward([only(frame_of(FILE, number & 0xFF))], (None,), 0.0)
-        own = frame_of(COMMAND, 0, Address(1, 194))
+        own = frame_of(COMMAND, 0, Address(1, 193))
         channel.send([own], (None,))
         other.setblocking(False)
         data = b''

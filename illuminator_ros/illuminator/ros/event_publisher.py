@@ -27,6 +27,8 @@ from std_msgs.msg import Bool, Float32, Float64, String, UInt32
 from .diagnostics import FlagLog
 from .parameters import device_parameters
 from .. import events, model
+from ...mavlink.dialect import mavlink
+from ...mavlink.messages import Address
 from ...payload.command_sources import DEFAULT, describe
 from ...ros.diagnostics import ERROR, WARN
 from ...ros.node import Endpoint, NodeInterface
@@ -57,6 +59,8 @@ PUBLICATIONS = (
 _DIAGNOSED = (events.LightConnected, events.LightLost, events.LightIdentified, events.LightHeld,
               events.AddressShared, events.ConfigurationChanged, events.ConfigurationRestored,
               events.LimitExceeded)
+ON_OFF = mavlink.MAV_CMD_ILLUMINATOR_ON_OFF
+CONFIGURE = mavlink.MAV_CMD_DO_ILLUMINATOR_CONFIGURE
 _SEVERITIES = {ERROR: logging.ERROR, WARN: logging.WARNING}
 
 
@@ -66,11 +70,14 @@ class EventPublisher:
 
     :param interface: has :data:`PUBLICATIONS`.
     :param check_diagnostics: called if a level may have changed.
+    :param sender_of: returns who has lately commanded a light through this program, given its
+        address, the command, and the first parameter, None for any.
     """
 
     def __init__(
         self, node: Node, interface: NodeInterface, parameters: DeviceParameters, log: NodeLog, *,
         limits: model.SafetyLimits, frame_id: str, check_diagnostics: Callable[[], None],
+        sender_of: Callable[[Address, int, float | None], Address | None],
     ) -> None:
         self._clock = node.get_clock()
         self._interface = interface
@@ -78,6 +85,7 @@ class EventPublisher:
         self._log = log
         self._frame_id = frame_id
         self._check_diagnostics = check_diagnostics
+        self._sender_of = sender_of
         self._identity: object = None
         self._limits = limits
         # The source of setpoints, as a prefix of its topics.
@@ -123,7 +131,8 @@ class EventPublisher:
                 serial = identity.serial_number and f', serial number {identity.serial_number}'
                 log.info(f'{light} is {known or "nameless"}{serial}', 'identity')
             case events.LightSwitched(on=on, origin=origin):
-                log.info(f'{light} was switched {_state(on)} by {origin}', 'switched')
+                by = self._by(event.address, ON_OFF, on) if origin == events.OTHER_SENDER else ''
+                log.info(f'{light} was switched {_state(on)} by {origin}{by}', 'switched')
             case events.LightHeld(change=change):
                 log.info(f'{light} {describe(change)}', 'holder')
                 self._source = f'{change.after}/' if change.after not in (None, DEFAULT) else ''
@@ -162,6 +171,11 @@ class EventPublisher:
         if isinstance(event, _DIAGNOSED):
             self._check_diagnostics()
 
+    def _by(self, light: Address, command: int, first_param: float | None = None) -> str:
+        """Return the sender of a command that another one gave, '' if it did not pass here."""
+        sender = self._sender_of(light, command, first_param)
+        return f' {sender}' if sender else ''
+
     def _status_received(self, event: events.StatusReceived) -> None:
         status = event.status
         for topic, read in STATUS_TOPICS.items():
@@ -190,8 +204,9 @@ class EventPublisher:
     def _configuration_changed(self, event: events.ConfigurationChanged) -> None:
         configuration, names = event.configuration, event.names
         if event.cause is events.ChangeCause.LIGHT:
-            self._log.info(f'light {event.address} was changed: {configuration.describe(names)}',
-                           'changed')
+            by = self._by(event.address, CONFIGURE)
+            self._log.info(f'light {event.address} was changed: {configuration.describe(names)}'
+                           f'{by and " by"}{by}', 'changed')
         if 'strobe_period' in names:
             self._fit(configuration.strobe_period)
         if 'brightness' in names:

@@ -109,7 +109,10 @@ class LightNode:
             node, host.link, log, parameters, self._check_value, self._configure, changeable)
         self._publishers = EventPublisher(
             node, interface, parameters, log, limits=limits, frame_id=geometry.frame_id,
-            check_diagnostics=host.check_diagnostics)
+            check_diagnostics=host.check_diagnostics,
+            sender_of=lambda light, command, first_param: (
+                host.link.lines.forwarded_commands.sender(
+                    light, command, host.link.clock(), first_param)))
         self._beam = (BeamPublisher(node, geometry, self._direction)
                       if geometry.beam_range else None)
         self._frame = (

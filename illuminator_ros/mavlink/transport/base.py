@@ -20,6 +20,7 @@ from abc import ABC, abstractmethod
 from collections import Counter, deque
 from collections.abc import Callable, Hashable, Iterator, Sequence
 import contextlib
+import errno
 import math
 import os
 import selectors
@@ -50,6 +51,13 @@ FORWARD_AHEAD = 0.002
 # Share of the rate of a line that frames of others use at most. The clocks of serial ports differ
 # by up to 2 % each; at the full rate the bytes that wait in a slower port become ever more.
 FORWARD_SHARE = 0.95
+
+
+def cannot_listen(address: HostPort, error: OSError) -> OSError:
+    """Return an error that says why a socket cannot listen, with the remedy if it is in use."""
+    remedy = (' (doc/routers.md: several programs on one link)'
+              if error.errno == errno.EADDRINUSE else '')
+    return OSError(error.errno, f'cannot listen on {address}: {error.strerror}{remedy}')
 
 
 class ChannelLost(OSError):

@@ -40,6 +40,7 @@ REASONS = {
     errno.EACCES: 'no permission; join its group, as in "sudo usermod -a -G dialout $USER", and '
                   'log in again',
 }
+OLDEST_PYSERIAL = 3, 5
 # Bytes in a pseudo-terminal that no program has read; a serial line would have lost them.
 MAX_UNREAD = 2048
 
@@ -55,6 +56,9 @@ def open_serial(url: SerialUrl) -> Channel:
     except ImportError:
         raise OSError('a serial port needs pyserial: apt install python3-serial, or '
                       'pip install pyserial') from None
+    if tuple(map(int, serial.__version__.split('.')[:2])) < OLDEST_PYSERIAL:
+        raise OSError(f'pyserial {serial.__version__} is too old; 3.5 or newer is needed: '
+                      "pip install 'pyserial>=3.5'")
     try:
         port = serial.Serial(
             url.device, url.baud, timeout=0, write_timeout=0, exclusive=True,

@@ -23,6 +23,7 @@ import selectors
 import socket
 
 from .base import (
+    cannot_listen,
     Channel,
     ChannelLost,
     FORWARD_SIZE,
@@ -126,7 +127,7 @@ class TcpServer(Channel):
             self._listener.setblocking(False)
         except OSError as error:
             self._listener.close()
-            raise OSError(error.errno, f'cannot listen on {address}: {error.strerror}') from None
+            raise cannot_listen(address, error) from None
         self._clients: dict[Peer, _Connection] = {}
         # When each last sent a valid frame, s.
         self._heard: dict[Peer, float] = {}

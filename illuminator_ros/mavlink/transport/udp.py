@@ -24,7 +24,7 @@ import itertools
 import selectors
 import socket
 
-from .base import Channel, ChannelLost, Peer, resolve, Serve, SocketName
+from .base import cannot_listen, Channel, ChannelLost, Peer, resolve, Serve, SocketName
 from ..url import HostPort, UdpUrl
 
 # Peers that a listening socket sends to. A new peer never replaces a live one.
@@ -81,7 +81,7 @@ class UdpChannel(Channel):
             self._socket.bind(bind)
         except OSError as error:
             self._socket.close()
-            raise OSError(error.errno, f'cannot listen on {url.bind}: {error.strerror}') from None
+            raise cannot_listen(url.bind, error) from None
         self.name = 'udp ' + ' to '.join(filter(None, (
             str(HostPort(*self._socket.getsockname()[:2])), str(url.remote or ''))))
 
