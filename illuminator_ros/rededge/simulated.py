@@ -33,7 +33,7 @@ from ..mavlink.dialect import mavlink, raw, replaced
 from ..mavlink.messages import Address, Heartbeat, Message, target_of
 from ..payload import simulated
 from ..payload.faults import Behaviour, COUNT, fault, FaultTable, SECONDS
-from ..payload.messages import Attitude, GeoPoint, GlobalPositionInt, is_finite, SystemTime
+from ..payload.messages import Attitude, GeoPoint, GlobalPositionInt, is_plausible, SystemTime
 from ..payload.rotation import Quaternion
 from ..payload.simulated_settings import geo_point, number, setting, Values
 
@@ -387,7 +387,8 @@ class SimulatedRedEdge(simulated.SimulatedDevice):
             is_known = (firmware >= rededge.PARAMETERS
                         and raw(message, 'param_id').rstrip(b'\0') == rededge.VERSION_PARAMETER)
             return (firmware.value(),) if is_known else ()
-        if self.behaviour.injectable and (not isinstance(message, Attitude) or is_finite(message)):
+        if self.behaviour.injectable and (
+                not isinstance(message, Attitude) or is_plausible(message)):
             self._injected |= {
                 state: Injected(message, now) for state in INJECTED.get(type(message), ())}
         return ()
