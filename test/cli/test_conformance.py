@@ -19,7 +19,6 @@ import json
 from pathlib import Path
 import re
 import signal
-import time
 from xml.etree import ElementTree
 
 from illuminator_ros.cli.conformance.run import FIND_TIMEOUT
@@ -184,10 +183,8 @@ def test_without_a_light_or_a_link_the_reason_is_reported_with_its_status(
     if used:
         simulate()
     program = start(CONFORMANCE, *arguments.format(url=url).split())
-    begun = time.monotonic()
 
-    assert program.wait() == status
-    assert time.monotonic() - begun < 0.5 * FIND_TIMEOUT
+    assert program.wait(0.8 * FIND_TIMEOUT) == status
     assert reason in program.log
     assert ('0 passed, 1 failed' in program.log) == ('FAIL' in program.log) == (status == 1)
     # The reason is printed at most twice: while the program waits, and as the result.
