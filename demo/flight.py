@@ -160,9 +160,9 @@ class SimulatedCamera:
         link.start()
         return link
 
-    def take_images(self, link: Link, interval: float) -> None:
-        """Take an image at each interval from now on, s."""
-        link.call(lambda now: self._device.set_interval(interval, now))
+    def take_images(self, link: Link, interval: float, begin: float) -> None:
+        """Take an image at each interval, s, from a moment (UTC, s) on."""
+        link.call(lambda now: self._device.set_interval(interval, now + begin - time.time()))
         # The interval begins with the next poll.
         link.call(lambda now: None)
 
@@ -199,8 +199,7 @@ def fly(flight: Flight, images: Path, directory: Path) -> Comparison:
                 if not (line := process.stdout.readline()):
                     raise TimeoutError('the robot has not started')
                 begin = float(line)
-                wait_until(begin, 0.0)
-                camera.take_images(link, IMAGE_INTERVAL / speed)
+                camera.take_images(link, IMAGE_INTERVAL / speed, begin)
                 wait_until(begin, flight.pull.begin / speed)
                 link.stop()
                 wait_until(begin, flight.pull.end / speed)
