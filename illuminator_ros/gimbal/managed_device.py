@@ -26,8 +26,8 @@ from .vehicle_state import VehicleState
 from ..mavlink.command_sender import Command, CommandResult, CommandSender
 from ..mavlink.dialect import mavlink
 from ..payload.messages import GimbalDeviceAttitudeStatus
-from ..payload.mount_attitude import names_frame, STILL, yaw_frame, YawFrame
-from ..payload.rotation import Quaternion, Vector
+from ..payload.mount_attitude import heading_of, rotation_of, STILL, yaw_frame, YawFrame
+from ..payload.rotation import Vector
 
 # Requests for GIMBAL_DEVICE_INFORMATION without the message after which the manager announces the
 # gimbal without it; s between these requests, and between later ones; and the longest time of one,
@@ -128,11 +128,8 @@ class ManagedDevice:
         """Return the vehicle's heading as the device reports it, else as the vehicle does."""
         status = self.status(now)
         # The heading in the status of a device without MAVLink is an older one of the vehicle.
-        # Implementations that name no frame are older than delta_yaw.
-        if (self._tracker.has_mavlink and status is not None and names_frame(status.flags)
-                and math.isfinite(status.delta_yaw)):
-            return status.delta_yaw
-        return self._vehicle.heading(now)
+        own = heading_of(status) if self._tracker.has_mavlink and status is not None else None
+        return self._vehicle.heading(now) if own is None else own
 
     def pointing(self, now: float) -> tuple[Vector, YawFrame] | None:
         """Return its roll, pitch and yaw, rad, and the frame of the yaw; None if unknown."""
@@ -140,7 +137,7 @@ class ManagedDevice:
         if status is None:
             return None
         try:
-            return Quaternion(*status.q).normalized().euler(), yaw_frame(status.flags)
+            return rotation_of(status.q).euler(), yaw_frame(status.flags)
         except ValueError:
             return None
 

@@ -43,7 +43,7 @@ from ..payload.messages import (
     GeoPoint,
     GimbalDeviceAttitudeStatus,
     GlobalPositionInt,
-    is_finite,
+    is_plausible,
     place_of,
 )
 from ..payload.mount_attitude import UNSET_VECTOR, YawFrame
@@ -238,7 +238,7 @@ class SimulatedManager(simulated.SimulatedDevice):
 
     def _take_vehicle(self, message: Attitude | GlobalPositionInt, now: float) -> None:
         if isinstance(message, Attitude):
-            if is_finite(message):
+            if is_plausible(message):
                 self.mount.motion.take_heading(
                     message.roll, message.pitch, message.yaw, message.yawspeed, now, math.inf)
         else:

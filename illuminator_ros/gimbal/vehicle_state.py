@@ -21,7 +21,15 @@ from typing import Generic, TypeVar
 
 from .messages import AutopilotStateForGimbalDevice
 from ..mavlink.messages import Address
-from ..payload.messages import Attitude, GeoPoint, GlobalPositionInt, is_finite, place_of
+from ..payload.messages import (
+    Attitude,
+    GeoPoint,
+    GlobalPositionInt,
+    is_place,
+    is_plausible,
+    is_rate,
+    place_of,
+)
 from ..payload.rotation import Quaternion, Vector
 
 T = TypeVar('T')
@@ -70,15 +78,14 @@ class VehicleState:
         self._autopilot_at = self._sent_at = -math.inf
 
     def take(self, message: Attitude | GlobalPositionInt, now: float) -> None:
-        """Take a message of the autopilot; ignore values that are not finite, or no position."""
+        """Take a message of the autopilot; ignore values that cannot be right, or no position."""
         if isinstance(message, Attitude):
-            if not (is_finite(message) and math.isfinite(message.yawspeed)):
+            if not (is_plausible(message) and is_rate(message.yawspeed)):
                 return
             self._attitude.set(Quaternion.from_euler(
                 message.roll, message.pitch, message.yaw), now, link=True)
             self._yaw_rate.set(message.yawspeed, now, link=True)
-        elif message.lat or message.lon:
-            # Autopilots send 0, 0 while they have no fix.
+        elif is_place(message):
             self._position.set(place_of(message), now, link=True)
             self._velocity.set(
                 (message.vx / 100, message.vy / 100, message.vz / 100), now, link=True)

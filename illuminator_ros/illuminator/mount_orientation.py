@@ -18,7 +18,7 @@ from __future__ import annotations
 
 from ..mavlink.dialect import mavlink
 from ..mavlink.messages import Address, Message
-from ..payload.messages import Attitude, GimbalDeviceAttitudeStatus, is_finite
+from ..payload.messages import Attitude, GimbalDeviceAttitudeStatus, is_plausible
 from ..payload.mount_attitude import MountAttitude, YawFrame
 from ..payload.rotation import flip, Quaternion
 
@@ -48,7 +48,7 @@ class MountOrientations:
                 except ValueError:
                     self._mounts[key] = None, now
                 return True
-        elif (isinstance(message, Attitude) and is_finite(message)
+        elif (isinstance(message, Attitude) and is_plausible(message)
                 and source.component == mavlink.MAV_COMP_ID_AUTOPILOT1
                 and (source.system in self._vehicles or len(self._vehicles) < MAX_MOUNTS)):
             self._vehicles[source.system] = message, now

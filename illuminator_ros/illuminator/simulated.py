@@ -202,6 +202,8 @@ class SimulatedIlluminator(SimulatedDevice):
 
     def _switch(self, on: bool) -> None:
         self.enabled = on
+        if on and self.behaviour.brightens:
+            self.configuration = replace(self.configuration, brightness=100.0)
         # Where 0 % means off, ON restores the last brightness above 0 %.
         if (on and self.behaviour.brightness_is_switch and not self.configuration.brightness):
             self.configuration = replace(self.configuration, brightness=self._last_brightness)
@@ -212,6 +214,8 @@ class SimulatedIlluminator(SimulatedDevice):
             self._last_brightness = configuration.brightness
         if self.behaviour.brightness_is_switch:
             self.enabled = configuration.brightness > 0
+        elif self.behaviour.configuring_switches and configuration.brightness > 0:
+            self.enabled = True
 
     def press(self, now: float, *, enabled: bool | None = None, **changes: object) -> Effect:
         """

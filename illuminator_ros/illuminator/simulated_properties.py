@@ -44,6 +44,9 @@ class IlluminatorBehaviour(Behaviour):
     :param brightness_is_switch: whether a brightness above 0 is on, and 0 is off.
     :param accepts_nan: whether range checks are comparisons that NaN passes.
     :param accepts_out_of_range: whether values out of range are accepted and applied.
+    :param brightens: whether ON sets its brightness to 100 %.
+    :param configuring_switches: whether a brightness above 0 switches it on, and 0 does not switch
+        it off.
     :param toggles: whether ON switches it off if it is on.
     :param false_flags: ILLUMINATOR_ERROR_FLAGS that are set without a reason.
     :param inverted_flags: whether THERMAL_THROTTLING is set while the light is cold.
@@ -63,6 +66,9 @@ class IlluminatorBehaviour(Behaviour):
         '', 'no-terminator', 'fills its strings with blanks, to the last byte', ' ')
     accepts_nan: bool = fault(False, 'nan', 'accepts NaN')
     accepts_out_of_range: bool = fault(False, 'anything', 'accepts values out of range')
+    brightens: bool = fault(False, 'on-bright', 'sets its brightness to 100 % when switched on')
+    configuring_switches: bool = fault(
+        False, 'configure-on', 'is switched on by a brightness above 0')
     toggles: bool = fault(False, 'toggle', 'is switched off by switching it on again')
     false_flags: int = fault(
         0, 'flags', 'reports error flags without a reason',

@@ -40,9 +40,29 @@ class GeoPoint(NamedTuple):
     altitude: float
 
 
-def is_finite(attitude: Attitude) -> bool:
-    """Return whether all angles are finite."""
-    return all(map(math.isfinite, (attitude.roll, attitude.pitch, attitude.yaw)))
+# rad/s; no vehicle and no mount turns faster.
+FASTEST_RATE = 100.0
+
+
+def is_angle(angle: float) -> bool:
+    """Return whether an angle in rad can be right: two turns at most, and not NaN."""
+    return abs(angle) <= 2 * math.tau
+
+
+def is_rate(rate: float) -> bool:
+    """Return whether an angular velocity in rad/s can be right; NaN cannot."""
+    return abs(rate) <= FASTEST_RATE
+
+
+def is_plausible(attitude: Attitude) -> bool:
+    """Return whether all angles can be right."""
+    return all(map(is_angle, (attitude.roll, attitude.pitch, attitude.yaw)))
+
+
+def is_place(message: GlobalPositionInt) -> bool:
+    """Return whether there is a position; autopilots send 0, 0 while they have no fix."""
+    return (bool(message.lat or message.lon) and abs(message.lat) <= 900_000_000
+            and abs(message.lon) <= 1_800_000_000)
 
 
 def place_of(message: GlobalPositionInt) -> GeoPoint:

@@ -28,7 +28,7 @@ from dataclasses import dataclass
 from enum import Enum
 import math
 
-from .messages import GimbalDeviceAttitudeStatus
+from .messages import GimbalDeviceAttitudeStatus, is_angle, is_rate
 from .rotation import enu_flu, flip, flu_frd, ned_frd, Quaternion, Vector
 from ..mavlink.dialect import mavlink
 
@@ -83,13 +83,30 @@ def yaw_frame(flags: int) -> YawFrame:
     return YawFrame.VEHICLE
 
 
+def rotation_of(q: Sequence[float]) -> Quaternion:
+    """
+    Return the rotation of a quaternion that a device reports.
+
+    :raises ValueError: if it is far from the norm 1, NaN included.
+    """
+    if not 0.25 <= math.hypot(*q) <= 4.0:
+        raise ValueError(f'({", ".join(f"{value:g}" for value in q)}) is not a rotation')
+    return Quaternion(*q).normalized()
+
+
+def heading_of(status: GimbalDeviceAttitudeStatus) -> float | None:
+    """Return the heading of the vehicle, rad from north, None if the status has none."""
+    # Implementations that name no frame are older than delta_yaw.
+    return status.delta_yaw if names_frame(status.flags) and is_angle(status.delta_yaw) else None
+
+
 def from_mavlink(q: Sequence[float], frame: YawFrame) -> Quaternion:
     """
     Return the rotation in ROS of a quaternion in MAVLink.
 
     :raises ValueError: if it is not a rotation, NaN included.
     """
-    rotation = Quaternion(*q).normalized()
+    rotation = rotation_of(q)
     return enu_flu(rotation) if frame is YawFrame.EARTH else flip(rotation)
 
 
@@ -124,11 +141,8 @@ class MountAttitude:
         frame = yaw_frame(status.flags)
         rates = flu_frd((status.angular_velocity_x, status.angular_velocity_y,
                          status.angular_velocity_z))
-        # Implementations that name no frame are older than delta_yaw.
-        heading = status.delta_yaw if names_frame(status.flags) else math.nan
         return cls(from_mavlink(status.q, frame), frame,
-                   rates if all(map(math.isfinite, rates)) else None,
-                   heading if math.isfinite(heading) else None)
+                   rates if all(map(is_rate, rates)) else None, heading_of(status))
 
     def seen_from(self, frame: YawFrame, heading: float | None = None) -> Quaternion | None:
         """

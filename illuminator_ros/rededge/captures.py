@@ -24,7 +24,7 @@ import math
 from . import messages as rededge
 from .pings import Done
 from ..mavlink.command_sender import format_seconds
-from ..mavlink.dialect import mavlink
+from ..mavlink.dialect import entry_names, mavlink
 from ..mavlink.messages import Address, Message
 
 # s from DIGICAM_CONTROL to CAMERA_FEEDBACK.
@@ -35,6 +35,9 @@ LATE_ANSWER = 15.0
 # An image whose index is less than this behind the newest one is older; if it is farther behind,
 # the camera has restarted.
 OLDER_INDICES = 32
+# CAMERA_FEEDBACK_FLAGS, a number instead of bits, of an image that was taken: MicaSense cameras
+# send CLOSEDLOOP, and ArduPilot sends PHOTO, which is 0.
+TAKEN = (mavlink.CAMERA_FEEDBACK_PHOTO, mavlink.CAMERA_FEEDBACK_CLOSEDLOOP)
 # Requests without an answer that are remembered.
 MAX_LATE = 32
 
@@ -44,6 +47,8 @@ class _Capture:
     sent_at: float
     done: Done
     index: int | None = None
+    # Why its CAMERA_FEEDBACK does not confirm the image, '' while none has come.
+    doubt: str = ''
     # The time until which the earlier request that may have caused a reported image counts, s.
     late_until: float | None = None
 
@@ -112,10 +117,14 @@ class Captures:
         self.images += 1
         self._take_index(message.img_idx, now)
         capture = self._capture
-        if (capture is not None and capture.index == message.img_idx
-                and message.flags == mavlink.CAMERA_FEEDBACK_CLOSEDLOOP):
+        if capture is None or capture.index != message.img_idx:
+            return
+        if message.flags in TAKEN:
             self._end(True, f'image {capture.index} taken, confirmed after '
                             f'{format_seconds(now - capture.sent_at)}{note}')
+        else:
+            name = entry_names('CAMERA_FEEDBACK_FLAGS').get(message.flags, 'unknown')
+            capture.doubt = f'its CAMERA_FEEDBACK has the flags {message.flags} ({name})'
 
     def _is_new(self, index: int) -> bool:
         """Return whether an image is newer than all others; its index has 16 bits."""
@@ -152,8 +161,8 @@ class Captures:
         if capture is None or now < capture.due:
             return
         if capture.index is not None:
-            self._end(False, f'image {capture.index} triggered, not confirmed: no CAMERA_FEEDBACK '
-                             f'within {limit}')
+            self._end(False, f'image {capture.index} triggered, not confirmed: '
+                      + (capture.doubt or f'no CAMERA_FEEDBACK within {limit}'))
             return
         text = f'no answer to DIGICAM_CONTROL within {limit}'
         if capture.late_until is None:

@@ -63,6 +63,8 @@ PING_ATTEMPTS = 3
 # A component that is not a camera.
 OTHER_COMPONENT = 1
 SHOTS_WITHOUT_IMAGE = (0, 3)
+# The images that are announced, and a few more because requests may be repeated.
+ANNOUNCED_IMAGES, MAX_IMAGES = 15, 20
 # Degrees; m. The place in the ocean that is farthest from any land: no camera is there.
 LATITUDE, LONGITUDE, ALTITUDE = -48.8766667, -123.3933333, 1234.5
 # The same in the fields of messages: 1e-7 degrees, and mm.
@@ -102,6 +104,22 @@ class CameraSession(Session):
     def is_device(self, message: Message) -> bool:
         """See :class:`Session`."""
         return isinstance(message, Heartbeat)
+
+    def images(self) -> int:
+        """Return the number of images that the camera has reported."""
+        statuses = self.received(rededge.CameraStatus)
+        feedbacks = self.received(rededge.CameraFeedback)
+        return max(len({(one.img_idx, one.time_usec) for _, one in statuses}),
+                   len({(one.img_idx, one.time_usec) for _, one in feedbacks}))
+
+    def danger_of(self, message: Message) -> str:
+        """See :class:`Session`: the camera must not fill its card with images."""
+        if not (self.consent and isinstance(
+                message, rededge.CameraStatus | rededge.CameraFeedback)):
+            return ''
+        count = self.images()
+        return f'it took {count} images instead of about {ANNOUNCED_IMAGES}' if (
+            count > MAX_IMAGES) else ''
 
     async def ping(
         self, sequence: int | None = None, source: Address | None = None,
@@ -370,6 +388,16 @@ async def capture_feedback(camera: CameraSession) -> str:
     return f'after {camera.now - begun:.1f} s'
 
 
+@with_captures('capture-once', 'takes one image for one request', section='DIGICAM_CONTROL')
+async def capture_once(camera: CameraSession) -> None:
+    """Count the images that are reported."""
+    before = camera.images()
+    await camera.image()
+    await camera.sleep(NO_IMAGE_TIME)
+    if (count := camera.images() - before) != 1:
+        raise Failed(f'{count} images')
+
+
 @with_captures('capture-panel', 'takes an image of the panel', section='DIGICAM_CONTROL')
 async def capture_panel(camera: CameraSession) -> None:
     """Command an image with shot 2."""
@@ -498,7 +526,7 @@ REQUIREMENTS: tuple[Requirement[CameraSession], ...] = (
     _documented(component.heartbeat,
                 f'sends HEARTBEAT from component {CAMERA_ID} (MAV_COMP_ID_CAMERA)'),
     ping, ping_sequence, ping_once, ping_target, system_id,
-    capture_status, capture_feedback, capture_panel, shot_values,
+    capture_status, capture_feedback, capture_once, capture_panel, shot_values,
     other_component, all_components, any_system,
     _position('raw-position', 'GPS_RAW_INT', CameraSession.raw_position),
     _position('fused-position', 'GLOBAL_POSITION_INT', CameraSession.fused_position),
@@ -510,7 +538,8 @@ CHECKS: PayloadChecks[CameraSession] = PayloadChecks(
     payload='rededge', device='camera', session=CameraSession, requirements=REQUIREMENTS,
     evidence=f'HEARTBEAT from component {CAMERA_ID}', mavlink_version=1,
     risk='take images with a false position',
-    question='Some checks make camera {device} take about 15 images, most with a false position '
-             f'({LATITUDE:.1f}, {LONGITUDE:.1f})\nand a false attitude. They stay on its card. '
+    question='Some checks make camera {device} take '
+             f'about {ANNOUNCED_IMAGES} images, most with a false position ({LATITUDE:.1f}, '
+             f'{LONGITUDE:.1f})\nand a false attitude. They stay on its card. '
              'All other checks run in any case.\nMay camera {device} take these images? [y/N] ',
     traces=', besides its new images')

@@ -102,12 +102,16 @@ class Field:
 
         :raises ValueError: if the value is out of range and the field has none for "unknown".
         """
-        if not self.low <= value <= self.high:
+        if not self.includes(value):
             if self.unknown is None:
                 raise ValueError(f'{self.source}: {value:.10g} {self.unit} is outside '
                                  f'{self.low:.10g} to {self.high:.10g} {self.unit}')
             return self.unknown
         return value if self.scale is None else round(value * self.scale)
+
+    def includes(self, value: float) -> bool:
+        """Return whether a value is in the range."""
+        return self.low <= value <= self.high
 
 
 _UTC = Field('UTC of ~/fix', 'us', 1, FIRST_UTC, LAST_UTC)
@@ -201,6 +205,11 @@ class Position:
     altitude: float
     horizontal: float = math.nan
     vertical: float = math.nan
+
+
+def is_no_place(position: Position) -> bool:
+    """Return whether a position is 0, 0, which receivers and autopilots send without a fix."""
+    return position.latitude == position.longitude == 0
 
 
 def standard_deviations(covariance: Sequence[float]) -> tuple[float, float]:
@@ -373,17 +382,20 @@ def image_position(feedback: CameraFeedback, geoid_separation: float) -> Positio
 
     :param geoid_separation: height of mean sea level above the ellipsoid, m.
     """
-    latitude, longitude = feedback.lat / 1e7, feedback.lng / 1e7
-    if (not (abs(latitude) <= 90 and abs(longitude) <= 180 and math.isfinite(feedback.alt_msl))
-            or latitude == longitude == 0):
+    position = Position(
+        0, feedback.lat / 1e7, feedback.lng / 1e7, feedback.alt_msl + geoid_separation)
+    if is_no_place(position) or not all(field.includes(value) for field, value in (
+            (_LATITUDE, position.latitude), (_LONGITUDE, position.longitude),
+            (_ALTITUDE, feedback.alt_msl))):
         return None
-    return Position(0, latitude, longitude, feedback.alt_msl + geoid_separation)
+    return position
 
 
 def image_attitude(feedback: CameraFeedback, frame: MountFrame) -> Quaternion | None:
-    """Return the orientation of the camera's frame in ENU; None if the angles are not finite."""
+    """Return the orientation of the camera's frame in ENU; None if the angles cannot be right."""
     angles = feedback.roll, feedback.pitch, feedback.yaw
-    if not all(map(math.isfinite, angles)):
+    # A comparison with NaN is false.
+    if not all(abs(angle) <= 360.0 for angle in angles):
         return None
     camera = enu_flu(Quaternion.from_euler(*map(math.radians, angles)) * _ZERO_POSE)
     return camera * _FROM_OPTICAL if frame is MountFrame.OPTICAL else camera

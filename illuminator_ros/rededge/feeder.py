@@ -56,10 +56,12 @@ class FeederSnapshot:
     All inputs at one moment.
 
     :param needed: groups of inputs; one input of each group must be received.
+    :param no_pair: why attitude and mount are not sent although both are received, '' if they are.
     """
 
     inputs: Mapping[Input, InputSnapshot]
     needed: Sequence[Sequence[Input]]
+    no_pair: str = ''
 
     @property
     def lacking(self) -> list[Sequence[Input]]:
@@ -108,7 +110,8 @@ class Feeder:
             needed.append((Input.MOUNT,))
         if self._needs_reference:
             needed.append((Input.TIME_REFERENCE,))
-        return FeederSnapshot(self._inputs.snapshot(now), needed)
+        return FeederSnapshot(
+            self._inputs.snapshot(now), needed, self.orientation.why_no_pair(now))
 
     # Position and time
 
@@ -119,6 +122,8 @@ class Feeder:
         satellites = self._satellites if is_fresh(Input.SATELLITES, now) else None
         with self._inputs.take(Input.FIX, now, stamp):
             conversions.fix_type(position.status)
+            if conversions.is_no_place(position):
+                raise ValueError('no fix: its position is 0, 0')
             utc = self._utc(stamp) // 1000
             self._inputs.check(Input.FIX, stamp)
             if settings.position_source is PositionSource.RAW:

@@ -90,6 +90,8 @@ class OrientationFeeder:
         self._interval = 1 / settings.attitude_rate
         self._pair_due = -math.inf
         self._pair_time = 0
+        # When attitude and mount were sent last, s.
+        self._pair_sent_at = -math.inf
 
     def take_attitude(
         self, name: Input, orientation: Quaternion | None, rates: Vector, stamp: Stamp,
@@ -173,11 +175,22 @@ class OrientationFeeder:
             angles = conversions.mount_angles(
                 conversions.in_vehicle(mount.rotation, self._mount_parent, sample.rotation),
                 self._settings.mount_frame)
-        self._pair_time = time
+        self._pair_time, self._pair_sent_at = time, now
         interval = self._interval
         self._pair_due = max(self._pair_due + interval, now + interval / 2)
         self._send(conversions.attitude(sample.rotation, sample.rates, time_boot_ms(now)))
         self._send_mount(angles, now)
+
+    def why_no_pair(self, now: float) -> str:
+        """Return why attitude and mount are not sent although both are received, '' else."""
+        is_fresh, is_fixed = self._inputs.is_fresh, self.mount_is_fixed
+        if not ((is_fresh(Input.IMU, now) or is_fresh(Input.ATTITUDE, now))
+                and (is_fixed or is_fresh(Input.MOUNT, now))):
+            return ''
+        if now < self._pair_sent_at + max(self._settings.attitude_timeout, 2 * self._interval):
+            return ''
+        return ('a publisher of ~/mount is still awaited' if is_fixed and now < self._fixed_since
+                else 'none are of one instant')
 
     def change_rate(self, attitude_rate: float, now: float) -> None:
         """Replace the highest rate of attitudes, Hz."""

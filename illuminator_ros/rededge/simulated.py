@@ -32,8 +32,8 @@ from . import messages as rededge
 from ..mavlink.dialect import mavlink, raw, replaced
 from ..mavlink.messages import Address, Heartbeat, Message, target_of
 from ..payload import simulated
-from ..payload.faults import Behaviour, fault, FaultTable, SECONDS
-from ..payload.messages import Attitude, GeoPoint, GlobalPositionInt, is_finite, SystemTime
+from ..payload.faults import Behaviour, COUNT, fault, FaultTable, SECONDS
+from ..payload.messages import Attitude, GeoPoint, GlobalPositionInt, is_plausible, SystemTime
 from ..payload.rotation import Quaternion
 from ..payload.simulated_settings import geo_point, number, setting, Values
 
@@ -78,6 +78,7 @@ class RedEdgeBehaviour(Behaviour):
     :param counts: whether it counts its images.
     :param captures: whether it takes images on DIGICAM_CONTROL.
     :param captures_panel: whether it takes images of the panel.
+    :param images: how many images it takes for one DIGICAM_CONTROL.
     :param takes_any_shot: whether it takes images for values of ``shot`` that do not exist.
     :param ping_component: offset of the component id that answers PING.
     :param ping_sequence: offset of the sequence number in the answer.
@@ -101,6 +102,7 @@ class RedEdgeBehaviour(Behaviour):
     counts: bool = fault(True, 'same-index', 'does not count its images')
     captures: bool = fault(True, 'no-captures', 'takes no image on DIGICAM_CONTROL')
     captures_panel: bool = fault(True, 'no-panel', 'takes no image of the panel')
+    images: int = fault(1, 'burst', 'takes N images for one request', 3, COUNT)
     takes_any_shot: bool = fault(False, 'any-shot', 'takes an image for each value of shot')
     injectable: bool = fault(True, 'no-injection', 'ignores injected position, time and attitude')
     expires: bool = fault(True, 'stale', 'uses injected state for ever')
@@ -385,7 +387,8 @@ class SimulatedRedEdge(simulated.SimulatedDevice):
             is_known = (firmware >= rededge.PARAMETERS
                         and raw(message, 'param_id').rstrip(b'\0') == rededge.VERSION_PARAMETER)
             return (firmware.value(),) if is_known else ()
-        if self.behaviour.injectable and (not isinstance(message, Attitude) or is_finite(message)):
+        if self.behaviour.injectable and (
+                not isinstance(message, Attitude) or is_plausible(message)):
             self._injected |= {
                 state: Injected(message, now) for state in INJECTED.get(type(message), ())}
         return ()
@@ -406,16 +409,17 @@ class SimulatedRedEdge(simulated.SimulatedDevice):
                  control.shot == rededge.Shot.SURVEY or behaviour.takes_any_shot)
         if not (taken and behaviour.captures and self.properties.firmware >= rededge.CAPTURES):
             return
-        self._index = (self._index + behaviour.counts) & 0xFFFF
-        image = self.capture(
-            rededge.Shot.PANEL if is_panel else rededge.Shot.SURVEY, 'mavlink', now)
-        if behaviour.feedback:
-            self._pending.append((
-                now + behaviour.feedback_delay, self._feedback(image, source.system)))
-        if behaviour.triggers:
-            yield rededge.CameraStatus(
-                _microseconds(image.time_utc_s), source.system, 0, self._index,
-                mavlink.CAMERA_STATUS_TYPE_TRIGGER, 0.0, 0.0, 0.0, 0.0)
+        for _ in range(behaviour.images):
+            self._index = (self._index + behaviour.counts) & 0xFFFF
+            image = self.capture(
+                rededge.Shot.PANEL if is_panel else rededge.Shot.SURVEY, 'mavlink', now)
+            if behaviour.feedback:
+                self._pending.append((
+                    now + behaviour.feedback_delay, self._feedback(image, source.system)))
+            if behaviour.triggers:
+                yield rededge.CameraStatus(
+                    _microseconds(image.time_utc_s), source.system, 0, self._index,
+                    mavlink.CAMERA_STATUS_TYPE_TRIGGER, 0.0, 0.0, 0.0, 0.0)
 
     # Images
 

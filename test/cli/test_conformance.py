@@ -21,6 +21,7 @@ import re
 import signal
 from xml.etree import ElementTree
 
+from illuminator_ros.cli.conformance.run import FIND_TIMEOUT
 import pytest
 from support.ports import free_port
 from support.processes import Program, python, run
@@ -170,20 +171,20 @@ def test_closed_standard_streams_are_no_error(url: str, simulate: Start, redirec
     assert 'Traceback' not in ended.stderr
 
 
-@pytest.mark.parametrize(('link', 'used', 'status', 'reason'), [
-    ('udpin://{url}', False, 1, 'no light was heard within 0.5 s'),
-    ('tcp://127.0.0.1:1', False, 1, 'link not open: tcp://127.0.0.1:1: '),
-    # This computer cannot open the link, which does not concern the light.
+@pytest.mark.parametrize(('arguments', 'used', 'status', 'reason'), [
+    ('udpin://{url} --wait 0.5', False, 1, 'no light was heard within 0.5 s'),
+    ('tcp://127.0.0.1:1 --wait 0.5', False, 1, 'link not open: tcp://127.0.0.1:1: '),
+    # This computer cannot open the link, which does not concern the light. The run ends at once.
     ('udpin://{url}', True, 2, 'several programs on one link); nothing was checked'),
     ('serial:///nowhere/tty:57600', False, 2, 'nothing was checked')])
 def test_without_a_light_or_a_link_the_reason_is_reported_with_its_status(
-        url: str, start: Start, simulate: Start, link: str, used: bool, status: int, reason: str,
-) -> None:
+        url: str, start: Start, simulate: Start, arguments: str, used: bool, status: int,
+        reason: str) -> None:
     if used:
         simulate()
-    program = start(CONFORMANCE, link.format(url=url), '--wait', '0.5')
+    program = start(CONFORMANCE, *arguments.format(url=url).split())
 
-    assert program.wait() == status
+    assert program.wait(0.8 * FIND_TIMEOUT) == status
     assert reason in program.log
     assert ('0 passed, 1 failed' in program.log) == ('FAIL' in program.log) == (status == 1)
     # The reason is printed at most twice: while the program waits, and as the result.

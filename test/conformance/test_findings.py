@@ -86,7 +86,7 @@ GIMBAL = {
 SEEDED: dict[str, dict[str, set[str]]] = {
     'illuminator': {
         **COMPONENT,
-        'reboot': {'uptime', 'interval-stop'},
+        'reboot': {'uptime'},
         'thermistor': {'flags-at-rest'},
         'refuse': ACCEPTED_CHANGES,
         'refuse=failed': ACCEPTED_CHANGES | DENIED_VALUES,
@@ -105,6 +105,8 @@ SEEDED: dict[str, dict[str, set[str]]] = {
         'anything': DENIED_VALUES,
         'disobey': {'status-unchanged'},
         'toggle': {'repeated'},
+        'on-bright': {'on-configuration'},
+        'configure-on': {'configure-switch'},
         'no-request': {'status-request'},
         'flags': {'flags-at-rest'},
         'flags=0x80': {'flags-at-rest'},
@@ -127,6 +129,8 @@ SEEDED: dict[str, dict[str, set[str]]] = {
         'same-index': {'capture-index'},
         'no-captures': CAPTURES,
         'no-panel': {'capture-panel'},
+        # The 21st image ends the run.
+        'burst': {'capture-once', 'raw-position'},
         'any-shot': {'shot-values'},
         'no-injection': INJECTED,
         'stale': {'validity'},
@@ -176,7 +180,7 @@ DEVIATIONS: dict[str, dict[str, set[str]]] = {
         'reference': {'address', 'information-terminated', 'other-target',
                       'not-a-number', 'interval', 'uptime'},
         'ardusub': {'heartbeat-type', 'heartbeat-autopilot', 'information-request',
-                    'not-a-number'},
+                    'configure-switch', 'not-a-number'},
     },
     'gimbal_manager': {
         'reference': set(),

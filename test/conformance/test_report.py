@@ -49,16 +49,16 @@ def test_the_json_report_has_every_requirement_with_its_messages(report: RunRepo
     assert any('< COMMAND_ACK' in line for line in nan['exchange'])
     assert content['counts']['FAIL'] == 3
     assert content['passed'] is False
-    assert report.summary == '44 passed, 3 failed, 1 skipped in 12 s; the light is as it was'
+    assert report.summary == '46 passed, 3 failed, 1 skipped in 12 s; the light is as it was'
     assert (content['light'], content['restored']) == (report.device, 'the light is as it was')
 
 
 def test_the_junit_report_has_counts_reasons_and_sections(report: RunReport) -> None:
     suite = ElementTree.fromstring(reports.as_junit(report))
     assert (suite.tag, suite.get('name')) == ('testsuite', 'illuminator conformance')
-    assert [suite.get(key) for key in ('tests', 'failures', 'skipped')] == ['48', '3', '1']
+    assert [suite.get(key) for key in ('tests', 'failures', 'skipped')] == ['50', '3', '1']
     assert [len(suite.findall(path)) for path in (
-        'testcase', 'testcase/failure', 'testcase/skipped')] == [48, 3, 1]
+        'testcase', 'testcase/failure', 'testcase/skipped')] == [50, 3, 1]
     (case,) = [one for one in suite.findall('testcase') if 'other-target: ' in one.attrib['name']]
     assert case.get('classname') == 'routing'
     (failure,) = case.findall('failure')
@@ -79,7 +79,7 @@ def test_the_junit_report_of_a_run_without_exit_status_0_has_a_failure_or_an_err
     assert [suite.get(key) for key in ('tests', 'failures', 'errors')] == [
         str(len(suite.findall('testcase'))), '0', str(errors)]
     assert [one.get('message') for one in suite.findall('testcase/error')] == [
-        'incomplete: 44 passed, 0 failed, 1 skipped in 12 s; THE LIGHT IS NOT AS IT WAS'][:errors]
+        'incomplete: 46 passed, 0 failed, 1 skipped in 12 s; THE LIGHT IS NOT AS IT WAS'][:errors]
 
 
 def test_the_junit_report_contains_no_character_that_xml_excludes(report: RunReport) -> None:
@@ -111,14 +111,14 @@ def test_the_table_has_the_last_messages_of_a_long_exchange() -> None:
 
 def test_requirements_that_were_not_reached_share_one_line() -> None:
     absent = run('illuminator', target=Address(9, 9))
-    assert unreached(absent.runner.results) == ['SKIPPED 47 not reached: no light was found']
+    assert unreached(absent.runner.results) == ['SKIPPED 49 not reached: no light was found']
 
     interrupted = start('illuminator', consent=False)
     interrupted.link.run_until(lambda: len(interrupted.runner.results) == 10, within=100.0)
     interrupted.interrupt()
     # Requirements that lack consent keep their lines.
     assert unreached(interrupted.finish().runner.results) == [
-        'SKIPPED 38 not reached: interrupted']
+        'SKIPPED 40 not reached: interrupted']
 
 
 def test_the_catalogue_has_a_line_for_each_requirement_with_its_section() -> None:

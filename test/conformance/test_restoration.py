@@ -32,7 +32,7 @@ from support.checks_run import ChecksRun, start
 BEFORE = Configuration(Mode.EXTERNAL_SYNC, 60.0, 0.5, 25.0)
 # Faults with which a light sends messages and applies commands.
 RESTORABLE = sorted(set(FAULTS) - {
-    'silence', 'refuse', 'lie', 'no-stop', 'reboot', 'toggle', 'no-resume'})
+    'silence', 'refuse', 'lie', 'no-stop', 'reboot', 'toggle', 'no-resume', 'on-bright'})
 
 
 def used(*faults: str, requirements: Sequence[Requirement[Any]] = ()) -> ChecksRun:

@@ -110,15 +110,21 @@ def test_delta_yaw_counts_only_beside_a_named_frame(flags: int) -> None:
     assert MountAttitude.from_status(status(Quaternion(), flags, delta_yaw=0.0)).heading is None
 
 
+def test_a_heading_that_cannot_be_right_is_unknown() -> None:
+    assert MountAttitude.from_status(status(Quaternion(), EARTH, delta_yaw=1e30)).heading is None
+
+
 @pytest.mark.parametrize(('rates', 'ros'), [
-    ((0.1, 0.2, 0.3), (0.1, -0.2, -0.3)), ((0.1, 0.2, NAN), None), ((NAN,) * 3, None)])
+    ((0.1, 0.2, 0.3), (0.1, -0.2, -0.3)), ((0.1, 0.2, NAN), None), ((NAN,) * 3, None),
+    ((0.1, 1e30, 0.3), None)])
 def test_rates_have_the_signs_of_ros_or_are_unknown(
         rates: tuple[float, float, float], ros: tuple[float, ...] | None) -> None:
     assert MountAttitude.from_status(status(Quaternion(), VEHICLE, rates=rates)).rates == ros
 
 
 @pytest.mark.parametrize('q', [
-    (NAN,) * 4, (1.0, 0.0, NAN, 0.0), (0.0,) * 4, (math.inf, 0.0, 0.0, 0.0)])
+    (NAN,) * 4, (1.0, 0.0, NAN, 0.0), (0.0,) * 4, (math.inf, 0.0, 0.0, 0.0),
+    (1e30, 0.0, 0.0, 0.0), (0.1, 0.0, 0.0, 0.0)])
 def test_quaternion_that_is_not_a_rotation_gives_no_attitude(
         q: tuple[float, float, float, float]) -> None:
     with pytest.raises(ValueError, match='not a rotation'):

@@ -35,7 +35,7 @@ import pytest
 OWN, NEW, ADOPTED = Address(1, 191), Address(255, 100), Address(1, 100)
 # The heartbeat of real cameras; its type and autopilot do not identify a camera.
 BEAT = Heartbeat(0, 1, 2, 3, 4, 3)
-CLOSED_LOOP, OPEN_LOOP = 3, 4
+PHOTO, CLOSED_LOOP, OPEN_LOOP = 0, 3, 4
 ENDING = 'the bridge is ending'
 
 
@@ -254,6 +254,8 @@ def test_a_capture_is_a_success_after_its_feedback_re_5(shot: rededge.Shot) -> N
 
 CAPTURE = object()
 NO_ANSWER = 'no answer to DIGICAM_CONTROL within 5.00 s'
+OPEN = ('image 7 triggered, not confirmed: its CAMERA_FEEDBACK has the flags 4 '
+        '(CAMERA_FEEDBACK_OPENLOOP)')
 AMBIGUOUS = f'{NO_ANSWER}; an image was reported that an earlier request may have caused'
 
 
@@ -280,7 +282,10 @@ def taken(index: int) -> str:
     ([CAPTURE, 5.0], [NO_ANSWER]),
     ([CAPTURE, status(7, event=3), 5.0], [NO_ANSWER]),
     ([CAPTURE, status(7), 5.0], [triggered(7)]),
-    ([CAPTURE, status(7), feedback(7, OPEN_LOOP), 5.0], [triggered(7)]),
+    # CAMERA_FEEDBACK_PHOTO, as ArduPilot sends it.
+    ([CAPTURE, status(7), feedback(7, PHOTO)], [taken(7)]),
+    ([CAPTURE, status(7), feedback(7, OPEN_LOOP), 5.0], [OPEN]),
+    ([CAPTURE, status(7), feedback(7, OPEN_LOOP), feedback(7)], [taken(7)]),
     ([CAPTURE, status(7), feedback(8), 5.0], [triggered(7)]),
     # An answer that comes late does not confirm the next capture,
     ([CAPTURE, 5.0, CAPTURE, *image(1), *image(2)], [NO_ANSWER, taken(2)]),

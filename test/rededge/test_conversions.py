@@ -224,7 +224,8 @@ def test_position_of_an_image_is_above_the_ellipsoid() -> None:
         0, 47.3977421, 8.5455939, 535.5, 0.0, 0.0)
     assert math.isnan(position.horizontal)
     assert math.isnan(position.vertical)
-    for nothing in ({'lat': 0, 'lng': 0}, {'lat': 900000001}, {'alt_msl': math.nan}):
+    for nothing in ({'lat': 0, 'lng': 0}, {'lat': 900000001}, {'alt_msl': math.nan},
+                    {'alt_msl': 1e30}, {'alt_msl': -1001.0}):
         assert conversions.image_position(feedback(**nothing), 0.0) is None
 
 
@@ -241,7 +242,8 @@ def test_attitude_of_an_image_is_that_of_vehicle_and_mount(
         attitude = found[frame]
         assert attitude is not None
         assert error(oracle(attitude), oracle(vehicle) * oracle(body) * axes) < 0.01
-    assert conversions.image_attitude(feedback(yaw=math.nan), MountFrame.CAMERA) is None
+    for wrong in ({'yaw': math.nan}, {'yaw': 1e30}, {'roll': -361.0}, {'pitch': math.inf}):
+        assert conversions.image_attitude(feedback(**wrong), MountFrame.CAMERA) is None
 
 
 def seen(earth: Rotation) -> CameraFeedback:

@@ -195,6 +195,8 @@ def test_an_old_or_early_message_is_refused_and_one_that_another_has_overtaken_r
     (Input.VELOCITY, lambda rig: rig.velocity(math.inf, 4.0, 0.0),
      'a component is not a finite number'),
     (Input.FIX, lambda rig: rig.fix(replace(HERE, status=-1), 1.1), 'no fix (status -1)'),
+    (Input.FIX, lambda rig: rig.fix(replace(HERE, latitude=0.0, longitude=0.0)),
+     'no fix: its position is 0, 0'),
     (Input.FIX, lambda rig: rig.fix(replace(HERE, latitude=math.nan)),
      'latitude of ~/fix: nan deg is outside -90 to 90 deg'),
     (Input.TIME_REFERENCE, lambda rig: rig.reference(1e9),
@@ -449,3 +451,27 @@ def test_attitude_is_used_while_no_imu_comes() -> None:
     assert attitude.yaw == pytest.approx(math.pi / 2)
     rig.run(0.6)
     assert classes(rig.imu(yaw, name=Input.ATTITUDE)) == [Attitude, MountStatus]
+
+
+def test_attitude_and_mount_that_are_received_and_not_sent_have_a_reason() -> None:
+    rig = Rig()
+    rig.feeder.orientation.set_fixed_mount((0.0, 0.0, 0.0), since=rig.now + 2.0)
+
+    def reason() -> str:
+        return rig.feeder.snapshot(rig.now).no_pair
+
+    assert reason() == ''
+    assert rig.imu() == []
+    assert reason() == 'a publisher of ~/mount is still awaited'
+    rig.run(2.0)
+    rig.imu()
+    assert reason() == ''
+
+    rig = Rig()
+    rig.feeder.orientation.expect_mount()
+    rig.imu()
+    # It is older than the only attitude.
+    assert rig.mount(age=0.1) == []
+    assert reason() == 'none are of one instant'
+    assert rig.mount() != []
+    assert reason() == ''

@@ -29,7 +29,7 @@ from illuminator_ros.payload.messages import GeoPoint
 from illuminator_ros.payload.rotation import enu_flu, flip, Quaternion
 from illuminator_ros.payload.simulated import SimulatedComponents
 from illuminator_ros.rededge.client import RedEdgeClient
-from illuminator_ros.rededge.conversions import Position
+from illuminator_ros.rededge.conversions import interpolate, Position
 from illuminator_ros.rededge.input_states import (
     Input,
     PositionSource,
@@ -52,6 +52,7 @@ from flight_model import (  # noqa: E402, I100
     Image,
     IMAGE_INTERVAL,
     LENS,
+    Pair,
 )
 
 UTC = 1.7e9
@@ -147,13 +148,14 @@ def test_comparison_finds_wrong_positions_wrong_angles_and_old_data() -> None:
     images = [Image.read(row, UTC, 1.0) for row in rig.rows]
     turned = Quaternion.from_euler(0.0, 0.002, 0.0)
 
-    def failures(changed: list[Image]) -> str:
+    def failures(changed: list[Image], max_delay: float = 0.001) -> str:
         return '; '.join(compare(
-            changed, flight, max_delay=0.001, least_fresh=1.0).failures)
+            changed, flight, max_delay=max_delay, least_fresh=1.0).failures)
 
-    assert 'an attitude is wrong by 0.1' in failures(
-        [replace(one, pair=one.pair and one.pair._replace(mount=one.pair.mount * turned))
-         for one in images])
+    wrong_mounts = [replace(one, pair=one.pair and one.pair._replace(
+        mount=one.pair.mount * turned)) for one in images]
+    assert 'an attitude is wrong by 0.1' in failures(wrong_mounts[20:26])
+    assert 'an attitude is wrong by 0.' in failures(wrong_mounts[20:26], max_delay=11.0)
     assert 'data that is 6.00 s old' in failures(
         [*images[1:], replace(images[0], position_age=6.0)])
     assert 'instead of 72' in failures(images[5:])
@@ -161,3 +163,22 @@ def test_comparison_finds_wrong_positions_wrong_angles_and_old_data() -> None:
         [replace(one, position_age=1.0) if one.position_age is None else one for one in images])
     wrong = Rig(flight, Settings(geoid_separation=GEOID - 0.6)).fly()
     assert wrong.failures[0].startswith('a position is wrong by 0.')
+
+
+def test_a_delay_of_the_machine_explains_an_attitude_that_was_true_or_lies_between_two() -> None:
+    flight = Flight(60.0, 10.0)
+
+    def turned(time: float, gap: float = 0.0) -> tuple[Quaternion, Quaternion]:
+        """Return vehicle and mount, each between two that were true."""
+        one, other = flight.truth(time - gap / 2), flight.truth(time + gap / 2)
+        return (interpolate(one.vehicle, other.vehicle, 0.5), interpolate(
+            one.vehicle.inverse() * one.camera, other.vehicle.inverse() * other.camera, 0.5))
+
+    for number in range(50):
+        # In all parts of the flight, and with a clock of the camera that is late, too.
+        time, delay = 3.0 + 1.08 * number, 2.9 * (number % 11 - 5) / 5
+        for gap in (0.0, 0.0, 0.15)[number % 3:]:
+            vehicle, mount = turned(time, gap)
+            fit = flight.explain(Pair(time + delay, vehicle, time + delay, mount), 11.0)
+            assert fit.error < 0.05
+            assert abs(fit.delay) < abs(delay) + 0.05

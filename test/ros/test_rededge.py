@@ -287,7 +287,8 @@ def test_diagnostics_name_each_input_that_is_missing_or_refused_re_30(own_ros: R
     with running_camera() as camera, running_node(own_ros, camera) as node:
         newest = findings(own_ros)
         eventually(lambda: newest() == (
-            'nothing received on ~/fix; nothing received on ~/imu or ~/attitude; '
+            'nothing received on ~/fix (/rededge/fix has no publisher); nothing received on ~/imu '
+            'or ~/attitude (/rededge/imu has no publisher; /rededge/attitude has no publisher); '
             'geoid_separation is not set, so altitudes are above the ellipsoid'))
         with Robot(own_ros) as robot:
             eventually(lambda: newest().startswith('geoid_separation is not set'))
@@ -297,6 +298,38 @@ def test_diagnostics_name_each_input_that_is_missing_or_refused_re_30(own_ros: R
         eventually(lambda: '~/imu: nothing for' in newest())
         camera.answers = False
         eventually(lambda: 'PINGs without a reply: the camera does not receive' in newest())
+
+
+def test_a_required_input_that_never_comes_is_logged_with_its_topic_and_publishers(
+        own_ros: Ros) -> None:
+    with (running_camera() as camera,
+          running_node(own_ros, camera, slow_python, heartbeat_timeout=60.0) as node):
+        own_ros.publisher(Imu, '/rededge/imu', '/rededge')
+        pass_time_until(lambda: node.count(
+            'nothing received on ~/fix (/rededge/fix has no publisher)'), step=2.0)
+        assert node.count('nothing received on ~/imu or ~/attitude (/rededge/imu has 1 publisher; '
+                          '/rededge/attitude has no publisher)')
+
+
+def test_several_publishers_of_an_input_are_logged_and_in_the_diagnostics(own_ros: Ros) -> None:
+    with running_camera() as camera, running_node(own_ros, camera) as node:
+        newest = findings(own_ros)
+        for _ in range(2):
+            own_ros.node.create_publisher(NavSatFix, '/rededge/fix', 10)
+        warning = ('~/fix: /rededge/fix has 2 publishers, so images may get values of each in '
+                   'turn')
+        node.wait_for(warning)
+        eventually(lambda: warning in newest())
+
+
+def test_a_capture_before_a_fixed_mount_is_sent_says_that_the_image_has_none(
+        own_ros: Ros) -> None:
+    with (running_camera() as camera,
+          running_node(own_ros, camera, slow_python, heartbeat_timeout=60.0),
+          Robot(own_ros)):
+        camera.wait('GPS_RAW_INT')
+        assert call(own_ros, 'capture').message.endswith(
+            ', without attitude and mount (a publisher of ~/mount is still awaited)')
 
 
 def test_reason_why_no_camera_is_heard_is_in_the_log(own_ros: Ros) -> None:

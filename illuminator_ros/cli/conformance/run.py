@@ -109,8 +109,9 @@ def parse(
     for one in checks.options:
         add(f'--{one.name}', type=option(number(one.low, one.high)), default=one.default,
             metavar=one.metavar, help=f'{one.help} (default: %(default)g)')
-    add('--wait', type=option(number(0.1, 3600)), default=FIND_TIMEOUT, metavar='S',
-        help=f'how long to wait for the {checks.device} (default: %(default)g)')
+    add('--wait', type=option(number(0.1, 3600)), metavar='S',
+        help=f'how long to wait for the {checks.device}, and for a port that is missing or busy '
+             f'(default: {FIND_TIMEOUT:g}, and 0 for a port)')
     for part, default in (('system', 255), ('component', 190)):
         add(f'--{part}-id', type=option(integer(1, 255)), default=default, metavar='ID',
             help=f'our MAVLink {part} ID (default: %(default)s)')
@@ -196,6 +197,7 @@ class Conformance:
         self._signals = 0
         self._written = True
         # Written by the link's thread before the main thread reads them.
+        self._is_finding = True
         self._missing = ''
         self._announcement: list[str] = []
 
@@ -256,8 +258,15 @@ class Conformance:
         return self._link.snapshot(self._link.clock())
 
     def _link_event(self, event: LinkEvent) -> None:
-        # An error of this computer ends the run, which then prints the reason.
-        if not event.is_open and (event.was_open or _is_peer_error(event.reason)):
+        if event.is_open:
+            return
+        if event.was_open or _is_peer_error(event.reason):
+            self._texts.put(str(event))
+        elif self._is_finding and self._options.wait is None:
+            # A port of this computer is missing or busy: the run ends, and prints the reason.
+            self._missing = f'{NOT_OPEN}{event.name}: {event.reason}'
+            self._texts.put(None)
+        elif self._is_finding:
             self._texts.put(str(event))
 
     def _show(self, result: Result) -> None:
@@ -266,8 +275,10 @@ class Conformance:
 
     async def _find(self) -> None:
         """Find the device; record the other components on the link, or why it was not found."""
-        session, checks, wait = self._session, self._checks, self._options.wait
+        session, checks = self._session, self._checks
+        wait = self._options.wait or FIND_TIMEOUT
         await session.find(wait, LISTEN_TIME)
+        self._is_finding = False
         state, components = self._link_state(), session.components
         if components.found is None:
             self._missing = (

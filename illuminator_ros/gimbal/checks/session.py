@@ -55,6 +55,8 @@ POLL = 0.1
 SETTLE_TIME = 0.4
 # Degrees.
 TOLERANCE = 3.0
+# Degrees beyond its range at which a gimbal is stopped; the vehicle may be tilted a little.
+MARGIN = 10.0
 STEP = 15.0
 RATE = 6.0
 NAN = math.nan
@@ -122,6 +124,15 @@ class Limits(NamedTuple):
                             for one in read_ranges(message))
         return cls(roll, pitch, yaw, getattr(message, 'cap_flags2', 0) or message.cap_flags)
 
+    def exceeded(self, pose: Pose) -> str:
+        """Return the range that a pose exceeds by more than :data:`MARGIN`, '' for none."""
+        for axis, angle, span in (('pitch', pose.pitch, self.pitch), ('yaw', pose.yaw, self.yaw)):
+            # The reported yaw has no turns. A comparison with an unknown end is false.
+            if (-180.0 <= span.low < span.high <= 180.0
+                    and not span.low - MARGIN <= angle <= span.high + MARGIN):
+                return f'beyond its range of {axis}, {span.low:.1f} to {span.high:.1f} deg'
+        return ''
+
 
 # The ranges and capabilities of a gimbal that does not report them: all are possible.
 UNKNOWN_LIMITS = Limits(*(Range(NAN, NAN),) * 3, -1)
@@ -142,6 +153,8 @@ class GimbalSession(Session):
         super().__init__(conditions)
         self._before: Pose | None = None
         self._limits: Limits | None = None
+        # Consecutive statuses with an attitude beyond the range; the first ones do not count.
+        self._beyond = -math.inf
 
     def describe(self, message: Message) -> str:
         """See :class:`Session`; an attitude is shown by its angles."""
@@ -349,12 +362,33 @@ class GimbalSession(Session):
         """See :class:`Session`."""
         return str(self._before)
 
+    def danger_of(self, message: Message) -> str:
+        """See :class:`Session`: the gimbal must not turn beyond its range."""
+        if not (isinstance(message, AttitudeStatus) and self.consent and self._limits
+                and self._before):
+            return ''
+        try:
+            pose = Pose.from_message(message)
+        except ValueError:
+            return ''
+        # A gimbal may retract to a position beyond its range.
+        beyond = '' if pose.flags & mavlink.GIMBAL_DEVICE_FLAGS_RETRACT else self._limits.exceeded(
+            pose)
+        # A single deviating status does not count: the requirement "continuous" covers it.
+        self._beyond = self._beyond + 1 if beyond else 0
+        return f'it turned to {pose}, {beyond}' if self._beyond > 1 else ''
+
     async def restore(self) -> list[str]:
         """See :class:`Session`."""
         before = self._before
         assert before is not None
         try:
-            if self.consent:
+            if self.danger:
+                # Only stop it, since each other setpoint may turn it beyond its range again.
+                await self.point(None, rates=(NAN, 0.0, 0.0))
+                await self.prepare()
+                await self.point(None, rates=(NAN, 0.0, 0.0))
+            elif self.consent:
                 await self._turn_back(before)
             is_back = before.near(await self.pose_when(before.near, 1.0))
         except Skipped:

@@ -20,9 +20,19 @@ from collections.abc import Awaitable, Callable, Sequence
 from dataclasses import astuple
 from functools import partial
 
-from .session import Change, CONFIGURE, DIM, LightSession, LOW, ON_OFF, same
+from .session import (
+    Change,
+    CONFIGURE,
+    differences,
+    DIM,
+    LightSession,
+    LOW,
+    ON_OFF,
+    same,
+    status_text,
+)
 from ..messages import IlluminatorStatus
-from ..model import flag_names, float32, Mode, Status, StrobeRange
+from ..model import Configuration, flag_names, float32, Mode, Status, StrobeRange
 from ...mavlink.dialect import mavlink
 from ...mavlink.messages import Address, ComponentInformationBasic
 from ...payload.checks import component_requirements as component
@@ -89,6 +99,45 @@ async def repeated(light: LightSession) -> None:
 
 
 # Switching and configuring
+
+@requirement('on-configuration', 'keeps its configuration when it is switched on', ILLUMINATOR,
+             'ON/OFF', changes=True)
+async def on_configuration(light: LightSession) -> str:
+    """Configure a low brightness, switch the light on, and compare with that."""
+    await light.ensure_dim()
+    dim = Configuration(Mode.INTERNAL_CONTROL, DIM, 0.0, 0.0)
+    configured = await light.configure(brightness=DIM)
+    if not configured.transaction.accepted or configured.not_shown:
+        raise Skipped(f'it cannot be dimmed to {DIM:g} %')
+    if await light.enabled():
+        # A brightness above 0 switches some lights on.
+        await light.switch(False)
+    one = (await light.switch(True)).transaction
+    status = await light.after_change(lambda status: differences(dim, status))
+    if status is None or not status.enabled:
+        raise Skipped(f'{one.text}: {one.answer}, and the status does not show it on')
+    if names := differences(dim, status):
+        raise one.failure(f'changed {" and ".join(names)}: {status_text(status)} instead of '
+                          + dim.describe())
+    return f'{status.brightness:g} %'
+
+
+@requirement('configure-switch', 'stays off, or on, when it is configured', ILLUMINATOR,
+             'CONFIGURE', changes=True)
+async def configure_switch(light: LightSession) -> None:
+    """Configure a low brightness while the light is off, and then while it is on."""
+    await light.ensure_dim()
+    failures = []
+    for on, brightness in ((False, LOW / 2), (True, LOW)):
+        if await light.enabled() is not on:
+            await light.switch(on)
+        if await light.enabled() is not on:
+            raise Skipped(f'the status does not show it {"on" if on else "off"}')
+        one = (await light.configure(brightness=brightness)).transaction
+        if await light.enabled() is not on:
+            failures.append(one.failure(f'switched it {"off" if on else "on"}'))
+    fail_if(failures)
+
 
 @requirement('on', 'can be switched on', ILLUMINATOR, 'ON/OFF', changes=True)
 async def on(light: LightSession) -> None:
@@ -419,7 +468,7 @@ REQUIREMENTS: tuple[Requirement[LightSession], ...] = (
         'COMPONENT_INFORMATION_BASIC', lambda session: session.identity or 'no names'),
     *component.IDENTITY_STRINGS,
     component.unknown_command, component.unknown_message, component.broadcast(IlluminatorStatus),
-    other_target, command_int, repeated,
+    other_target, on_configuration, configure_switch, command_int, repeated,
     on, off, on_off_values,
     internal, external, mode_values,
     brightness, brightness_values, *STROBE, not_a_number,

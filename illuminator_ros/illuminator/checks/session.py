@@ -39,6 +39,8 @@ from ...payload.checks.session import Conditions, Session, Transaction
 # %; the brightness of checks without consent, and the most at which the light may then be on.
 LOW = 10.0
 DIM = 20.0
+# %; a light may round the brightness that it reports.
+ROUNDING = 1.0
 ON_OFF, CONFIGURE = mavlink.MAV_CMD_ILLUMINATOR_ON_OFF, mavlink.MAV_CMD_DO_ILLUMINATOR_CONFIGURE
 # s to wait for a status of the stream if the light sends none on request.
 STREAM_TIMEOUT = 2.5
@@ -114,6 +116,8 @@ class LightSession(Session):
         self.disagreements: list[Failed] = []
         self.rejected_but_applied: list[Failed] = []
         self._before: Status | None = None
+        # Whether it has been off or dim since its state was saved.
+        self._is_safe = False
 
     def is_device(self, message: Message) -> bool:
         """See :class:`Session`."""
@@ -153,7 +157,7 @@ class LightSession(Session):
         if not one.accepted:
             return Change(one)
         mark = self.record.log.total
-        status = await self._after_change(differ)
+        status = await self.after_change(differ)
         if status is None or not (not_shown := differ(status)):
             return Change(one)
         self.disagreements.append(Failed(
@@ -162,7 +166,7 @@ class LightSession(Session):
             one.lines + self.record.log.since(mark)[-3:]))
         return Change(one, tuple(not_shown), self.disagreements[-1])
 
-    async def _after_change(self, differ: Callable[[Status], list[str]]) -> Status | None:
+    async def after_change(self, differ: Callable[[Status], list[str]]) -> Status | None:
         """Return the first status that shows a change, or the last before CHANGE_TIMEOUT."""
         end = self.now + CHANGE_TIMEOUT
         while (status := await self.status()) and differ(status) and self.now < end:
@@ -195,7 +199,7 @@ class LightSession(Session):
             status = await self.status()
         if status is None or differences(low, status):
             one = await self.command(CONFIGURE, *low.params())
-            status = await (self._after_change(lambda status: differences(low, status))
+            status = await (self.after_change(lambda status: differences(low, status))
                             if one.accepted else self.status())
         if status is not None and status.enabled:
             # A brightness above 0 switches some lights on.
@@ -221,6 +225,11 @@ class LightSession(Session):
         if reason := _risk(status):
             raise Skipped(f'switched on, {reason}, and that cannot be changed: {NOT_AGREED}')
 
+    async def _is_lit_by_configuration(self) -> bool:
+        """Configure a low brightness while the light is off; return whether it may be on then."""
+        await self.configure(brightness=LOW / 2)
+        return await self.enabled() is not False
+
     async def ensure_unlit(self) -> None:
         """
         Bring the light to a state in which it stays off at a brightness that it must reject.
@@ -230,8 +239,7 @@ class LightSession(Session):
         await self.baseline()
         if self.consent:
             return
-        await self.configure(brightness=LOW / 2)
-        if await self.enabled() is not False:
+        if await self._is_lit_by_configuration():
             raise Skipped('its brightness switches it on, so that an invalid brightness might '
                           'dazzle: ' + NOT_AGREED)
 
@@ -252,16 +260,41 @@ class LightSession(Session):
         """See :class:`Session`."""
         assert self._before is not None
         wanted, enabled = _saved(self._before), bool(self._before.enabled)
+        on = enabled and not self.danger
         # Switch off first, so that the changes are not visible.
         await self.command(ON_OFF, 0.0)
-        await self.command(CONFIGURE, *wanted.params())
+        dazzles = (
+            not (self.consent or on) and (wanted.brightness > DIM or _strobes(wanted))
+            and await self._is_lit_by_configuration())
+        if not dazzles:
+            await self.command(CONFIGURE, *wanted.params())
         # Then restore the switch, because the brightness switches some lights on.
-        await self.command(ON_OFF, float(enabled))
+        await self.command(ON_OFF, float(on))
         await restore_interval(self, IlluminatorStatus)
         status = await self.status()
         if status is None:
             return ['unknown']
-        return differences(wanted, status) + (['enable'] if status.enabled != enabled else [])
+        return (['configuration, which would switch it on'] if dazzles
+                else differences(wanted, status)) + (
+                    ['enable'] if status.enabled != enabled else [])
+
+    def danger_of(self, message: Message) -> str:
+        """See :class:`Session`: without consent the light must not dazzle."""
+        if not isinstance(message, IlluminatorStatus) or self._before is None or self.consent:
+            return ''
+        status, allowed = Status.from_message(message), NOTHING
+        if self.runner.restoring and self._before.enabled:
+            allowed = _saved(self._before)
+        # The brightness as sent: one of more than 100 % is not valid, and dazzles.
+        bright = message.brightness > max(allowed.brightness, DIM) + ROUNDING
+        strobes = _strobes(status.configuration(NOTHING)) and not _strobes(allowed)
+        if not (status.enabled and (bright or strobes)):
+            self._is_safe = True
+            return ''
+        if not self._is_safe:
+            return ''
+        return (f'it is {status_text(status)}; without consent it must neither strobe nor be '
+                f'brighter than {DIM:g} %')
 
 
 def _saved(status: Status) -> Configuration:

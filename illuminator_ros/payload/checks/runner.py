@@ -99,8 +99,9 @@ class CheckRunner(Generic[T]):
                 await self._session.sleep(0.0)
                 self._add(await self._check(one, missing))
         except Interrupted:
+            reason = 'stopped' if self._session.danger else 'interrupted'
             for one in self._requirements[len(self.results):]:
-                self._add(Result(one, Verdict.SKIPPED, 'interrupted', reached=False))
+                self._add(Result(one, Verdict.SKIPPED, reason, reached=False))
         finally:
             self._session.runner.restoring = True
             if self.changed:
@@ -122,6 +123,10 @@ class CheckRunner(Generic[T]):
         except Skipped as error:
             verdict, detail = Verdict.SKIPPED, str(error)
             reached = not isinstance(error, _Unreached)
+        except Interrupted:
+            if not self._session.danger:
+                raise
+            detail = f'stopped: {self._session.danger}'
         except DeviceLost:
             self._lost = detail = f'the {self._checks.device} has stopped sending'
         except Exception as error:
@@ -151,6 +156,10 @@ class CheckRunner(Generic[T]):
                 differing = await self._session.restore()
             except DeviceLost:
                 differing = ['unknown']
+            except Interrupted:
+                # Restoring was dangerous. The session now restores only what is safe.
+                self._session.runner.restoring = True
+                continue
             if not differing or self._session.now >= until:
                 break
             await self._session.sleep(RESTORE_PAUSE)
@@ -158,3 +167,5 @@ class CheckRunner(Generic[T]):
         self.restored = f'the {device} is as it was{self._checks.traces}' if not differing else (
             f'THE {device.upper()} IS NOT AS IT WAS ({", ".join(differing)}): it was '
             + self._session.saved)
+        if self._session.danger:
+            self.restored = f'stopped: {self._session.danger}; {self.restored}'

@@ -167,6 +167,7 @@ class Session(Endpoint):
     :cvar component: the component id that alone identifies a device, see :class:`Components`.
     :cvar discovery: a message that is requested of all components until the device is found.
     :ivar consent: whether the operator has agreed to the checks that need consent.
+    :ivar danger: why the run was stopped, '' if it was not; see :meth:`danger_of`.
     :ivar runner: runs the coroutines.
     :ivar idle_until: end of the time in which the session only listened, s.
     :ivar transactions: all commands.
@@ -181,6 +182,7 @@ class Session(Endpoint):
         self.address = conditions.address
         self.conditions = conditions
         self.consent = False
+        self.danger = ''
         self.components = Components(self.address, conditions.target, self.component)
         self.record = Record(self.messages)
         self.runner = CoroutineRunner()
@@ -208,6 +210,14 @@ class Session(Endpoint):
         return (f'COMMAND_ACK {command_name(message.command)}: {result_name(message.result)}'
                 + (f', progress {message.progress}' if progress else '')
                 + (f' to {target}' if any(target) else ''))
+
+    def danger_of(self, message: Message) -> str:
+        """
+        Return why the run must stop at once, '' if a message of the device shows no reason.
+
+        Then :meth:`restore` must bring the device to a safe state.
+        """
+        return ''
 
     @property
     def saved(self) -> str:
@@ -247,6 +257,11 @@ class Session(Endpoint):
             self.record.add(message, now)
             if isinstance(message, CommandAck):
                 self._acknowledge(message, line)
+            if not self.danger and (danger := self.danger_of(message)):
+                self.danger = danger
+                # Restoring is stopped, too.
+                self.runner.restoring = False
+                self.runner.interrupt(now)
         self.runner.advance(now)
 
     def _acknowledge(self, ack: CommandAck, line: str) -> None:

@@ -28,7 +28,15 @@ from sensor_msgs.msg import NavSatFix, NavSatStatus
 from std_msgs.msg import Bool, Header, UInt32
 from std_srvs.srv import Trigger
 
-from .diagnostics import reports, topics, why_no_camera, why_unused
+from .diagnostics import (
+    missing,
+    reports,
+    shared_topics,
+    Topic,
+    topics,
+    why_no_camera,
+    why_unused,
+)
 from .inputs import subscriptions
 from ..client import (
     CameraConnected,
@@ -71,6 +79,9 @@ EARTH_FRAME = 'map'
 # s in which a publisher of ~/mount is discovered; shorter than the 5 s for which the camera keeps
 # what it got before a restart of the node.
 DISCOVERY_TIME = 2.0
+
+# s between counts of the publishers of the inputs.
+COUNT_INTERVAL = 1.0
 
 PUBLICATIONS = (
     Endpoint('connected', Bool, "the camera's heartbeat is heard"),
@@ -129,7 +140,9 @@ class CameraNode(ServedPayload):
         # The states of the inputs as they were logged.
         self._states: dict[Input, InputState] = {}
         self._geoid_is_known = GEOID_SEPARATION.name in given_parameters(host.node)
-        self._mount_topic = host.node.resolve_topic_name(f'~/{Input.MOUNT.value}')
+        self._topics = {one: host.node.resolve_topic_name(f'~/{one.value}') for one in Input}
+        self._graph: dict[Input, Topic] = {}
+        self._count_due = -math.inf
         self._interface = NodeInterface(
             host.node, host.link, host.log, publications=PUBLICATIONS,
             services=(
@@ -173,10 +186,13 @@ class CameraNode(ServedPayload):
 
     def _capture(self, shot: Shot) -> Callable[[Trigger.Request, float, Answer], None]:
         def capture(request: Trigger.Request, now: float, answer: Answer) -> None:
+            before = self._lacking(now)
+
             def done(success: bool, message: str) -> None:
-                lacking = self._client.feeder.snapshot(self._host.link.clock()).lacking
+                # The camera may have taken the image at any time between.
+                lacking = dict.fromkeys((*before, *self._lacking(self._host.link.clock())))
                 if success and lacking:
-                    message += f', without {", ".join(map(topics, lacking))}'
+                    message += f', without {", ".join(lacking)}'
                 answer(success, message)
 
             if absence := self._absence(now):
@@ -185,6 +201,12 @@ class CameraNode(ServedPayload):
                 self._client.capture(shot, now, done)
 
         return capture
+
+    def _lacking(self, now: float) -> list[str]:
+        """Return the state that the camera does not get, for people."""
+        feeder = self._client.feeder.snapshot(now)
+        pair = [f'attitude and mount ({feeder.no_pair})'] if feeder.no_pair else []
+        return [*map(topics, feeder.lacking), *pair]
 
     def _set_mount(
         self, changes: Mapping[str, object], now: float, answer: Callable[[str], None],
@@ -215,8 +237,18 @@ class CameraNode(ServedPayload):
             if absence := self._absence(now):
                 self._host.log.warning(absence)
         self._log_inputs(now)
+        if now >= self._count_due:
+            self._count_due = now + COUNT_INTERVAL
+            self._graph = {one: Topic(name, self._host.node.count_publishers(name))
+                           for one, name in self._topics.items()}
+            self._host.log.write_conditions(shared_topics(self._graph), 'shared input')
+            # Publishers and their first messages take some time.
+            if self._absence_due == math.inf:
+                self._host.log.write_conditions(
+                    missing(self._client.feeder.snapshot(now), self._graph), 'missing input')
         orientation = self._client.feeder.orientation
-        if orientation.mount_is_fixed and self._host.node.count_publishers(self._mount_topic):
+        if orientation.mount_is_fixed and self._host.node.count_publishers(
+                self._topics[Input.MOUNT]):
             orientation.expect_mount()
             self._host.log.info('~/mount has a publisher: the mount is not fixed')
         if self._transforms and orientation.fixed_mount and now >= self._frame_due:
@@ -274,7 +306,7 @@ class CameraNode(ServedPayload):
     def _take_snapshot(self, now: float) -> MakeReports:
         return functools.partial(
             reports, camera=self._client.snapshot(now),
-            feeder=self._client.feeder.snapshot(now), started=self._started,
+            feeder=self._client.feeder.snapshot(now), graph=self._graph, started=self._started,
             geoid_is_known=self._geoid_is_known)
 
 

@@ -16,8 +16,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Mapping, Sequence
 import math
+from typing import NamedTuple
 
 from ..client import CameraSnapshot
 from ..feeder import FeederSnapshot
@@ -54,9 +55,24 @@ CAMERA_VALUES = {
 }
 
 
+class Topic(NamedTuple):
+    """The topic of an input, with its name in the graph and the number of its publishers."""
+
+    name: str
+    publishers: int
+
+    def __str__(self) -> str:
+        count = self.publishers
+        return f'{self.name} has {count or "no"} publisher{"s" if count > 1 else ""}'
+
+
+# The topics whose publishers have been counted.
+Topics = Mapping[Input, Topic]
+
+
 def reports(
-    link: LinkDiagnostics, *, camera: CameraSnapshot, feeder: FeederSnapshot, started: float,
-    geoid_is_known: bool,
+    link: LinkDiagnostics, *, camera: CameraSnapshot, feeder: FeederSnapshot, graph: Topics,
+    started: float, geoid_is_known: bool,
 ) -> list[Report]:
     """
     Return the reports of the node.
@@ -64,7 +80,7 @@ def reports(
     :param started: when the node was started, s on the link's clock.
     :param geoid_is_known: whether ``geoid_separation`` is set.
     """
-    findings = camera_findings(camera) + input_findings(feeder)
+    findings = camera_findings(camera) + input_findings(feeder, graph)
     if not geoid_is_known:
         findings.append((WARN, 'geoid_separation is not set, so altitudes are above the '
                                'ellipsoid'))
@@ -95,8 +111,8 @@ def camera_findings(camera: CameraSnapshot) -> list[Finding]:
     return findings
 
 
-def input_findings(feeder: FeederSnapshot) -> list[Finding]:
-    """Return a finding for each input that is missing, stale or refused."""
+def input_findings(feeder: FeederSnapshot, graph: Topics) -> list[Finding]:
+    """Return a finding for each input that is missing, stale, refused or shared."""
     findings: list[Finding] = []
     optional = set(Input).difference(*feeder.needed)
     for group in (*feeder.needed, *((name,) for name in Input if name in optional)):
@@ -110,13 +126,33 @@ def input_findings(feeder: FeederSnapshot) -> list[Finding]:
                 break
         else:
             if group in feeder.needed:
-                findings.append((WARN, f'nothing received on {topics(group)}'))
-    return findings
+                findings.append((WARN, nothing_received(group, graph)))
+    if feeder.no_pair:
+        findings.append((WARN, f'attitude and mount are not sent: {feeder.no_pair}'))
+    return findings + [(WARN, text) for text in shared_topics(graph)]
 
 
 def topics(names: Sequence[Input]) -> str:
     """Return the topics of alternative inputs, for people."""
     return ' or '.join(f'~/{name.value}' for name in names)
+
+
+def nothing_received(names: Sequence[Input], graph: Topics) -> str:
+    """Return that nothing is received on the topics of alternative inputs, for people."""
+    known = '; '.join(str(graph[name]) for name in names if name in graph)
+    return f'nothing received on {topics(names)}' + (f' ({known})' if known else '')
+
+
+def missing(feeder: FeederSnapshot, graph: Topics) -> Iterable[str]:
+    """Return a text for each required input of which no message has ever been received."""
+    return (nothing_received(group, graph) for group in feeder.needed
+            if all(feeder.inputs[name].state is InputState.MISSING for name in group))
+
+
+def shared_topics(graph: Topics) -> Iterable[str]:
+    """Return a text for each topic with several publishers."""
+    return (f'{topics([name])}: {topic}, so images may get values of each in turn'
+            for name, topic in graph.items() if topic.publishers > 1)
 
 
 def why_unused(name: Input, snapshot: InputSnapshot) -> str:

@@ -1,0 +1,36 @@
+# Copyright 2026 The illuminator_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""The state of the vehicle, as the autopilot on the link reports it."""
+
+from illuminator_ros.gimbal.vehicle_state import VehicleState
+from illuminator_ros.mavlink.messages import Address
+from illuminator_ros.payload.messages import Attitude, GlobalPositionInt
+import pytest
+
+DEVICE = Address(1, 154)
+
+
+@pytest.mark.parametrize('wrong', [
+    Attitude(0, 1e30, 0.0, 0.5, 0.0, 0.0, 0.0), Attitude(0, 0.0, 0.0, 1e30, 0.0, 0.0, 0.0),
+    Attitude(0, 0.0, 0.0, 0.5, 0.0, 0.0, 1e30),
+    GlobalPositionInt(0, 900_000_001, 1, 0, 0, 0, 0, 0, 0),
+    GlobalPositionInt(0, 1, -1_800_000_001, 0, 0, 0, 0, 0, 0),
+    GlobalPositionInt(0, 0, 0, 0, 0, 0, 0, 0, 0)], ids=str)
+def test_values_that_cannot_be_right_are_ignored(wrong: Attitude | GlobalPositionInt) -> None:
+    vehicle = VehicleState()
+    vehicle.take(wrong, 1.0)
+    assert vehicle.heading(1.0) is None
+    assert vehicle.position(1.0) is None
+    assert vehicle.for_device(DEVICE, 1.0) is None
