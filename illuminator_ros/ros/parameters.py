@@ -55,7 +55,8 @@ class ParameterSpec(NamedTuple):
     :param low: and ``high``, the range of a number, both ends included.
     :param choices: the permitted values of a string.
     :param constraints: other conditions on the value, for people.
-    :param restricts: whether it limits or protects something, so that a misspelt name is an error.
+    :param restricts: whether it limits or protects something, so that the node does not start
+        where it has no effect: by a misspelt name, or for a node that does not exist.
     :param changeable: whether it may be set while the node runs, see
         :class:`ChangeableParameters`.
     """
@@ -159,7 +160,8 @@ LINK_PARAMETERS = (
     ParameterSpec('diagnostics_period', 1.0, 'period of /diagnostics', 's', 0.1, 60.0),
     ParameterSpec('signing_mode', 'off', 'MAVLink 2 message signing',
                   choices=tuple(mode.value for mode in SigningMode), restricts=True),
-    ParameterSpec('signing_key_file', '', 'path of the signing key, readable by its owner only'),
+    ParameterSpec('signing_key_file', '', 'path of the signing key, readable by its owner only',
+                  restricts=True),
 )
 
 

@@ -40,7 +40,7 @@ GIMBAL_PARAMETERS = (
     ParameterSpec('auto_take_control', False,
                   'take control of a gimbal that no component controls when it connects'),
     ParameterSpec('setpoint_timeout', 0.5, 'silence of ~/cmd/rate after which zero is sent', 's',
-                  0.05, 60.0, changeable=True),
+                  0.05, 60.0, restricts=True, changeable=True),
     *FRAME_PARAMETERS,
     PUBLISH_TF,
     GEOID_SEPARATION,
