@@ -84,10 +84,9 @@ class Gimbals(ServedPayload):
             GimbalNode.bind)
         client.events.subscribe(self._take)
 
-    def _change_parameters(self, values: Values) -> None:
-        """Take parameters that were set, in any thread."""
-        self._host.link.do(
-            functools.partial(self._client.change_settings, settings(values)))
+    def _change_parameters(self, values: Values, now: float) -> None:
+        """Take parameters that were set."""
+        self._client.change_settings(settings(values), now)
 
     def _take(self, event: GimbalEvent) -> None:
         if isinstance(event, GimbalForgotten):

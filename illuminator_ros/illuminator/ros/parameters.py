@@ -153,7 +153,8 @@ def check_not_loosened(values: Values, start: Values) -> None:
                 f'given at the start: restart the node with -p {name}:=VALUE')
 
 
-@functools.cache
+# The nodes of all lights have the same limits.
+@functools.lru_cache(1)
 def device_parameters(limits: SafetyLimits) -> tuple[ParameterSpec, ...]:
     """Return the parameters of a light, with limits in their descriptions."""
     notes = {}
