@@ -133,6 +133,8 @@ def test_other_thread_with_many_calls_waits_for_the_link(monkeypatch: pytest.Mon
             live.link.call(count)
             made.append(number)
 
+    # No other call waits from then on.
+    live.wait_open()
     live.link.call(hold)
     assert is_held.wait(PATIENCE)
     caller = threading.Thread(target=make_calls)
