@@ -34,6 +34,8 @@ from illuminator_ros.mavlink.dialect import decode, mavlink
 from support.frames import Codec
 
 LIGHT = mav.Address(1, 243)
+# The component id of the first of more lights than there are ids from that one on.
+FIRST_OF_MANY = 201
 S = TypeVar('S', bound='Side')
 E = TypeVar('E', bound='SerialEnd')
 
@@ -153,8 +155,9 @@ class MinimalLight(Side):
 @contextlib.contextmanager
 def serving(port: int, count: int = 1) -> Iterator[list[MinimalLight]]:
     """Serve lights, each in a thread of this process."""
+    first = LIGHT.component if count <= 12 else FIRST_OF_MANY
     with contextlib.ExitStack() as stack:
-        lights = [stack.enter_context(MinimalLight(port, mav.Address(1, 243 + number)))
+        lights = [stack.enter_context(MinimalLight(port, mav.Address(1, first + number)))
                   for number in range(count)]
         ended = threading.Event()
         for light in lights:
@@ -165,11 +168,19 @@ def serving(port: int, count: int = 1) -> Iterator[list[MinimalLight]]:
         yield lights
 
 
-if __name__ == '__main__':
-    # A light in a process of its own, which sends to the given UDP port.
+def _main(port: int, count: int = 1) -> None:
+    """Serve lights in a process of their own, which send to a UDP port, until SIGINT."""
     print('ready', flush=True)
-    with contextlib.suppress(KeyboardInterrupt), MinimalLight(int(sys.argv[1])) as own:
-        own.serve(threading.Event())
+    with contextlib.suppress(KeyboardInterrupt):
+        if count > 1:
+            with serving(port, count):
+                threading.Event().wait()
+        with MinimalLight(port) as own:
+            own.serve(threading.Event())
+
+
+if __name__ == '__main__':
+    _main(*map(int, sys.argv[1:]))
 
 
 class SerialEnd(ABC):

@@ -121,8 +121,8 @@ connection URLs, with their meanings in MAVROS, MAVSDK and pymavlink:
 Each further kind in payloads has a node of its own, with the parameters that --help of its
 executable shows: -p gimbal:setpoint_timeout:=0.2 sets that of the node gimbal.
 
-exit status: 0 after SIGINT, SIGTERM or SIGHUP; 1 if a package is missing; 2 if an argument or
-parameter is wrong.
+exit status: 0 after a signal (SIGINT, SIGTERM, SIGQUIT ...); 1 if a package is missing; 2 if an
+argument or parameter is wrong.
 """
 
 

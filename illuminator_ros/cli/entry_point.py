@@ -16,7 +16,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 import contextlib
 import io
 import os
@@ -53,17 +53,14 @@ class Refusal(Exception):
     """Why a program cannot start, for people."""
 
 
-def run_program(
-    name: str, run: Callable[[Termination], int], more: Iterable[int] = (),
-) -> int:
+def run_program(name: str, run: Callable[[Termination], int]) -> int:
     """
     Run a program and return its exit status.
 
     :param run: must import its modules itself, so that a signal meanwhile ends the process.
-    :param more: signals that end it too, see :class:`Termination`.
     """
     escape_output()
-    termination = Termination(more)
+    termination = Termination()
     status = explained(name, lambda: run(termination))
     termination.finish()
     return status

@@ -12,12 +12,12 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""The orderly end of a process within a time limit, on SIGINT, SIGTERM and SIGHUP."""
+"""The orderly end of a process within a time limit, on each signal that would end it."""
 
 from __future__ import annotations
 
 import atexit
-from collections.abc import Callable, Iterable
+from collections.abc import Callable
 import contextlib
 import math
 import os
@@ -29,7 +29,13 @@ from typing import NoReturn
 
 from .output_queue import OutputQueue
 
-SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
+# The signals that end a process by default: SIGQUIT of a terminal (Ctrl-\\), SIGUSR1 of a script,
+# SIGABRT of a watchdog ... Where one is the fault of the process itself, the kernel ends the
+# process although it is blocked.
+ENDING = frozenset({signal.SIGINT, signal.SIGTERM, *(
+    one for one in signal.valid_signals() if signal.getsignal(one) == signal.SIG_DFL)}) - {
+        signal.SIGKILL, signal.SIGSTOP, signal.SIGCONT, signal.SIGTSTP, signal.SIGTTIN,
+        signal.SIGTTOU, signal.SIGCHLD, signal.SIGURG, signal.SIGWINCH}
 # s from the signal to the exit, even if something hangs.
 LIMIT = 0.85
 # s in which queued output must be written: at an exit without a signal, since a busy machine may
@@ -48,15 +54,13 @@ class Termination:
     imports and is printed by destructors, and C code that waits sees no flag. So the signals are
     blocked in this thread and in the threads that it starts, and one thread waits for them.
 
-    :param more: signals beside SIGINT, SIGTERM and SIGHUP. Under nohup SIGHUP is left ignored.
+    A signal that is ignored is left ignored, as SIGHUP is under nohup, except SIGINT and SIGTERM.
+
     :ivar is_terminal: whether stderr leads to a terminal.
     """
 
-    def __init__(self, more: Iterable[int] = ()) -> None:
-        # sigwait() would return a blocked signal although it is ignored.
-        ignored = {signal.SIGHUP} if signal.getsignal(signal.SIGHUP) == signal.SIG_IGN else set()
-        self._signals: set[int] = {*SIGNALS, *more} - ignored
-        signal.pthread_sigmask(signal.SIG_BLOCK, self._signals)
+    def __init__(self) -> None:
+        signal.pthread_sigmask(signal.SIG_BLOCK, ENDING)
         self.is_terminal = sys.stderr is not None and sys.stderr.isatty()
         self._output: OutputQueue | None = None
         self._lock = threading.Lock()
@@ -98,7 +102,7 @@ class Termination:
                            HURRIED_OUTPUT_LIMIT))
 
     def _wait(self) -> None:
-        signal.sigwait(self._signals)
+        signal.sigwait(ENDING)
         with self._lock:
             self._deadline = time.monotonic() + LIMIT
             self._signalled = True

@@ -68,6 +68,11 @@ class LineUser(ABC):
     def silent(self, line: Line, now: float) -> None:
         """Note that no peer is heard over an open line; repeated."""
 
+    @property
+    @abstractmethod
+    def is_behind(self) -> bool:
+        """Whether it has not taken all received frames yet: no more must be read."""
+
     @abstractmethod
     def behind(self, line: Line, peer: Peer, now: float) -> None:
         """Note that the signing clock of a sender that is not a peer is behind."""
@@ -281,7 +286,7 @@ class Line:
         try:
             if events & selectors.EVENT_WRITE:
                 channel.writable(handle)
-            if events & selectors.EVENT_READ:
+            if events & selectors.EVENT_READ and not self._user.is_behind:
                 for peer, data in channel.receive(handle):
                     now = self._clock()
                     frames = self.receiver.take(peer, data, now)

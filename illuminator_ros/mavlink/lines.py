@@ -16,6 +16,7 @@
 
 from __future__ import annotations
 
+from collections import deque
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 import logging
 import math
@@ -50,7 +51,9 @@ class Lines(LineUser):
     All lines are equal. With one line nothing is forwarded, between its peers neither.
 
     :param urls: of each line, by its label.
-    :param call: calls a function in the thread of the link, given the time, s.
+    :param call: calls a function in the thread of the link, given the time, s; ``call_first`` does
+        so before others that wait.
+    :param is_turn_over: returns whether no more messages must be taken in this turn of the thread.
     :param mavlink_version: 1 or 2, of the frames that are sent; both are received.
     :param wall_clock: s, Unix time, for the signing time stamps.
     :ivar forwarded_commands: the commands of others that were forwarded lately.
@@ -60,6 +63,7 @@ class Lines(LineUser):
     def __init__(
         self, urls: Sequence[tuple[str, Url]], endpoint: Endpoint, *, faults: FaultLog,
         selector: selectors.BaseSelector, call: Callable[[Callable[[float], None]], None],
+        call_first: Callable[[Callable[[float], None]], None], is_turn_over: Callable[[], bool],
         signing: Signing, mavlink_version: int, clock: Callable[[], float],
         wall_clock: Callable[[], float],
     ) -> None:
@@ -71,6 +75,11 @@ class Lines(LineUser):
         self._classes = {cls.id: cls for cls in endpoint.messages}
         self._faults = faults
         self._clock = clock
+        self._call_first = call_first
+        self._is_turn_over = is_turn_over
+        # Messages that wait for the next turn, of one read, and their lines.
+        self._received: deque[tuple[Line, ReceivedFrame]] = deque()
+        self._is_behind = False
         self._version = mavlink_version
         self._duplicates = DuplicateFilter() if len(urls) > 1 else None
         self.forwarded_commands = ForwardedCommands()
@@ -162,6 +171,7 @@ class Lines(LineUser):
 
     def lost(self, heard: Sequence[Address], reason: str, now: float) -> None:
         """See :meth:`LineUser.lost`."""
+        self._received = deque(one for one in self._received if one[0].is_open)
         if not any(line.is_open for line in self._lines):
             self._heard_at = -math.inf
             self._sender.clear()
@@ -205,10 +215,21 @@ class Lines(LineUser):
         self._heard_at = now
         if self._duplicates is not None:
             self._faults.call(self._forward, line, peer, frames, now)
-        for frame, sender in frames:
-            cls = self._classes.get(frame.message_id)
-            if cls is None:
-                continue
+        self._received += ((line, one) for one in frames if one[0].message_id in self._classes)
+        if not self._is_behind and not self._must_wait():
+            self._take_received(now)
+
+    @property
+    def is_behind(self) -> bool:
+        """See :meth:`LineUser.is_behind`."""
+        return self._is_behind
+
+    def _take_received(self, now: float) -> None:
+        """Take messages while the turn lasts; the next turn takes the rest before other calls."""
+        self._is_behind = False
+        while self._received:
+            _, (frame, sender) = self._received.popleft()
+            cls = self._classes[frame.message_id]
             if self._endpoint.inspect is not None:
                 self._faults.call(self._endpoint.inspect, frame, cls)
             message = decode(cls, frame.payload, sender)
@@ -216,6 +237,16 @@ class Lines(LineUser):
                 _frame_log.debug('received from %s: %s', frame.source, line_of(message),
                                  extra={'address': frame.source})
             self._faults.call(self._endpoint.receive, frame.source, message, now)
+            if self._must_wait():
+                return
+
+    def _must_wait(self) -> bool:
+        """Return whether messages wait for the next turn, and have it take them."""
+        if not self._received or not self._is_turn_over():
+            return False
+        self._is_behind = True
+        self._call_first(self._take_received)
+        return True
 
     def _forward(
         self, line: Line, peer: Peer, frames: Sequence[ReceivedFrame], now: float,

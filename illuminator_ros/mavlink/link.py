@@ -75,7 +75,9 @@ class Link:
             label, self._work, self._finish, self._faults, clock, selector)
         self.lines = Lines(
             [(label, url), *further.items()], endpoint, faults=self._faults,
-            selector=self._thread.selector, call=self._thread.call, signing=self._signing,
+            selector=self._thread.selector, call=self._thread.call,
+            call_first=self._thread.call_first, is_turn_over=self._thread.is_turn_over,
+            signing=self._signing,
             mavlink_version=mavlink_version, clock=clock, wall_clock=wall_clock)
 
     # From any thread
@@ -107,9 +109,9 @@ class Link:
         """Have ``function(now)`` called in the link's thread, unless the thread has ended."""
         self._thread.call(function)
 
-    def do(self, function: Callable[[float], None]) -> None:
-        """Call ``function(now)`` at once if this is the link's thread, else have it called."""
-        self._thread.do(function)
+    def call_first(self, function: Callable[[float], None]) -> None:
+        """Have ``function(now)`` called in the link's thread, before the calls that wait."""
+        self._thread.call_first(function)
 
     # In the link's thread
 

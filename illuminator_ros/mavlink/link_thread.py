@@ -28,6 +28,12 @@ import threading
 
 # s; the longest wait.
 MAX_WAIT = 10.0
+# s after which a turn begins no more messages and calls, so that the deadlines have their turn.
+TURN_TIME = 0.001
+# Calls that wait; another thread with one more waits for room, for this time at most, s, since
+# this thread may hang.
+MAX_CALLS = 2
+ROOM_TIMEOUT = 0.25
 # s; the pause of a loop after an exception, and the shortest time between log lines.
 FAULT_PAUSE = 0.1
 FAULT_LOG_INTERVAL = 1.0
@@ -71,6 +77,9 @@ class LinkThread:
     """
     Waits for descriptors, calls and deadlines, and handles each in this thread.
 
+    No number of calls delays frames and deadlines: a turn begins no call after its time, except
+    its first one, and other threads that call too often wait.
+
     :param label: names the link in errors.
     :param work: called after each wait; returns when it must be called again, s.
     :param finish: called at the end.
@@ -91,7 +100,12 @@ class LinkThread:
         self._faults = faults
         self._clock = clock
         self._due = 0.0
+        # When the turn begins no more messages and calls, s.
+        self._turn_ends = math.inf
         self._calls: deque[Callable[[float], None]] = deque()
+        # Set while few calls wait.
+        self._room = threading.Event()
+        self._room.set()
         self._wake_out, self._wake_in = socket.socketpair()
         self._wake_out.setblocking(False)
         self._wake_in.setblocking(False)
@@ -136,16 +150,23 @@ class LinkThread:
         return self._thread.is_alive()
 
     def call(self, function: Callable[[float], None]) -> None:
-        """Have ``function(now)`` called in this thread, unless the thread has ended."""
+        """
+        Have ``function(now)`` called in this thread, unless the thread has ended.
+
+        Another thread waits first while :data:`MAX_CALLS` calls wait.
+        """
+        if threading.current_thread() is not self._thread and self._thread.is_alive():
+            self._room.wait(ROOM_TIMEOUT)
         self._calls.append(function)
+        if len(self._calls) >= MAX_CALLS:
+            # The thread wakes after this, and sets it again.
+            self._room.clear()
         self._wake()
 
-    def do(self, function: Callable[[float], None]) -> None:
-        """Call ``function(now)`` at once if this is the thread, otherwise see :meth:`call`."""
-        if threading.current_thread() is self._thread:
-            function(self._clock())
-        else:
-            self.call(function)
+    def call_first(self, function: Callable[[float], None]) -> None:
+        """Have ``function(now)`` called in this thread, before the calls that wait."""
+        self._calls.appendleft(function)
+        self._wake()
 
     def _wake(self) -> None:
         # A full buffer has woken the thread already; a closed one has no thread to wake.
@@ -156,16 +177,21 @@ class LinkThread:
 
     def pause(self, seconds: float) -> None:
         """Wait for calls only, if that takes 1 ms at least: poll() cannot wait for less."""
-        if seconds >= 0.001:
+        if seconds >= 0.001 and not self._calls:
             self._calls_only.poll(1000 * seconds)
+
+    def is_turn_over(self) -> bool:
+        """Return whether this turn must begin no more messages and calls."""
+        return self._clock() >= self._turn_ends
 
     def run_once(self) -> None:
         """Wait once, and handle everything that is ready or due."""
-        wait = max(self._due - self._clock(), self._faults.pause)
+        wait = max(self._due - self._clock(), self._faults.pause) if not self._calls else 0.0
         self._faults.pause = 0.0
         # A stop of the process (SIGSTOP, docker pause) interrupts the wait, which then finds
         # nothing. Frames that came meanwhile precede the deadlines that have passed.
         ready = self.selector.select(min(wait, MAX_WAIT)) or self.selector.select(0)
+        self._turn_ends = self._clock() + TURN_TIME
         for key, events in ready:
             key.data(key.fileobj, events)
         self._run_calls()
@@ -178,6 +204,10 @@ class LinkThread:
     def _run_calls(self) -> None:
         for _ in range(len(self._calls)):
             self._faults.call(self._calls.popleft(), self._clock())
+            if self.is_turn_over():
+                break
+        if len(self._calls) < MAX_CALLS:
+            self._room.set()
 
     def _run(self) -> None:
         while not self._stopping.is_set():
@@ -186,6 +216,7 @@ class LinkThread:
             except Exception:
                 self._faults.log()
                 self._stopping.wait(FAULT_PAUSE)
+        self._turn_ends = math.inf
         self._run_calls()
         self._faults.call(self._finish)
         self._release()

@@ -23,6 +23,7 @@ import itertools
 import logging
 import math
 import queue
+import sys
 import threading
 import time
 from typing import NamedTuple
@@ -57,6 +58,8 @@ from ..payload.payload_type import PayloadType
 OFF_LIMIT = 0.6
 STOP_LIMIT = 0.15
 THREADS_LIMIT = 0.05
+# s for which the interpreter runs one of several busy threads, at the end.
+SWITCH_INTERVAL = 0.0005
 # s in which other processes read the last messages; no event tells that they have.
 READING_TIME = 0.02
 # s between checks of the diagnostics, and the minimum between two checks after events.
@@ -191,6 +194,9 @@ class Bridge:
             if self._ended.is_set():
                 return
             self._ended.set()
+        # By default the link's thread waits for 5 ms after each OFF that it sends while the
+        # executor's thread is busy.
+        sys.setswitchinterval(SWITCH_INTERVAL)
         if self.link.is_running():
             self._shut_down_devices()
         self.link.stop(STOP_LIMIT)
@@ -244,7 +250,7 @@ class Bridge:
             reports.put((self.log, None, logging.DEBUG, 'the link answers'))
 
         deadline = time.monotonic() + OFF_LIMIT
-        self.link.call(start)
+        self.link.call_first(start)
         with contextlib.suppress(queue.Empty):
             while self._late:
                 log, key, severity, text = reports.get(

@@ -41,10 +41,11 @@ HOLDER_VALUES = {
 }
 SOURCE_PARAMETERS = (
     ParameterSpec('sources', [],
-                  'sources of commands, the highest first; empty = commands have no sources'),
+                  'sources of commands, the highest first; empty = commands have no sources',
+                  restricts=True),
     ParameterSpec('source_timeout', 0.0,
                   'silence after which a source loses the device; 0 = never',
-                  's', 0.0, 3600.0, changeable=True),
+                  's', 0.0, 3600.0, restricts=True, changeable=True),
 )
 
 

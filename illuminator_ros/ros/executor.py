@@ -82,7 +82,7 @@ class DeferredService:
 
 class NodeExecutor(SingleThreadedExecutor):
     """
-    Runs the services and subscriptions of nodes, one callback after the other.
+    Runs the services, subscriptions and guard conditions of nodes, one callback after the other.
 
     It does not run timers, clients and waitables.
     """
@@ -161,7 +161,11 @@ class NodeExecutor(SingleThreadedExecutor):
             timeout = math.inf if timeout_sec is None else timeout_sec
             if self._calls:
                 timeout = min(self._calls[0][0] - time.monotonic(), timeout)
-            services, subscriptions = self._wait_set.wait(max(timeout, 0.0))
+            guards, services, subscriptions = self._wait_set.wait(max(timeout, 0.0))
+            # First, so that a request finds what was called before it was sent.
+            for guard in guards:
+                if guard.callback is not None:
+                    guard.callback()
             for service in services:
                 self._serve(service)
             for subscription in subscriptions:
@@ -252,30 +256,34 @@ class _WaitSet:
     def __init__(self, nodes: list[Node], wakeup: GuardCondition, context: Context) -> None:
         services = [one for node in nodes for one in node.services]
         subscriptions = [one for node in nodes for one in node.subscriptions]
-        self._guards = [wakeup, *(one for node in nodes for one in node.guards)]
+        guards = [wakeup, *(one for node in nodes for one in node.guards)]
         with contextlib.ExitStack() as stack:
             # Untyped: they have no common class.
-            entities: tuple[Any, ...] = (*services, *subscriptions, *self._guards, context)
+            entities: tuple[Any, ...] = (*services, *subscriptions, *guards, context)
             for one in entities:
                 stack.enter_context(one.handle)
             self._services = {service.handle.pointer: service for service in services}
             self._subscriptions = {one.handle.pointer: one for one in subscriptions}
+            self._guards = {one.handle.pointer: one for one in guards}
             self._wait_set = _rclpy.WaitSet(
-                len(subscriptions), len(self._guards), 0, 0, len(services), 0, context.handle)
+                len(subscriptions), len(guards), 0, 0, len(services), 0, context.handle)
             self._stack = stack.pop_all()
 
-    def wait(self, timeout: float) -> tuple[list[Service], list[Subscription]]:
-        """Wait, and return the services and subscriptions that are ready."""
+    def wait(
+        self, timeout: float,
+    ) -> tuple[list[GuardCondition], list[Service], list[Subscription]]:
+        """Wait, and return the guard conditions, services and subscriptions that are ready."""
         wait_set = self._wait_set
         wait_set.clear_entities()
         for service in self._services.values():
             wait_set.add_service(service.handle)
         for subscription in self._subscriptions.values():
             wait_set.add_subscription(subscription.handle)
-        for guard in self._guards:
+        for guard in self._guards.values():
             wait_set.add_guard_condition(guard.handle)
         wait_set.wait(-1 if timeout == math.inf else int(timeout * 1e9))
-        return ([self._services[one] for one in wait_set.get_ready_entities('service')],
+        return ([self._guards[one] for one in wait_set.get_ready_entities('guard_condition')],
+                [self._services[one] for one in wait_set.get_ready_entities('service')],
                 [self._subscriptions[one] for one in wait_set.get_ready_entities('subscription')])
 
     def close(self) -> None:

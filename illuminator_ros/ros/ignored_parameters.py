@@ -16,7 +16,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence, Set
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence, Set
 import difflib
 from pathlib import Path
 import re
@@ -29,6 +29,8 @@ from .parameters import ParameterError
 
 # Parameters that each node of rclpy has.
 _OF_RCLPY = frozenset({'use_sim_time', 'start_type_description_service'})
+# Characters of a name that are compared with the names of parameters.
+COMPARED = 100
 # Patterns for wildcards in a name of a parameter file (rcl_yaml_param_parser).
 _WILDCARDS = {'*': '/[^/]+', '**': '(/[^/]+)*'}
 
@@ -51,9 +53,28 @@ class _Section(NamedTuple):
     def pattern(self) -> str:
         return '/'.join(self.parts)
 
+    @property
+    def has_wildcard(self) -> bool:
+        return not _WILDCARDS.keys().isdisjoint(self.parts)
+
     def matches(self, node: str) -> bool:
         return re.fullmatch(''.join(
             _WILDCARDS.get(part, '/' + re.escape(part)) for part in self.parts), node) is not None
+
+
+def did_you_mean(name: str, names: Iterable[str]) -> str:
+    """Return a question that follows the refusal of an unknown name; '' if it resembles none."""
+    return _suggestion(_closest(name, names, 0.75))
+
+
+def _closest(name: str, names: Iterable[str], likeness: float) -> str:
+    # The comparison with a long name takes long, and none of ours is long.
+    found = difflib.get_close_matches(name[:COMPARED], [*names], 1, likeness)
+    return found[0] if found else ''
+
+
+def _suggestion(close: str) -> str:
+    return f'; did you mean {close!r}?' if close else ''
 
 
 def ignored_parameters(
@@ -70,14 +91,20 @@ def ignored_parameters(
     :param restrictions: names of parameters that must not be ignored.
     :param of_further_node: returns the parameters of a node that is made later, given its name
         without namespace; None if no node may have that name.
-    :raises ParameterError: if a restriction is ignored, or a file cannot be read.
+    :raises ParameterError: if a restriction is ignored, or a file cannot be read. A section may be
+        for the node of another process with the same file, if a section for one of our nodes by
+        its name has the same restrictions.
     """
     known = {node.get_fully_qualified_name(): frozenset(node.list_parameters([], 0).names)
              for node in nodes}
     namespace, ours = nodes[0].get_namespace().rstrip('/'), {node.get_name() for node in nodes}
     all_names = frozenset().union(*known.values())
     warnings: dict[str, None] = {}
-    for section in _sections(arguments):
+    sections = [*_sections(arguments)]
+    restricted_here = frozenset().union(*(
+        section.names for section in sections
+        if not section.has_wildcard and any(map(section.matches, known))))
+    for section in sections:
         found = [names for node, names in known.items() if section.matches(node)]
         last = ''.join(section.parts[-1:])
         further = of_further_node(last)
@@ -85,21 +112,24 @@ def ignored_parameters(
             found.append(_OF_RCLPY | further)
         if not found:
             here = f'the name here is {", ".join(known)}'
-            if not section.is_file and not restrictions.isdisjoint(section.names):
-                raise ParameterError(f'{section.place} {section.pattern} matches no node; {here}')
+            lost = restrictions & section.names - (
+                restricted_here if section.is_file else frozenset())
+            if lost:
+                raise ParameterError(
+                    f'{section.place} {section.pattern} matches no node; {here}, where '
+                    f'{", ".join(sorted(lost))} would have no effect')
             warnings[f'{section.place} {section.pattern} matches no node and is ignored; '
                      f'{here}'] = None
             continue
         declared = frozenset().union(*found)
-        is_shared = (section.is_file and not _WILDCARDS.keys().isdisjoint(section.parts)
+        is_shared = (section.is_file and section.has_wildcard
                      and declared.isdisjoint(section.names - _OF_RCLPY))
         for name in sorted(section.names - declared):
             # A file may nest the node's name below ros__parameters instead of above it.
             head, _, rest = name.partition('.')
             is_nested = head in ours or of_further_node(head) is not None
-            [close] = difflib.get_close_matches(
-                rest if is_nested else name, all_names, 1, 0.9 if is_shared else 0.75) or ['']
-            reason = 'is unknown' + (f'; did you mean {close!r}?' if close else '')
+            close = _closest(rest if is_nested else name, all_names, 0.9 if is_shared else 0.75)
+            reason = 'is unknown' + _suggestion(close)
             if close == name:
                 owners = (node for node, names in known.items() if name in names)
                 reason = f'is given for {section.pattern}, but is a parameter of {next(owners)}'

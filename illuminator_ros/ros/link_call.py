@@ -16,7 +16,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Hashable
 import threading
 from typing import Any, TypeVar
 
@@ -35,28 +35,30 @@ LinkRequest = Callable[[float, Callable[[T], None]], None]
 
 class LinkCalls:
     """
-    Requests of one kind, for the link's thread.
+    Requests for the link's thread.
 
-    :param limit: how many may wait for their answers; one more is refused at once.
+    :param limit: how many of one kind may wait for their answers; one more is refused at once.
     """
 
     def __init__(self, link: Link, log: NodeLog, limit: int = MAX_PENDING) -> None:
         self._link = link
         self._log = log
         self._limit = limit
-        # The refusal of each request that waits, by the function that ends it. Untyped: the
+        # Kind and refusal of each request that waits, by the function that ends it. Untyped: the
         # answers of requests have different types.
-        self._waiting: dict[Callable[[Any], None], Callable[[str], Any]] = {}
+        self._waiting: dict[Callable[[Any], None], tuple[Hashable, Callable[[str], Any]]] = {}
         self._lock = threading.Lock()
 
     def ask(
         self, request: LinkRequest[T], answer: Callable[[T], None], refusal: Callable[[str], T],
+        kind: Hashable = None,
     ) -> None:
         """
         Start a request.
 
         :param answer: called once with the answer, in any thread.
         :param refusal: returns the answer for a reason why the request cannot be executed.
+        :param kind: an OFF is of another kind than an ON, so that no number of these refuses it.
         """
         def end(value: T) -> None:
             with self._lock:
@@ -73,9 +75,9 @@ class LinkCalls:
                 end(refusal(reason))
 
         with self._lock:
-            busy = len(self._waiting) >= self._limit
+            busy = sum(one == kind for one, _ in self._waiting.values()) >= self._limit
             if not busy:
-                self._waiting[end] = refusal
+                self._waiting[end] = kind, refusal
         if busy:
             answer(refusal(f'busy: {self._limit} requests wait for an answer already'))
             return
@@ -85,5 +87,5 @@ class LinkCalls:
         """Answer the requests that wait with a refusal; callable in any thread."""
         with self._lock:
             waiting = tuple(self._waiting.items())
-        for end, refusal in waiting:
+        for end, (_, refusal) in waiting:
             end(refusal(reason))

@@ -74,7 +74,8 @@ class RequestService:
 
     :param start: called in the link's thread with the request, the time (s), and the function
         that it must call once with success and message, then or later.
-    :param limit: requests that may wait for their answers; one more is answered at once.
+    :param limit: requests with equal ``data`` that may wait for their answers; one more is
+        answered at once.
     """
 
     endpoint: Endpoint
@@ -166,7 +167,8 @@ def _taker(service: RequestService, calls: LinkCalls) -> Take:
             service.start(request, now, lambda success, message: answer(
                 response(success=success, message=message)))
 
-        calls.ask(start, respond, lambda reason: response(success=False, message=reason))
+        calls.ask(start, respond, lambda reason: response(success=False, message=reason),
+                  kind=getattr(request, 'data', None))
 
     return take
 

@@ -17,13 +17,14 @@ The parameter services of a node whose parameters are kept by a device.
 
 rclpy's own answer from synchronous callbacks: while one waits for the device, the executor
 is blocked, and each parameter of a list needs a command of its own. Here a set waits for the
-device's acknowledgement without blocking, and the values of one call are one command.
+device's acknowledgement without blocking, and the values of one call are one command. The
+executor's thread checks them, so that a request costs the link's thread one call at most.
 """
 
 from __future__ import annotations
 
 from array import array
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 import contextlib
 import functools
 from typing import Any
@@ -37,6 +38,7 @@ from rclpy.parameter import Parameter
 from rclpy.qos import qos_profile_services_default, QoSProfile
 
 from .executor import DeferredService, Respond, Take
+from .ignored_parameters import did_you_mean
 from .link_call import LinkCalls
 from .parameters import ChangeableParameters, DeviceParameters, Values
 from .throttled_log import NodeLog
@@ -44,8 +46,10 @@ from ..mavlink.link import Link
 
 Messages = Sequence[ParameterMessage]
 
-# Names in one request; longer lists would delay the other services of the node.
-MAX_NAMES = 1000
+# Names in one request, more than a node has; longer lists would delay the other services.
+MAX_NAMES = 200
+# Unknown names in one request for which similar ones are looked for, each in milliseconds.
+SUGGESTIONS = 10
 # Requests that wait in the middleware, each of the size of a few parameters.
 QUEUE_DEPTH = 100
 # s, in addition to the 0.78 s that a light may take: a set is answered within 0.9 s.
@@ -54,7 +58,9 @@ ANSWER_SPREAD = 0.1
 # Sets values in the device, in the link's thread, given the time (s); calls its last argument
 # once with '' or why the values were not set.
 Configure = Callable[[Values, float, Callable[[str], None]], None]
-# Raises ValueError where the device cannot take a value of a parameter, given its name.
+# Changes the node or its device, in the link's thread, given the time (s).
+Change = Callable[[float], None]
+# Raises ValueError if a parameter cannot have a value, given its name.
 Check = Callable[[str, object], object]
 
 
@@ -63,24 +69,28 @@ class ParameterServices:
     The six parameter services of a node made with ``start_parameter_services=False``.
 
     :param device: the parameters that the device accepts or refuses, None if it has none.
-    :param check: by default as the specification of each parameter.
+    :param check: checks a value without the device, by default as the specification of each
+        parameter.
+    :param check_by_device: checks a value with what is known of the device, in the link's thread.
     :param changeable: the parameters of the node itself that may be set, None if it has none.
     """
 
     def __init__(
         self, node: Node, link: Link, log: NodeLog, device: DeviceParameters | None = None,
-        check: Check | None = None,
+        check: Check | None = None, check_by_device: Check = lambda name, value: None,
         configure: Configure = lambda changes, now, answer: answer(''),
         changeable: ChangeableParameters | None = None,
     ) -> None:
         self._node = node
         self._log = log
-        self._device = device or DeviceParameters(node, ())
+        self._device = device or DeviceParameters(node, (), log)
         specs = self._device.specs
         self._check_value = check or (lambda name, value: specs[name].check(value))
+        self._check_by_device = check_by_device
         self._configure = configure
         self._changeable = changeable
-        self._calls = LinkCalls(link, log)
+        self._link = link
+        self._calls, self._own_calls = LinkCalls(link, log), LinkCalls(link, log)
         qos = QoSProfile(depth=QUEUE_DEPTH,
                          reliability=qos_profile_services_default.reliability)
 
@@ -148,53 +158,107 @@ class ParameterServices:
     def _start(
         self, messages: Messages, atomically: bool, answer: Callable[[list[str]], None],
     ) -> None:
-        """Set parameters; answer with the reason why each was not set, '' if it was."""
-        if self._is_short(messages):
-            self._calls.ask(
-                lambda now, done: self._set_all(messages, atomically, now, done), answer,
-                lambda reason: [reason] * len(messages))
-        else:
+        """
+        Set parameters; answer with the reason why each was not set, '' if it was.
+
+        All those of the node are one change of it, and all those of the device one command.
+
+        :param atomically: set all or none. Those of the node are set first: they can be put back.
+        """
+        if not self._is_short(messages):
             answer([f'{len(messages)} parameters are more than {MAX_NAMES}'])
-
-    # In the link thread
-
-    def _set_all(
-        self, messages: Messages, atomically: bool, now: float,
-        answer: Callable[[list[str]], None],
-    ) -> None:
-        """
-        Set those of the device with one command, and each other one separately.
-
-        :param atomically: set all or none. Local ones are set first: they can be rolled back.
-        """
-        reasons = [self._check(message) for message in messages]
-        changes = {message.name: _value(message)
-                   for message, reason in zip(messages, reasons, strict=True)
-                   if not reason and message.name in self._device.specs}
-        reasons = [reason or _replacement(message, changes)
+            return
+        suggests = len(messages) <= SUGGESTIONS
+        reasons = [self._check(message, suggests) for message in messages]
+        last = {message.name: message
+                for message, reason in zip(messages, reasons, strict=True) if not reason}
+        reasons = [reason or _replacement(message, last[message.name])
                    for message, reason in zip(messages, reasons, strict=True)]
-        local = [index for index, message in enumerate(messages)
-                 if not reasons[index] and message.name not in changes]
         if atomically and any(reasons):
             answer(reasons)
             return
-        before = [self._node.get_parameter(messages[index].name) for index in local]
-        for group in filter(None, [local] if atomically else [[index] for index in local]):
-            result = self._node.set_parameters_atomically(
-                [self._parameter(messages[index]) for index in group])
-            if not result.successful:
-                reasons[group[0]] = str(result.reason)
+        of_device = {name: _value(message) for name, message in last.items()
+                     if name in self._device.specs}
+        own = [self._parameter(message) for name, message in last.items() if name not in of_device]
+        before = [self._node.get_parameter(parameter.name) for parameter in own]
+        failures, change, undo = self._set_own(own, atomically)
 
-        def done(refusal: str) -> None:
-            if refusal and atomically and before:
-                self._node.set_parameters_atomically(before)
-            answer([reason or (refusal if message.name in changes else '')
+        def done(refusals: Mapping[str, str]) -> None:
+            answer([reason or failures.get(message.name, '') or refusals.get(message.name, '')
                     for message, reason in zip(messages, reasons, strict=True)])
 
-        if changes and not (atomically and any(reasons)):
-            self._configure(changes, now, done)
+        def put_back(refusals: Mapping[str, str]) -> None:
+            # Not those that another request has set meanwhile, such as a tighter limit.
+            _, changed_back, _ = self._set_own(
+                [old for old, new in zip(before, own, strict=True)
+                 if self._node.get_parameter(new.name).value == new.value], True)
+            self._link.call(changed_back)
+            done(refusals)
+
+        def made(refusals: Mapping[str, str]) -> None:
+            refused = {name for name, refusal in refusals.items() if refusal}
+            if before and refused and (atomically or not refused <= of_device.keys()):
+                self._device.call(functools.partial(put_back, refusals))
+            else:
+                done(refusals)
+
+        if atomically and failures or not of_device and change is _no_change:
+            done({})
         else:
-            done('')
+            # Own parameters are set by now, and few requests without others wait at any time.
+            (self._calls if of_device else self._own_calls).ask(
+                functools.partial(self._make, change, undo, of_device, atomically), made,
+                lambda reason: dict.fromkeys(last, reason))
+
+    def _set_own(
+        self, parameters: Sequence[Parameter], atomically: bool,
+    ) -> tuple[dict[str, str], Change, Change]:
+        """
+        Set parameters of the node itself.
+
+        :return: by name why some were not set; the change for the link, and how it is undone.
+        """
+        failures: dict[str, str] = {}
+        before = self._changeable.values if self._changeable else {}
+        if parameters:
+            result = self._node.set_parameters_atomically([*parameters])
+            if not result.successful and (atomically or len(parameters) == 1):
+                failures = {parameters[0].name: str(result.reason)}
+            elif not result.successful:
+                results = ((one.name, self._node.set_parameters_atomically([one]))
+                           for one in parameters)
+                failures = {name: str(one.reason) for name, one in results if not one.successful}
+        changeable = self._changeable
+        if changeable is None or changeable.values == before:
+            return failures, _no_change, _no_change
+        return (failures, functools.partial(changeable.change, changeable.values),
+                functools.partial(changeable.change, before))
+
+    # In the link's thread
+
+    def _make(
+        self, change: Change, undo: Change, of_device: Values, atomically: bool, now: float,
+        answer: Callable[[Mapping[str, str]], None],
+    ) -> None:
+        """Change the node and the device; answer by name why the device's were not set."""
+        change(now)
+        refusals: dict[str, str] = {}
+        for name, value in of_device.items():
+            try:
+                self._check_by_device(name, value)
+            except ValueError as error:
+                refusals[name] = str(error)
+        allowed = {name: value for name, value in of_device.items() if name not in refusals}
+        if atomically and refusals:
+            undo(now)
+            answer(refusals)
+        elif allowed:
+            self._configure(allowed, now, lambda refusal: answer(
+                {**dict.fromkeys(allowed, refusal), **refusals}))
+        else:
+            answer(refusals)
+
+    # In the executor's thread
 
     def _parameter(self, message: ParameterMessage) -> Parameter:
         """Return a parameter to set; an integer is taken for a double."""
@@ -204,11 +268,16 @@ class ParameterServices:
             return Parameter(message.name, value=float(parameter.value))
         return parameter
 
-    def _check(self, message: ParameterMessage) -> str:
-        """Return why a parameter cannot be set, '' if the device or rclpy decides that."""
+    def _check(self, message: ParameterMessage, suggests: bool) -> str:
+        """
+        Return why a parameter cannot be set, '' if the device or rclpy decides that.
+
+        :param suggests: whether the name that resembles an unknown one is looked for.
+        """
         name = message.name
         if not self._node.has_parameter(name):
-            return f'{name} is not a parameter of this node'
+            names = self._node.list_parameters([], 0).names if suggests else []
+            return f'{name} is not a parameter of this node{did_you_mean(name, names)}'
         try:
             value = _value(message)
         except ValueError:
@@ -225,15 +294,18 @@ class ParameterServices:
         return ''
 
 
+def _no_change(now: float) -> None:
+    pass
+
+
 def _result(reason: str) -> SetParametersResult:
     return SetParametersResult(successful=not reason, reason=reason)
 
 
-def _replacement(message: ParameterMessage, changes: Values) -> str:
-    """Return that a parameter has another value among the changes, '' if it has not."""
-    name = message.name
-    return (f'{name} has another value later in the request'
-            if name in changes and changes[name] != _value(message) else '')
+def _replacement(message: ParameterMessage, last: ParameterMessage) -> str:
+    """Return that a parameter has another value later in the request, '' if it has not."""
+    return '' if message is last or _value(message) == _value(last) else (
+        f'{message.name} has another value later in the request')
 
 
 def _value(message: ParameterMessage) -> object:

@@ -17,14 +17,18 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping
+import contextlib
 import math
+import threading
 import time
 from typing import Any, NamedTuple
 
 from rcl_interfaces import msg
+from rclpy.exceptions import InvalidHandle
 from rclpy.node import Node
 from rclpy.parameter import Parameter
 
+from .throttled_log import NodeLog
 from ..mavlink.messages import Address
 from ..mavlink.signing import Signing, SigningMode
 from ..mavlink.signing_files import KeyFileError, load_signing, TimestampStore
@@ -55,7 +59,8 @@ class ParameterSpec(NamedTuple):
     :param low: and ``high``, the range of a number, both ends included.
     :param choices: the permitted values of a string.
     :param constraints: other conditions on the value, for people.
-    :param restricts: whether it limits or protects something, so that a misspelt name is an error.
+    :param restricts: whether it limits or protects something, so that the node does not start
+        where it has no effect: by a misspelt name, or for a node that does not exist.
     :param changeable: whether it may be set while the node runs, see
         :class:`ChangeableParameters`.
     """
@@ -159,7 +164,8 @@ LINK_PARAMETERS = (
     ParameterSpec('diagnostics_period', 1.0, 'period of /diagnostics', 's', 0.1, 60.0),
     ParameterSpec('signing_mode', 'off', 'MAVLink 2 message signing',
                   choices=tuple(mode.value for mode in SigningMode), restricts=True),
-    ParameterSpec('signing_key_file', '', 'path of the signing key, readable by its owner only'),
+    ParameterSpec('signing_key_file', '', 'path of the signing key, readable by its owner only',
+                  restricts=True),
 )
 
 
@@ -278,22 +284,23 @@ def given_parameters(node: Node) -> Mapping[str, Parameter]:
 
 class ChangeableParameters:
     """
-    Parameters of a node that may be set while it runs.
+    Parameters of a node that may be set while it runs; for the executor's thread.
 
     :param specs: of the parameters of the node; only the changeable ones count.
     :param values: of all these parameters.
     :param check: takes the values that they would have; raises ParameterError if they are wrong.
-    :param change: takes the new values. It is called in the thread that sets a parameter.
+    :ivar values: of all these parameters, as they were set.
+    :ivar change: takes the values that were set, in the link's thread, with the time (s).
     """
 
     def __init__(
         self, node: Node, specs: Iterable[ParameterSpec], values: Values, *,
-        check: Callable[[Values], object], change: Callable[[Values], None],
+        check: Callable[[Values], object], change: Callable[[Values, float], None],
     ) -> None:
+        self.values = values
+        self.change = change
         self._specs = {spec.name: spec for spec in specs if spec.changeable}
-        self._values = values
         self._check = check
-        self._change = change
         node.add_on_set_parameters_callback(self._may_set)
         node.add_post_set_parameters_callback(self._set)
 
@@ -307,7 +314,7 @@ class ChangeableParameters:
             spec.check(value)
 
     def _with(self, parameters: list[Parameter]) -> Values:
-        return {**self._values, **{
+        return {**self.values, **{
             parameter.name: self._specs[parameter.name].check(parameter.value)
             for parameter in parameters if parameter.name in self._specs}}
 
@@ -319,25 +326,30 @@ class ChangeableParameters:
         return msg.SetParametersResult(successful=True)
 
     def _set(self, parameters: list[Parameter]) -> None:
-        values = self._with(parameters)
-        if values != self._values:
-            self._values = values
-            self._change(values)
+        self.values = self._with(parameters)
 
 
 class DeviceParameters:
     """
-    Parameters of a node that show a device; for the link's thread.
+    Parameters of a node that show a device; callable from any thread.
 
     They have no value until the device reports one. Only :meth:`show` may set them: a set of the
-    parameter services goes to the device.
+    parameter services goes to the device. The thread of the node's executor makes the changes,
+    before it takes the requests that were sent after them: rclpy's parameters are for one thread.
 
     :ivar specs: by name.
     """
 
-    def __init__(self, node: Node, specs: Iterable[ParameterSpec]) -> None:
+    def __init__(self, node: Node, specs: Iterable[ParameterSpec], log: NodeLog) -> None:
         self.specs = {spec.name: spec for spec in specs}
         self._node = node
+        self._log = log
+        # The newest values that are not shown yet, and the upper ends of ranges.
+        self._values: dict[str, object] = {}
+        self._highs: dict[str, float] = {}
+        self._calls: list[Callable[[], None]] = []
+        self._lock = threading.Lock()
+        self._called = node.create_guard_condition(self._run)
         for spec in self.specs.values():
             node.declare_parameter(
                 spec.name, spec.type, spec.descriptor(read_only=False), ignore_override=True)
@@ -351,17 +363,56 @@ class DeviceParameters:
         """Replace the specifications, which the next :meth:`set_high` shows."""
         self.specs = {spec.name: spec for spec in specs}
 
-    def show(self, values: Values) -> str:
-        """Set parameters to the reported values; return why that failed, '' if it did not."""
-        result = self._node.set_parameters_atomically([
-            Parameter(name, value=value) for name, value in values.items()])
-        return '' if result.successful else str(result.reason)
+    def show(self, values: Values) -> None:
+        """Set parameters to the reported values."""
+        with self._lock:
+            self._values |= values
+        self.call(self._change)
 
     def set_high(self, name: str, high: float) -> None:
-        """Show another upper end of the range of a number, which is at least its value."""
-        value = self._node.get_parameter_or(name).value
-        # rclpy cannot change the descriptor of a parameter without a value; the call after its
-        # first value can.
-        if isinstance(value, float) and math.isfinite(high):
-            self._node.set_descriptor(name, self.specs[name].descriptor(
-                read_only=False, high=max(high, value)))
+        """Show another upper end of the range of a number, or its value if that is higher."""
+        with self._lock:
+            self._highs[name] = high
+        self.call(self._change)
+
+    def call(self, function: Callable[[], None]) -> None:
+        """Have a function called in the executor's thread, once if it waits already."""
+        with self._lock:
+            if function not in self._calls:
+                self._calls.append(function)
+        # The node of a forgotten device may be gone.
+        with contextlib.suppress(InvalidHandle):
+            self._called.trigger()
+
+    # In the executor's thread
+
+    def _run(self) -> None:
+        with self._lock:
+            calls, self._calls = self._calls, []
+        for function in calls:
+            function()
+
+    def _change(self) -> None:
+        with self._lock:
+            values, self._values = self._values, {}
+            highs = dict(self._highs)
+        self._fit(highs, values)
+        if values:
+            result = self._node.set_parameters_atomically([
+                Parameter(name, value=value) for name, value in values.items()])
+            if not result.successful:
+                self._log.error(f'cannot show parameters of the device: {result.reason}',
+                                'parameters')
+            self._fit(highs, {})
+
+    def _fit(self, highs: Mapping[str, float], values: Values) -> None:
+        """Set the upper ends of ranges, which include the present and the next values."""
+        for name, high in highs.items():
+            value = self._node.get_parameter_or(name).value
+            # rclpy cannot change the descriptor of a parameter without a value; the call after its
+            # first value can.
+            if isinstance(value, float):
+                high = max(high, value, values.get(name, high))
+                if math.isfinite(high):
+                    self._node.set_descriptor(name, self.specs[name].descriptor(
+                        read_only=False, high=high))

@@ -101,7 +101,7 @@ def test_a_camera_is_checked_in_mavlink_1_and_takes_no_image_without_consent(
     camera.wait_for('1 image ')
 
 
-@pytest.mark.parametrize('number', [signal.SIGTERM, signal.SIGHUP])
+@pytest.mark.parametrize('number', [signal.SIGTERM, signal.SIGHUP, signal.SIGQUIT])
 def test_a_signal_restores_the_light_and_ends_with_status_1(
         url: str, start: Start, simulate: Start, number: int) -> None:
     simulator = simulate()

@@ -117,19 +117,35 @@ def test_parameter_file_that_cannot_be_read_is_named(
     ('illuminator', False), ('/illuminator', False), ('/**', False), ('/*', False),
     ('/**/illuminator', False), ('illuminator_1_244', False), ('belly', False),
     ('illuminatr', True), ('/boat/illuminator', True), ('/boat/**', True), ('/*/*', True)])
-def test_section_of_a_parameter_file_that_matches_no_node_is_warned_about(
+def test_section_of_a_parameter_file_that_matches_no_node_ends_the_start_if_it_restricts(
     node: Callable[..., Node], tmp_path: Path, section: str, is_ignored: bool,
 ) -> None:
     # rcl reads UTF-16, too.
-    arguments = write(tmp_path, f'{section}: {{ros__parameters: {{brightness: 40.0}}}}', 'utf-16')
+    arguments = write(tmp_path, f'{section}: {{ros__parameters: {{limit: 40.0}}}}', 'utf-16')
+    made = node('illuminator', 'limit')
+    pattern, further = section.strip('/'), dict.fromkeys(
+        ('illuminator_1_244', 'belly'), {'limit'}).get
 
-    warnings = ignored_parameters(
-        arguments, [node('illuminator', 'brightness')], {'brightness'},
-        dict.fromkeys(('illuminator_1_244', 'belly'), {'brightness'}).get)
+    assert ignored_parameters(arguments, [made], set(), further) == [
+        f'{arguments[-1]}: the section {pattern} matches no node and is ignored; the name here is '
+        '/illuminator'] * is_ignored
+    with pytest.raises(ParameterError, match=re.escape(
+            f'the section {pattern} matches no node; the name here is /illuminator, where limit '
+            'would have no effect')) if is_ignored else contextlib.nullcontext():
+        assert ignored_parameters(arguments, [made], {'limit'}, further) == []
 
-    assert warnings == [
-        f'{arguments[-1]}: the section {section.strip("/")} matches no node and is ignored; the '
-        'name here is /illuminator'] * is_ignored
+
+def test_section_for_a_node_of_another_process_is_warned_about_if_another_restricts_our_node(
+    node: Callable[..., Node], tmp_path: Path,
+) -> None:
+    arguments = write(tmp_path, 'port: {ros__parameters: {limit: 1}}\n'
+                                'starboard: {ros__parameters: {limit: 2, other: 3}}')
+    nodes = [node('port', 'limit')]
+
+    [warning] = ignored_parameters(arguments, nodes, {'limit'})
+    assert 'the section starboard matches no node and is ignored' in warning
+    with pytest.raises(ParameterError, match='where other would have no effect'):
+        ignored_parameters(arguments, nodes, {'limit', 'other'})
 
 
 # The reason for which a limit ends the start, which is '' where it has an effect.

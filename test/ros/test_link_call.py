@@ -20,10 +20,15 @@ from collections.abc import Callable
 from typing import Any
 from unittest.mock import Mock
 
-from illuminator_ros.ros.link_call import LinkCalls
+from illuminator_ros.ros.executor import DeferredService
+from illuminator_ros.ros.link_call import LinkCalls, MAX_PENDING
+from illuminator_ros.ros.node import Endpoint, NodeInterface, RequestService
+from rclpy.node import Node
+from std_srvs.srv import SetBool
+from support.ros import Ros
 
 
-def test_requests_beyond_the_limit_are_refused_at_once_and_each_is_answered_once() -> None:
+def test_requests_of_a_kind_beyond_the_limit_are_refused_and_each_is_answered_once() -> None:
     answers: list[Callable[[str], None]] = []
     answered: list[str] = []
     # Any: a link that calls functions at once.
@@ -36,6 +41,8 @@ def test_requests_beyond_the_limit_are_refused_at_once_and_each_is_answered_once
 
     for _ in range(3):
         ask()
+    calls.ask(lambda now, answer: answer('OFF'), answered.append, 'refused: {}'.format, kind=False)
+    assert answered.pop() == 'OFF'
     assert answered == ['refused: busy: 2 requests wait for an answer already']
     answers[0]('done')
     ask()
@@ -43,3 +50,20 @@ def test_requests_beyond_the_limit_are_refused_at_once_and_each_is_answered_once
         calls.refuse_waiting('the end')
         answers[1]('done')
     assert answered[1:] == ['done', 'refused: the end', 'refused: the end']
+
+
+def test_off_is_asked_however_many_requests_of_an_on_wait(ros: Ros) -> None:
+    asked: list[bool] = []
+    node = Node('switched', context=ros.context)
+    # Any: a link that calls functions at once.
+    link: Any = Mock(call=lambda function: function(0.0))
+    NodeInterface(node, link, Mock(), services=[RequestService(
+        Endpoint('enable', SetBool, ''), lambda request, now, answer: asked.append(request.data))])
+    [enable] = [one.callback for one in node.services if one.service_name == '/switched/enable']
+    assert isinstance(enable, DeferredService)
+
+    for on in [True] * (MAX_PENDING + 1) + [False]:
+        enable.take(SetBool.Request(data=on), Mock())
+    node.destroy_node()
+
+    assert asked == [True] * MAX_PENDING + [False]

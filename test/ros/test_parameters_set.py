@@ -67,7 +67,8 @@ def test_four_parameters_in_one_call_are_one_command_and_one_event(
                             '0 (no strobe) or 0.05 to 10 s'),
     ('brightness', None, 'brightness cannot be deleted'),
     ('frame_id', 'other', 'frame_id is read-only: restart the node with -p frame_id:=VALUE'),
-    ('banana', 1.0, 'banana'),
+    ('banana', 1.0, 'banana is not a parameter of this node'),
+    ('brightnes', 1.0, "brightnes is not a parameter of this node; did you mean 'brightness'?"),
 ])
 def test_invalid_value_is_refused_with_its_reason_and_nothing_is_sent(
     light: ServedLight, parameters: Parameters, name: str, value: object, reason: str,

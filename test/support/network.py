@@ -133,8 +133,10 @@ class Router:
         faults.log = network.fail  # type: ignore[method-assign]
         self.lines = Lines(
             [(port.name, MemoryUrl(port.name)) for port in ports], self.endpoint, faults=faults,
-            selector=FakeSelector(), call=lambda function: None, signing=signing or Signing(),
-            mavlink_version=version, clock=lambda: network.now, wall_clock=lambda: 1.7e9)
+            selector=FakeSelector(), call=lambda function: None,
+            call_first=lambda function: None, is_turn_over=lambda: False,
+            signing=signing or Signing(), mavlink_version=version, clock=lambda: network.now,
+            wall_clock=lambda: 1.7e9)
         for line, port in zip(self.lines, ports, strict=True):
             line._connect_at = float('inf')
             line.opened(port, network.now)

@@ -23,7 +23,7 @@ import signal
 import sys
 from typing import Any
 
-from illuminator_ros.cli.monitor import ENDING
+from illuminator_ros.cli.termination import ENDING
 
 # Program -> the module that constructs its objects with a clock: links, or a monitor.
 PLACES = {'illuminator_ros.bridge': 'illuminator_ros.ros.bridge',
@@ -37,8 +37,7 @@ def main(module: str) -> None:
     """Run a module with the rest of the command line."""
     # Block signals before the imports, as the module does: threads that start during the imports
     # must not take them.
-    signal.pthread_sigmask(signal.SIG_BLOCK, {
-        signal.SIGINT, signal.SIGTERM, signal.SIGHUP, *ENDING})
+    signal.pthread_sigmask(signal.SIG_BLOCK, ENDING)
     from support.slow import CLOCK, SlowLink
     from support.waiting import PATIENCE
     place: Any = import_module(PLACES[module])

@@ -66,7 +66,8 @@ def assert_ends(program: Program, number: int = signal.SIGTERM) -> None:
     assert (program.end(number), 'Traceback' in program.log) == (0, False), program.log
 
 
-@pytest.mark.parametrize('number', [signal.SIGINT, signal.SIGTERM])
+@pytest.mark.parametrize('number', [
+    signal.SIGINT, signal.SIGTERM, signal.SIGQUIT, signal.SIGUSR1, signal.SIGRTMAX])
 def test_every_light_is_switched_off_and_named(own_ros: Ros, port: int, number: int) -> None:
     with (lit(own_ros, port) as (program, light),
           ServedLight(port, source=Address(1, 244), enable=1) as other):

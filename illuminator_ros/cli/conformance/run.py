@@ -35,7 +35,7 @@ from ..arguments import invocation, option, Parser
 from ..entry_point import print_output
 from ..options import add_mavlink_version, add_signing, address, mavlink_version, signing
 from ..payloads import DEFAULT_PAYLOAD, PAYLOADS
-from ..termination import SIGNALS
+from ..termination import ENDING
 from ...mavlink.link import Link
 from ...mavlink.link_state import LinkEvent, LinkSnapshot
 from ...mavlink.link_thread import LinkThreadError
@@ -59,6 +59,8 @@ NOT_OPEN = 'link not open: '
 PEER_ERRORS = (errno.ECONNREFUSED, errno.ECONNRESET, errno.ETIMEDOUT, errno.EHOSTUNREACH,
                errno.ENETUNREACH, errno.EPIPE)
 FIND_TIMEOUT = 10.0
+# Signals of a fault of the process: a handler would return to the fault.
+FAULTS = {signal.SIGSEGV, signal.SIGBUS, signal.SIGFPE, signal.SIGILL}
 
 EXAMPLES = (
     'serial:///dev/ttyACM0:57600',
@@ -204,7 +206,7 @@ class Conformance:
     def run(self) -> int:
         """Find the device, ask for consent, check the device, and write the reports."""
         checks, options, runner = self._checks, self._options, self._runner
-        for one in SIGNALS:
+        for one in ENDING - FAULTS:
             if signal.getsignal(one) != signal.SIG_IGN:
                 signal.signal(one, self._handle)
         begun = self._link.clock()

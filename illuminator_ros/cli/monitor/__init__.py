@@ -23,18 +23,11 @@ command line. Each payload has a view of its own (``ros/monitor_view.py``).
 from __future__ import annotations
 
 from collections.abc import Mapping
-import signal
 
 from ..entry_point import run_program
 from ..payloads import PAYLOADS
 from ..termination import Termination
 from ...payload.payload_type import PayloadType
-
-# The signals that end a process: each would leave the terminal without echo. Where one is the
-# fault of the process itself, the kernel ends it although it is blocked.
-ENDING = {one for one in signal.valid_signals() if signal.getsignal(one) == signal.SIG_DFL} - {
-    signal.SIGKILL, signal.SIGSTOP, signal.SIGCONT, signal.SIGTSTP, signal.SIGTTIN,
-    signal.SIGTTOU, signal.SIGCHLD, signal.SIGURG, signal.SIGWINCH}
 
 
 def main(args: list[str] | None = None, payloads: Mapping[str, PayloadType] = PAYLOADS) -> int:
@@ -48,4 +41,4 @@ def main(args: list[str] | None = None, payloads: Mapping[str, PayloadType] = PA
         from .run import run
         return run(args, termination, payloads)
 
-    return run_program('monitor', start, more=ENDING)
+    return run_program('monitor', start)

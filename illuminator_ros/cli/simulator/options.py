@@ -57,7 +57,7 @@ def _epilog(types: Types) -> str:
 console: lines on standard input, for all components or, after its id or name, for one
 {describe_commands(one.device for one in types)}
 
-exit status: 0 after a signal (SIGINT, SIGTERM, SIGHUP) or quit, 1 if a package is missing, 2 if an
+exit status: 0 after a signal (SIGINT, SIGTERM ...) or quit, 1 if a package is missing, 2 if an
 argument is wrong."""
 
 

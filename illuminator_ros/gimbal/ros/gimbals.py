@@ -41,7 +41,7 @@ GIMBAL_PARAMETERS = (
     ParameterSpec('auto_take_control', False,
                   'take control of a gimbal that no component controls when it connects'),
     ParameterSpec('setpoint_timeout', 0.5, 'silence of ~/cmd/rate after which zero is sent', 's',
-                  STEP_LIMIT, 60.0, changeable=True),
+                  STEP_LIMIT, 60.0, restricts=True, changeable=True),
     *FRAME_PARAMETERS,
     PUBLISH_TF,
     GEOID_SEPARATION,
@@ -85,10 +85,9 @@ class Gimbals(ServedPayload):
             GimbalNode.bind)
         client.events.subscribe(self._take)
 
-    def _change_parameters(self, values: Values) -> None:
-        """Take parameters that were set, in any thread."""
-        self._host.link.do(
-            functools.partial(self._client.change_settings, settings(values)))
+    def _change_parameters(self, values: Values, now: float) -> None:
+        """Take parameters that were set."""
+        self._client.change_settings(settings(values), now)
 
     def _take(self, event: GimbalEvent) -> None:
         if isinstance(event, GimbalForgotten):

@@ -65,14 +65,18 @@ FIX = Endpoint('fix', NavSatFix, 'position of the vehicle, for regions of intere
                'without a fix')
 MANAGER_PARAMETERS = (
     ParameterSpec('policy', Policy.HOLD.value, 'when a player takes control from another one',
-                  choices=tuple(policy.value for policy in Policy)),
-    ParameterSpec('priority', [], 'players, the highest first: sysid/compid, or ros'),
-    ParameterSpec('overruling', [], 'players that take control under each policy'),
-    ParameterSpec('lease', 3.0, 'silence after which a player loses control', 's', 2.0, 3600.0),
+                  choices=tuple(policy.value for policy in Policy), restricts=True),
+    ParameterSpec('priority', [], 'players, the highest first: sysid/compid, or ros',
+                  restricts=True),
+    ParameterSpec('overruling', [], 'players that take control under each policy',
+                  restricts=True),
+    ParameterSpec('lease', 3.0, 'silence after which a player loses control', 's', 2.0, 3600.0,
+                  restricts=True),
     ParameterSpec('nudge_limit', 0.175, 'largest angle that secondary control adds', 'rad', 0.0,
-                  math.pi),
+                  math.pi, restricts=True),
     *(ParameterSpec(f'{axis}_{end}', round(limits[index], 3),
-                    f'{word} of a gimbal without MAVLink', 'rad', -2 * math.pi, 2 * math.pi)
+                    f'{word} of a gimbal without MAVLink', 'rad', -2 * math.pi, 2 * math.pi,
+                    restricts=True)
       for axis, limits in zip(AXES, _RANGES, strict=True)
       for index, (end, word) in enumerate((
           ('min', f'smallest {axis}'), ('max', f'largest {axis}')))),

@@ -94,6 +94,7 @@ class EventPublisher:
         self._condition: tuple[object, ...] = ()
         self._flags = FlagLog()
         interface.publish('connected', False)
+        self._fit()
 
     def change_limits(self, limits: model.SafetyLimits) -> None:
         """Show other limits in the descriptions of the parameters."""
@@ -101,8 +102,7 @@ class EventPublisher:
             return
         self._limits = limits
         self._parameters.respecify(device_parameters(limits))
-        self._fit(0.0)
-        self._parameters.set_high('brightness', limits.max_brightness)
+        self._fit()
 
     def take(self, event: events.LightEvent) -> None:
         """Publish an event."""
@@ -195,7 +195,7 @@ class EventPublisher:
     def _condition_changed(self, event: events.StatusReceived) -> None:
         if event.status.strobe_range != self._strobe_range:
             self._strobe_range = event.status.strobe_range
-            self._fit(0.0)
+            self._fit()
         for level, text in self._flags.take(event.status.error_flags, event.received_at):
             self._log.write(_SEVERITIES.get(level, logging.INFO), f'light {event.address}: {text}',
                             'flags')
@@ -207,34 +207,15 @@ class EventPublisher:
             by = self._by(event.address, CONFIGURE)
             self._log.info(f'light {event.address} was changed: {configuration.describe(names)}'
                            f'{by and " by"}{by}', 'changed')
-        if 'strobe_period' in names:
-            self._fit(configuration.strobe_period)
-        if 'brightness' in names:
-            self._fit_brightness(configuration.brightness)
-        reason = self._parameters.show({name: _value(configuration, name) for name in names})
-        if reason:
-            self._log.error(f'cannot update parameters from status: {reason}', 'parameters')
-        if 'strobe_period' in names:
-            self._fit(0.0)
-        if 'brightness' in names:
-            self._fit_brightness(0.0)
+        self._parameters.show({name: _value(configuration, name) for name in names})
 
-    def _fit_brightness(self, brightness: float) -> None:
-        """Show the limit of the brightness, or more where the light shines brighter."""
-        highest = self._limits.max_brightness
-        if highest < 100.0:
-            self._parameters.set_high('brightness', max(highest, brightness))
-
-    def _fit(self, period: float) -> None:
-        """
-        Show the longest strobe period that the light reports to be possible.
-
-        :param period: a value that must fit too, s: some lights report more than they allow.
-        """
+    def _fit(self) -> None:
+        """Show the limit of the brightness, and the longest strobe period that is possible."""
         possible = self._strobe_range
         longest = model.shortest(possible.max_strobe_period) if possible.known else 0.0
+        self._parameters.set_high('brightness', self._limits.max_brightness)
         self._parameters.set_high(
-            'strobe_period', max(longest if longest > 0 else model.MAX_STROBE_PERIOD, period))
+            'strobe_period', longest if longest > 0 else model.MAX_STROBE_PERIOD)
 
 
 def _value(configuration: model.Configuration, name: str) -> object:

@@ -89,7 +89,7 @@ class LightNode:
         self._started = self._bound_at = host.link.clock()
         self._mount_reported = False
         self._hardware_id = ''
-        parameters = DeviceParameters(node, device_parameters(limits))
+        parameters = DeviceParameters(node, device_parameters(limits), log)
         self._overrides = _checked(parameters.overrides(), limits)
         sources = client.settings.sources
         interface = ros_node.NodeInterface(
@@ -106,7 +106,8 @@ class LightNode:
         if sources:
             interface.publish('source', '')
         ParameterServices(
-            node, host.link, log, parameters, self._check_value, self._configure, changeable)
+            node, host.link, log, parameters, checked, self._check_value, self._configure,
+            changeable)
         self._publishers = EventPublisher(
             node, interface, parameters, log, limits=limits, frame_id=geometry.frame_id,
             check_diagnostics=host.check_diagnostics,

@@ -113,22 +113,18 @@ class Lights(ServedPayload):
                 f'{nodes.first.address}. After a restart the order may differ: set '
                 'target_system and target_component')
 
-    # Parameters, in any thread
+    # Parameters
 
     def _check_parameters(self, values: Values) -> None:
+        """Check the values that parameters would have, in the executor's thread."""
         parameters.settings(values)
         parameters.check_not_loosened(values, self._host.values)
 
-    def _change_parameters(self, values: Values) -> None:
-        settings = parameters.settings(values)
-
-        def change(now: float) -> None:
-            self._client.change_settings(settings, now)
-            for node in {self._nodes.first, *self._nodes}:
-                node.limits_changed()
-
-        # At once, so that the other values of an atomic set are checked against the new limits.
-        self._host.link.do(change)
+    def _change_parameters(self, values: Values, now: float) -> None:
+        """Take parameters that were set, in the link's thread."""
+        self._client.change_settings(parameters.settings(values), now)
+        for node in {self._nodes.first, *self._nodes}:
+            node.limits_changed()
 
     # Requests to all lights
 

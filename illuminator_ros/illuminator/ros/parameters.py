@@ -42,7 +42,8 @@ LIGHT_PARAMETERS = (
                   high=255),
     ParameterSpec('target_component', 0, 'component id of the light to serve; 0 = any', low=0,
                   high=255),
-    ParameterSpec('only_target', False, 'leave lights alone that the target does not select'),
+    ParameterSpec('only_target', False, 'leave lights alone that the target does not select',
+                  restricts=True),
     ParameterSpec('names', [], 'node names of further lights, such as 1/244=belly'),
     ParameterSpec('heartbeat_timeout', 3.0, 'silence after which the light is lost', 's', 1.1,
                   3600.0),
@@ -62,7 +63,7 @@ LIGHT_PARAMETERS = (
                   'configure a light that has restarted as it was before'),
     *SOURCE_PARAMETERS,
     ParameterSpec('on_release', 'keep', 'state of a light that no source holds any more',
-                  choices=('keep', 'off')),
+                  choices=('keep', 'off'), restricts=True),
     ParameterSpec('max_brightness', 100.0, 'limit of the brightness that is sent', '%', 0.0,
                   100.0, restricts=True, changeable=True),
     ParameterSpec('min_strobe_period', 0.0,
@@ -72,7 +73,7 @@ LIGHT_PARAMETERS = (
                   'silence of all sources that switches a light off; 0 = never', 's',
                   0.0, 3600.0, restricts=True, changeable=True),
     ParameterSpec('external_changes', 'follow', 'answer to changes by other senders',
-                  choices=('follow', 'reassert'), changeable=True),
+                  choices=('follow', 'reassert'), restricts=True, changeable=True),
 )
 
 DEVICE_PARAMETERS = (
@@ -152,7 +153,8 @@ def check_not_loosened(values: Values, start: Values) -> None:
                 f'given at the start: restart the node with -p {name}:=VALUE')
 
 
-@functools.cache
+# The nodes of all lights have the same limits.
+@functools.lru_cache(1)
 def device_parameters(limits: SafetyLimits) -> tuple[ParameterSpec, ...]:
     """Return the parameters of a light, with limits in their descriptions."""
     notes = {}

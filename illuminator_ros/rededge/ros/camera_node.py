@@ -152,7 +152,7 @@ class CameraNode(ServedPayload):
         self._interface.publish('connected', False)
         # The first NavSatFix imports numpy, which takes too long for the link's thread.
         NavSatFix()
-        self._parameters = DeviceParameters(host.node, MOUNT_PARAMETERS)
+        self._parameters = DeviceParameters(host.node, MOUNT_PARAMETERS, host.log)
         given = self._parameters.overrides()
         angles = {spec.name: spec.check(given.get(spec.name, spec.default))
                   for spec in MOUNT_PARAMETERS}
@@ -212,23 +212,21 @@ class CameraNode(ServedPayload):
         self, changes: Mapping[str, object], now: float, answer: Callable[[str], None],
     ) -> None:
         orientation = self._client.feeder.orientation
-        if not orientation.mount_is_fixed:
+        if orientation.fixed_mount is None:
             answer('the mount is not fixed: ~/mount has or had a publisher; restart the node for '
                    'a fixed one')
             return
-        node, specs = self._host.node, self._parameters.specs
-        angles = {name: specs[name].check(changes.get(name, node.get_parameter(name).value))
-                  for name in specs}
+        specs = self._parameters.specs
+        angles = {name: specs[name].check(changes.get(name, angle))
+                  for name, angle in zip(specs, orientation.fixed_mount, strict=True)}
         orientation.set_fixed_mount(_angles(angles), now)
         self._frame_due = now
-        answer(self._parameters.show(angles))
+        self._parameters.show(angles)
+        answer('')
 
-    def _change_parameters(self, values: Values) -> None:
-        """Take parameters that were set, in any thread."""
-        def change(now: float) -> None:
-            self._client.feeder.orientation.change_rate(values['attitude_rate'], now)
-
-        self._host.link.do(change)
+    def _change_parameters(self, values: Values, now: float) -> None:
+        """Take parameters that were set."""
+        self._client.feeder.orientation.change_rate(values['attitude_rate'], now)
 
     def poll(self, now: float) -> None:
         """See :meth:`ServedPayload.poll`."""

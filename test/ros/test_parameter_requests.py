@@ -1,0 +1,195 @@
+# Copyright 2026 The illuminator_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""A request to the parameter services is one call of the link; the executor does the rest."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from typing import Any
+from unittest.mock import Mock
+
+from illuminator_ros.ros.executor import DeferredService, NodeExecutor
+from illuminator_ros.ros.parameter_services import MAX_NAMES, ParameterServices
+from illuminator_ros.ros.parameters import (
+    ChangeableParameters,
+    declare_given,
+    DeviceParameters,
+    ParameterSpec,
+    Values,
+)
+from illuminator_ros.ros.payload_node import PayloadNode
+import pytest
+from rcl_interfaces import srv
+from rclpy.parameter import Parameter
+from support.ros import Ros
+
+OWN = (ParameterSpec('limit', 100.0, '', low=0.0, high=100.0, changeable=True),
+       ParameterSpec('silence', 0.0, '', low=0.0, high=10.0, changeable=True))
+OF_DEVICE = (ParameterSpec('brightness', 0.0, '', low=0.0, high=100.0),)
+
+
+class Served:
+    """
+    A node with parameters of its own and of a device, without its executor's thread.
+
+    :ivar calls: of the link, which wait.
+    :ivar changes: of the node, as the link has got them.
+    :ivar commands: to the device.
+    """
+
+    def __init__(self, ros: Ros) -> None:
+        self.node = PayloadNode('served', context=ros.context)
+        self.calls: list[Any] = []
+        self.changes: list[Values] = []
+        self.commands: list[Values] = []
+        self.answers: list[Any] = []
+        self.refusal = ''
+        self.device = DeviceParameters(self.node, OF_DEVICE, Mock())
+        # Any: a link that notes its calls.
+        link: Any = Mock(call=self.calls.append)
+        ParameterServices(
+            self.node, link, Mock(), self.device, configure=self._configure,
+            changeable=ChangeableParameters(
+                self.node, OWN, declare_given(self.node, OWN), check=lambda values: None,
+                change=lambda values, now: self.changes.append(values)))
+        self.executor = NodeExecutor(ros.context, Mock())
+        self.executor.add_node(self.node)
+        self.executor.spin_once()
+
+    def _configure(self, values: Values, now: float, answer: Any) -> None:
+        self.commands.append(values)
+        answer(self.refusal)
+
+    def request(self, name: str, request: Any) -> None:
+        """Take a request, as the executor does."""
+        [service] = [one for one in self.node.services
+                     if one.service_name == f'/served/{name}']
+        assert isinstance(service.callback, DeferredService)
+        service.callback.take(request, self.answers.append)
+
+    def set_parameters(self, *values: tuple[str, object], atomically: bool = False) -> None:
+        """Request a set."""
+        kind, name = ((srv.SetParametersAtomically, 'set_parameters_atomically') if atomically
+                      else (srv.SetParameters, 'set_parameters'))
+        self.request(name, kind.Request(parameters=[
+            Parameter(one, value=value).to_parameter_msg() for one, value in values]))
+
+    def run_link(self) -> int:
+        """Make the calls of the link; return how many there were."""
+        calls, self.calls[:] = self.calls[:], []
+        for call in calls:
+            call(0.0)
+        return len(calls)
+
+    def values(self, *names: str) -> Sequence[object]:
+        """Return the values of parameters."""
+        return [self.node.get_parameter_or(name).value for name in names]
+
+
+@pytest.fixture
+def served(ros: Ros) -> Iterator[Served]:
+    """Yield a node with parameters."""
+    made = Served(ros)
+    yield made
+    made.executor.remove_node(made.node)
+    made.node.destroy_node()
+
+
+@pytest.mark.parametrize('atomically', [False, True])
+def test_all_values_of_a_request_are_one_call_one_change_and_one_command(
+    served: Served, atomically: bool,
+) -> None:
+    repeated = [] if atomically else [
+        (name, float(number)) for number in range(MAX_NAMES // 4) for name in (
+            'limit', 'brightness')]
+    served.set_parameters(
+        *repeated, ('limit', 60.0), ('silence', 5.0), ('brightness', 50.0), atomically=atomically)
+
+    assert served.run_link() == 1
+    assert served.changes == [{'limit': 60.0, 'silence': 5.0}]
+    assert served.commands == [{'brightness': 50.0}]
+    [answer] = served.answers
+    if not atomically:
+        reasons = [result.reason for result in answer.results]
+        assert reasons == [f'{name} has another value later in the request'
+                           for name, _ in repeated] + [''] * 3
+
+
+@pytest.mark.parametrize('values', [
+    [('limit', 101.0)], [('limits', 1.0)], [('limit', 1.0)] * (MAX_NAMES + 1)])
+@pytest.mark.parametrize('atomically', [False, True])
+def test_request_that_is_too_long_or_wrong_is_answered_without_the_link(
+    served: Served, values: list[tuple[str, object]], atomically: bool,
+) -> None:
+    served.set_parameters(*values, atomically=atomically)
+
+    assert served.run_link() == 0
+    [answer] = served.answers
+    result = answer.result if atomically else answer.results[0]
+    assert not result.successful
+    assert served.values('limit') == [100.0]
+
+
+def test_change_that_the_device_refuses_is_put_back_before_the_answer(
+    served: Served,
+) -> None:
+    served.refusal = 'denied'
+    served.set_parameters(('limit', 60.0), ('brightness', 50.0), atomically=True)
+    served.run_link()
+    assert served.answers == []
+    served.executor.spin_once()
+
+    assert served.answers[0].result.reason == 'denied'
+    assert served.values('limit') == [100.0]
+    served.run_link()
+    assert [change['limit'] for change in served.changes] == [60.0, 100.0]
+
+
+def test_limit_that_was_tightened_meanwhile_is_not_put_back(served: Served) -> None:
+    served.refusal = 'denied'
+    served.set_parameters(('limit', 60.0), ('brightness', 50.0), atomically=True)
+    served.set_parameters(('limit', 20.0))
+    served.run_link()
+    served.executor.spin_once()
+    served.run_link()
+
+    assert served.values('limit') == [20.0]
+    assert served.changes[-1]['limit'] == 20.0
+
+
+def test_parameters_of_the_device_are_set_by_the_executor_before_the_next_request(
+    served: Served,
+) -> None:
+    served.device.show({'brightness': 40.0})
+    served.device.show({'brightness': 70.0})
+    assert served.values('brightness') == [None]
+
+    served.executor.spin_once()
+
+    assert served.values('brightness') == [70.0]
+
+
+@pytest.mark.parametrize('request_', [
+    ('get_parameters', srv.GetParameters.Request(names=['limit'] * (MAX_NAMES + 1)), 'values'),
+    ('describe_parameters', srv.DescribeParameters.Request(names=['limit'] * (MAX_NAMES + 1)),
+     'descriptors')], ids=lambda value: value[0])
+def test_long_list_of_names_is_answered_with_an_empty_one(
+    served: Served, request_: tuple[str, Any, str],
+) -> None:
+    name, request, field = request_
+
+    served.request(name, request)
+
+    assert list(getattr(served.answers[0], field)) == []
