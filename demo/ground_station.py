@@ -50,8 +50,12 @@ class GroundStation:
         command = Command(light, mavlink.MAV_CMD_DO_ILLUMINATOR_CONFIGURE,
                           (mode, brightness, strobe_period, duty_cycle))
         results: SimpleQueue[CommandResult] = SimpleQueue()
-        self._link.call(lambda now: self._commands.start(
-            command, now, lambda result, now: results.put(result), deadline=now + timeout))
+
+        def start(now: float) -> None:
+            self._commands.start(command, now, lambda result, now: results.put(result),
+                                 deadline=now + timeout)
+
+        self._link.call(start)
         return results.get(timeout=timeout + 1.0)
 
     def close(self) -> None:

@@ -46,9 +46,9 @@ from illuminator_ros.mavlink.signing import MAX_STREAMS, ticks
 from illuminator_ros.mavlink.statistics import MAX_SOURCES
 from illuminator_ros.mavlink.transport.udp import MAX_PEERS
 from illuminator_ros.payload import simulated
+from illuminator_ros.payload.device_property import MAX_CALLERS
 from illuminator_ros.payload.discovery import MAX_CANDIDATES, MAX_DEVICES, MAX_IGNORED
 from illuminator_ros.payload.messages import Attitude, GimbalDeviceAttitudeStatus
-from illuminator_ros.payload.reconciler import MAX_CALLERS
 from illuminator_ros.payload.simulated import SimulatedComponents
 from illuminator_ros.rededge.client import RedEdgeClient
 from illuminator_ros.rededge.input_states import Settings as InputSettings
@@ -241,7 +241,6 @@ SENT = {
     'LoopbackFilter.sent': frame_writer.MAX_FRAMES, 'CommandSender.round_trips': MAX_TARGETS,
     'CommandSender.unanswering': MAX_TARGETS, 'CommandSender.pending': FOUND,
     # Two requests to each, remembered for 5 s.
-    'CommandSender.earlier': 2 * FOUND,
     **dict.fromkeys(('DeadlineQueue.heap', 'DeadlineQueue.entered'), 2 * FOUND + SPARE),
     'DeadlineQueue.deadlines': FOUND}
 STAMPS = {'LoopbackFilter.stamps': frame_writer.MAX_STAMPS}
@@ -262,7 +261,8 @@ ROWS = {
     'signed streams': Row(
         signed_streams, {**LINK, 'Signing.streams': MAX_STREAMS}, {**SENT, **STAMPS, **LIGHTS}),
     'own frames': Row(own_frames, {'LoopbackFilter.sent': frame_writer.MAX_FRAMES, **STAMPS}),
-    'requests to a light': Row(requests, {'_Callers.requests': MAX_CALLERS}),
+    'requests to a light': Row(requests, {
+        'Property.next_callers': MAX_CALLERS - 1, 'LightSources.calling': MAX_CALLERS}),
     'forwarded frames': Row(
         functools.partial(forwarded, MAX_FRAMES + COUNT, heartbeat(44)),
         {'DuplicateFilter.arrivals': MAX_FRAMES, 'RoutingTable.routes': MAX_ROUTES,

@@ -73,7 +73,7 @@ def setpoint_flags(frame: YawFrame) -> int:
 @dataclass(frozen=True)
 class GimbalChange(Generic[S]):
     """
-    A change of a gimbal, and its command: a :class:`~..payload.attempt.Change`.
+    A change of a gimbal, and its command: a :class:`~..payload.confirmed_command.Change`.
 
     :param status_name: of the status that shows the change, '' if none does.
     """
@@ -86,9 +86,11 @@ class GimbalChange(Generic[S]):
     shown_by: Callable[[S], bool | None] = lambda status: None
     actual: Callable[[S], str] = lambda status: ''
     note: str = ''
+    is_idempotent: bool = True
+    is_repeated: bool = False
 
     def evidence(self, status: S) -> str:
-        """See :class:`~..payload.attempt.Change`."""
+        """See :class:`~..payload.confirmed_command.Change`."""
         return f'confirmed by {self.status_name}'
 
 

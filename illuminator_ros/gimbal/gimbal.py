@@ -24,7 +24,7 @@ from typing import TypeVar
 from . import events
 from . import messages as gimbal
 from .axes import known_ranges, Ranges
-from .commands import Flag, GimbalChange, NEUTRAL, point, RETRACT, setpoint_flags, YAW_LOCKS
+from .commands import Flag, NEUTRAL, point, RETRACT, setpoint_flags, YAW_LOCKS
 from .gimbal_control import GimbalControl, REQUEST_LIMIT
 from .remote_managers import (
     is_late,
@@ -35,17 +35,17 @@ from .remote_managers import (
     SILENCE_LIMIT,
     STOP_LIMIT,
 )
-from .setpoint_stream import SetpointStream
+from .setpoint_stream import Request, SetpointStream
 from .yaw_lock import YawLock
 from ..mavlink.command_sender import CommandResult, CommandSender
 from ..mavlink.dialect import mavlink, short_names
 from ..mavlink.messages import Address
 from ..payload.arbitration import HolderChanged
-from ..payload.attempt import Done, Result
 from ..payload.command_sources import Sources, SourceSettings
+from ..payload.confirmed_command import Done, Result
+from ..payload.device_property import answer, Caller, Desired, Outcome, Property
 from ..payload.messages import GeoPoint, GimbalDeviceAttitudeStatus
 from ..payload.mount_attitude import Components, MountAttitude, YawFrame
-from ..payload.reconciler import Desired, Reconciler
 from ..payload.rotation import Quaternion, Vector
 
 S = TypeVar('S')
@@ -118,10 +118,9 @@ class _Device:
     def poll(self, manager: RemoteManager, now: float) -> None:
         """Request what it does not send by itself."""
         if self._identity_query.take(now):
-            manager.target.request_message(
-                gimbal.GimbalDeviceInformation.id, now, to=self._address)
+            manager.request(gimbal.GimbalDeviceInformation.id, now, to=self._address)
         if self._interval_query.take(now):
-            manager.target.send(
+            manager.send(
                 mavlink.MAV_CMD_SET_MESSAGE_INTERVAL,
                 (float(GimbalDeviceAttitudeStatus.id), self._interval * 1e6), now,
                 self._interval_answered, to=self._address)
@@ -181,6 +180,7 @@ class Gimbal:
         if self.key.address in lost:
             self._device.heard_at = min(self._device.heard_at, now - SILENCE_LIMIT)
         self._check(now)
+        self._settle(now)
 
     @property
     def silent_since(self) -> float:
@@ -270,6 +270,7 @@ class Gimbal:
         if manager is not None and manager.take_status(status, now):
             self._check(now)
             manager.confirm_control(status, now)
+            self._settle(now)
 
     def take_device_information(self, message: gimbal.GimbalDeviceInformation) -> None:
         """Take GIMBAL_DEVICE_INFORMATION of the device."""
@@ -282,10 +283,11 @@ class Gimbal:
             return
         self._check(now)
         manager.confirm_pose(status, now)
+        self._settle(now)
         self._yaw_lock.reported(status, now)
         self._setpoints.reported(status, device.attitude, now, may_send=(
             self.in_control
-            and not (manager.pose_changes.is_busy or manager.place_changes.is_busy)))
+            and not (manager.pose_changes.desired or manager.place_changes.desired)))
         if manager.is_releasing and self._setpoints.stands:
             self._setpoints.forget()
             manager.release_due = -math.inf
@@ -306,7 +308,7 @@ class Gimbal:
 
     def unavailable(self, now: float) -> str:
         """Return why the gimbal cannot be commanded now, for people; '' if it can."""
-        return (self._commands.refusal or self._absence(now)
+        return (self._commands.refusal or self._commands.lateness(now) or self._absence(now)
                 or (self._manager.lack_of_status(now) if self._control.known is None
                     else self._control.lack(self._manager)))
 
@@ -340,50 +342,69 @@ class Gimbal:
             # No command stops a gimbal everywhere: PX4 reads unset angles as 0.
             setpoints.stop(now)
             manager.release_due = now + STOP_LIMIT
-
-        def released(result: Result, now: float) -> None:
-            manager.release_due = -math.inf
-            if result.success and setpoints.may_turn:
-                result = result._replace(
-                    message=f'{result.message}; no attitude shows that the gimbal stands')
-            done(result, now)
-
-        self._request_control(False, now, released)
+        self._request_control(False, now, done)
 
     def _request_control(self, take: bool, now: float, done: Done) -> None:
         refusal = self._commands.refusal if take else ''
         if refusal := refusal or self._absence(now):
             done(Result(False, refusal), now)
+            return
+        wish = 'take control' if take else 'release control'
+        result = self._control.request(take, self._manager, now, Caller(done, now, detail=wish))
+        if result is not None:
+            done(self._released(result), now)
+        self._settle(now)
+
+    def _released(self, result: Result) -> Result:
+        """Take the result of a release of control."""
+        self._manager.release_due = -math.inf
+        if result.success and self._setpoints.may_turn:
+            return result._replace(
+                message=f'{result.message}; no attitude shows that the gimbal stands')
+        return result
+
+    def _settle(self, now: float) -> None:
+        """Answer the callers whose requests have ended."""
+        for manager in list(self._managers.all.values()):
+            for changes, outcome in manager.take_outcomes():
+                answer(outcome.callers, self._ended(manager, changes, outcome, now), now)
+
+    def _ended(
+        self, manager: RemoteManager, changes: Property[S], outcome: Outcome[S], now: float,
+    ) -> Result:
+        """Return the result of a request, for its callers."""
+        result = outcome.result
+        if changes is manager.pose_changes:
+            self._setpoints.request_ended(Request.POSE, result)
+        elif changes is manager.place_changes:
+            self._setpoints.request_ended(Request.PLACE, result)
+        elif outcome.desired.change.params[0] == gimbal.REMOVE_SENDER:
+            result = self._released(self._control.ended(False, result, manager))
         else:
-            self._control.request(take, self._manager, now, self._explained(
-                'take control' if take else 'release control', done))
+            result = self._control.ended(True, result, manager)
+        wish = outcome.callers[0].detail if outcome.callers else ''
+        return self._explained(result, manager, wish, now) if result.refused else result
 
-    def _explained(self, wish: str, done: Done) -> Done:
-        """Return a callback that adds the manager, the wish and the control to a refusal."""
-        manager = self._manager.address
-
-        def ended(result: Result, now: float) -> None:
-            if result.refused:
-                primary = self._control.known and self._control.known.primary
-                if primary and not self.in_control and result.permanent:
-                    advice = f'{primary} has control and must release it first'
-                else:
-                    who = 'this node' if self.in_control else primary or 'no component'
-                    advice = self.unreachable(now) or (
-                        f'{who} has control: the log of the manager may have the reason')
-                # A doubtful answer, which may belong to an earlier command, has no such prefix.
-                _, is_refusal, answer = result.message.partition('refused: ')
-                text = (f'manager {manager} refused "{wish}": {answer}' if is_refusal
-                        else result.message)
-                result = result._replace(message=f'{text}; {advice}')
-            done(result, now)
-
-        return ended
+    def _explained(
+        self, result: Result, manager: RemoteManager, wish: str, now: float,
+    ) -> Result:
+        """Add the manager, the wish and the control to a refusal."""
+        primary = self._control.known and self._control.known.primary
+        if primary and not self.in_control and result.permanent:
+            advice = f'{primary} has control and must release it first'
+        else:
+            who = 'this node' if self.in_control else primary or 'no component'
+            advice = self.unreachable(now) or (
+                f'{who} has control: the log of the manager may have the reason')
+        reason = result.message.removeprefix('refused: ')
+        return result._replace(
+            message=f'manager {manager.address} refused "{wish}": {reason}; {advice}')
 
     def close(self, now: float) -> None:
         """Answer all requests; :meth:`release_control` is still possible."""
         self._yaw_lock.cancel(self._commands.refusal, now, superseded=True)
         self._managers.close(self._commands.refusal, now)
+        self._settle(now)
 
     def change_settings(self, settings: GimbalSettings, now: float) -> None:
         """Take other settings: ``setpoint_timeout`` and the time-out of ``sources`` may differ."""
@@ -396,18 +417,30 @@ class Gimbal:
     # Sources
 
     def claim(self, source: str, now: float) -> str:
-        """Claim the gimbal for a source; return why it may not command it, '' if it may."""
+        """Claim the gimbal for a stream; return any refusal of its source, '' for none."""
         self._change_holder(self._sources.poll(now), now)
-        self._change_holder(self._sources.claim(source, now), now)
-        return self.refusal(source)
+        self._take_over(source, now)
+        if change := self._sources.claim(source, now):
+            self._emit(events.GimbalHeld(self.key, change))
+        return self._sources.refusal(source)
+
+    def begin_call(self, source: str, now: float) -> str:
+        """Begin a call; return why its source may not command the gimbal, '' if it may."""
+        self._change_holder(self._sources.poll(now), now)
+        if refusal := self._sources.refusal(source):
+            return refusal
+        self._take_over(source, now)
+        self._sources.begin_call(source)
+        return ''
+
+    def end_call(self, source: str, now: float, *, success: bool) -> None:
+        """End a call, which claims the gimbal if it has succeeded."""
+        if change := self._sources.end_call(source, now, success=success):
+            self._emit(events.GimbalHeld(self.key, change))
 
     def refusal(self, source: str) -> str:
         """Return why a source may not command the gimbal, for people; '' if it may."""
         return self._sources.refusal(source)
-
-    def refusal_of_claim(self, source: str) -> str:
-        """Return why a claim of a source would be refused, '' if it would not."""
-        return self._sources.refusal_of_claim(source)
 
     def release(self, source: str, now: float) -> str:
         """
@@ -419,14 +452,23 @@ class Gimbal:
         self._change_holder(self._sources.release(source, now), now)
         return self._sources.holder or ''
 
+    def _take_over(self, source: str, now: float) -> None:
+        """End the setpoint and the requests of another source, unless it is a higher one."""
+        sources = self._sources
+        if sources.are_ranked and sources.commander != source and not sources.refusal(source):
+            self._end_commands(f'held by {source}', now)
+
     def _change_holder(self, change: HolderChanged[str] | None, now: float) -> None:
         """End the setpoint and the requests of the previous source."""
         if change is None:
             return
-        self._setpoints.end(now)
-        if change.before is not None:
-            self._cancel_moves(self.refusal(change.before), now)
+        self._end_commands(f'held by {change.after or "no source"}', now)
         self._emit(events.GimbalHeld(self.key, change))
+
+    def _end_commands(self, message: str, now: float) -> None:
+        self._setpoints.end(now)
+        self._cancel_moves(message, now)
+        self._settle(now)
 
     # Requests
 
@@ -455,15 +497,11 @@ class Gimbal:
             return
         self._end_place_changes(flag.goal, now)
         self._yaw_lock.cancel(f'superseded by {flag.goal}', now, superseded=True)
-        self._request(self._manager.pose_changes, flag.change(self.key.device_id), flag.wish, now,
-                      self._setpoints.suspend(now, done))
-
-    def _request(
-        self, changes: Reconciler[S], change: GimbalChange[S], wish: str, now: float, done: Done,
-        *, is_stream: bool = False,
-    ) -> None:
-        changes.want(Desired(change, since=now, limit=REQUEST_LIMIT), now,
-                     self._explained(wish, done), is_stream=is_stream)
+        self._setpoints.suspend(now, Request.POSE)
+        self._manager.pose_changes.want(
+            Desired(flag.change(self.key.device_id), limit=REQUEST_LIMIT), now,
+            Caller(done, now, detail=flag.wish))
+        self._settle(now)
 
     def _capabilities(self) -> int | None:
         information = self._manager.information
@@ -494,9 +532,11 @@ class Gimbal:
             done(Result(False, reason), now)
             return
         change = point(self.key.device_id, place)
-        self._request(
-            self._manager.place_changes, change, change.goal, now,
-            self._setpoints.suspend(now, done, is_place=place is not None), is_stream=is_stream)
+        self._setpoints.suspend(now, Request.PLACE, is_place=place is not None)
+        self._manager.request_place(
+            Desired(change, limit=REQUEST_LIMIT), now,
+            Caller(done, now, is_stream=is_stream, detail=change.goal))
+        self._settle(now)
 
     # Setpoints
 
@@ -562,7 +602,7 @@ class Gimbal:
 
     def _end_place_changes(self, newer: str, now: float) -> None:
         """Send no place again, which would undo a later setpoint or request."""
-        self._manager.place_changes.cancel(f'superseded by {newer}', now, superseded=True)
+        self._manager.cancel_places(f'superseded by {newer}', now, superseded=True)
 
     def _message(
         self, frame: YawFrame, q: Components, rates: Vector,
@@ -580,9 +620,9 @@ class Gimbal:
         self._check(now)
         self._change_holder(self._sources.poll(now), now)
         manager, control = self._manager, self._control
-        for one in manager.reconcilers:
-            one.poll(now)
+        manager.poll(now)
         self._yaw_lock.poll(now)
+        self._settle(now)
         if self.in_control:
             self._setpoints.poll(now)
         if not self._connected:
@@ -592,7 +632,7 @@ class Gimbal:
             if control.known.primary is None:
                 self._request_control(True, now, self._taken_automatically)
         if manager.status_query.take(now):
-            manager.target.request_status(now)
+            manager.request(gimbal.GimbalManagerStatus.id, now)
         self._device.poll(manager, now)
 
     def _taken_automatically(self, result: Result, now: float) -> None:
@@ -606,7 +646,7 @@ class Gimbal:
         if self._connected and is_known and self._control.take_due:
             return -math.inf
         due = min(self._sources.next_deadline(), self._yaw_lock.next_deadline(),
-                  *(one.next_deadline() for one in manager.reconcilers))
+                  manager.next_deadline())
         if is_known:
             due = min(due, manager.control_deadline())
         if self._connected:

@@ -22,8 +22,8 @@ from . import events
 from .commands import configure, Control
 from .remote_managers import RemoteManager
 from ..mavlink.messages import Address
-from ..payload.attempt import Done, Result
-from ..payload.reconciler import Desired
+from ..payload.confirmed_command import Result
+from ..payload.device_property import Caller, Desired
 
 # s; the limit of a request, including its confirmation.
 REQUEST_LIMIT = 5.0
@@ -81,21 +81,23 @@ class GimbalControl:
         todo = '' if self.known and self.known.primary else '; take control first'
         return f'no control of gimbal {self._key}: {self.known}{todo}'
 
-    def request(self, take: bool, manager: RemoteManager, now: float, done: Done) -> None:
-        """Take primary control, or release all; succeed only if the status shows it."""
-        def ended(result: Result, now: float) -> None:
-            if result.success or take and result.refused:
-                self._may_have_it = False
-            if result.success and take and not manager.enforces_control:
-                result = result._replace(
-                    message=f'{result.message}; ArduPilot also obeys components without control')
-            done(result, now)
-
+    def request(
+        self, take: bool, manager: RemoteManager, now: float, caller: Caller,
+    ) -> Result | None:
+        """Take primary control, or release all; return the result if nothing need be sent."""
         if not take and self.known is not None and not self.has_any:
             # PX4 would take the system id from another component of our system.
-            ended(Result(True, f'not in control: {self.known}'), now)
-            return
+            return Result(True, f'not in control: {self.known}')
         self._may_have_it |= take
-        manager.control_changes.want(Desired(
-            configure(self._us, self._key.device_id, take=take), since=now, limit=REQUEST_LIMIT),
-            now, ended)
+        manager.change_control(Desired(
+            configure(self._us, self._key.device_id, take=take), limit=REQUEST_LIMIT), now, caller)
+        return None
+
+    def ended(self, take: bool, result: Result, manager: RemoteManager) -> Result:
+        """Take the result of a request; return it with what the manager makes of control."""
+        if result.success or take and result.refused:
+            self._may_have_it = False
+        if result.success and take and not manager.enforces_control:
+            return result._replace(
+                message=f'{result.message}; ArduPilot also obeys components without control')
+        return result

@@ -16,7 +16,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection
+from collections.abc import Callable, Collection, Iterator
 from dataclasses import dataclass
 import math
 from typing import Any
@@ -24,13 +24,19 @@ from typing import Any
 from . import events
 from .commands import Control
 from .messages import GimbalManagerInformation, GimbalManagerStatus, REMOVE_SENDER
-from ..mavlink.command_sender import CommandSender, format_seconds
+from ..mavlink.command_sender import (
+    Command,
+    CommandSender,
+    Done,
+    format_seconds,
+    request_message,
+)
 from ..mavlink.dialect import mavlink
 from ..mavlink.messages import Address
-from ..payload.attempt import StatusReport, Target
+from ..payload.confirmed_command import Result, Target
+from ..payload.device_property import Caller, Desired, Outcome, Property
 from ..payload.messages import GimbalDeviceAttitudeStatus
 from ..payload.mount_attitude import yaw_frame, YawFrame
-from ..payload.reconciler import Reconciler
 
 # s of silence after which a manager or a device is lost.
 SILENCE_LIMIT = 3.0
@@ -85,7 +91,7 @@ class RemoteManager:
 
     :ivar autopilot: MAV_AUTOPILOT, None while unknown; likewise ``information``.
     :ivar control: the components in control in its last status.
-    :ivar release_due: the time before which control is not changed: the gimbal is being stopped.
+    :ivar release_due: the time before which control is not released: the gimbal is being stopped.
     :ivar control_changes: confirmed by its status.
     :ivar pose_changes: of the flags, confirmed by the status of the device: ArduPilot's manager
         does not report them.
@@ -101,29 +107,103 @@ class RemoteManager:
         self.status_query = Repetition()
         self._status_time = 0
         self.release_due = -math.inf
-        self.target = Target(
-            address, commands, kind='gimbal manager', status_id=GimbalManagerStatus.id,
-            status_name=GimbalManagerStatus.msgname, needs_status=True)
-        self.control_changes: Reconciler[GimbalManagerStatus] = Reconciler(
-            self.target, earliest=lambda change: self.release_due)
-        self.pose_changes: Reconciler[GimbalDeviceAttitudeStatus] = Reconciler(Target(
-            address, commands, kind='gimbal device', status_id=GimbalDeviceAttitudeStatus.id,
-            status_name=GimbalDeviceAttitudeStatus.msgname, status_source=key.address,
-            needs_status=True))
-        self.place_changes: Reconciler[None] = Reconciler(
-            Target(address, commands, kind='gimbal manager'))
+        self._commands = commands
+        self.control_changes: Property[GimbalManagerStatus] = Property(Target(
+            address, commands, 'gimbal manager', GimbalManagerStatus.id,
+            GimbalManagerStatus.msgname, needs_status=True))
+        self.pose_changes: Property[GimbalDeviceAttitudeStatus] = Property(Target(
+            address, commands, 'gimbal device', GimbalDeviceAttitudeStatus.id,
+            GimbalDeviceAttitudeStatus.msgname, key.address, needs_status=True))
+        self.place_changes: Property[None] = Property(Target(address, commands, 'gimbal manager'))
+        # The newest place of a stream, while another one is under way.
+        self._next_place: tuple[Desired[None], Caller] | None = None
+        # A release of control that waits until the gimbal stands, and its callers.
+        self._release: tuple[Desired[GimbalManagerStatus], list[Caller]] | None = None
 
     @property
-    def reconcilers(self) -> tuple[Reconciler[Any], ...]:
-        """Return the reconcilers of all properties."""
+    def properties(self) -> tuple[Property[Any], ...]:
+        """Return all properties."""
         return self.control_changes, self.pose_changes, self.place_changes
+
+    def request(self, message_id: int, now: float, *, to: Address | None = None) -> None:
+        """Request one message of the manager or of another component."""
+        self._commands.start(request_message(to or self.address, message_id), now)
+
+    def send(
+        self, command: int, params: tuple[float, ...], now: float, done: Done, *, to: Address,
+    ) -> None:
+        """Send a command to another component."""
+        self._commands.start(Command(to, command, params), now, done)
+
+    def change_control(
+        self, desired: Desired[GimbalManagerStatus], now: float, caller: Caller,
+    ) -> None:
+        """Take or release control; a release waits until ``release_due``."""
+        if desired.change.params[0] != REMOVE_SENDER:
+            self._end_release(Result(False, f'superseded by {desired.change.goal}',
+                                     superseded=True))
+        elif now < self.release_due:
+            self.control_changes.cancel(f'superseded by {desired.change.goal}', now,
+                                        superseded=True)
+            self._release = desired, [*(self._release[1] if self._release else ()), caller]
+            return
+        self.control_changes.want(desired, now, caller)
+
+    def _end_release(self, result: Result) -> None:
+        release, self._release = self._release, None
+        if release is not None:
+            self.control_changes.outcomes.append(
+                Outcome(release[0], result, None, tuple(release[1])))
+
+    def take_outcomes(self) -> Iterator[tuple[Property[Any], Outcome[Any]]]:
+        """Return what has ended, and of which property."""
+        for one in self.properties:
+            while one.outcomes:
+                yield one, one.outcomes.popleft()
+
+    def poll(self, now: float) -> None:
+        """Do what is due."""
+        if self._release is not None and now >= self.release_due:
+            (release, callers), self._release = self._release, None
+            for caller in callers:
+                self.control_changes.want(release, now, caller)
+        for one in self.properties:
+            one.poll(now)
+        if self._next_place is not None and self.place_changes.desired is None:
+            (desired, caller), self._next_place = self._next_place, None
+            self.place_changes.want(desired, now, caller)
+
+    def next_deadline(self) -> float:
+        """Return when :meth:`poll` has something to do."""
+        due = math.inf if self._release is None else self.release_due
+        return min(due, *(one.next_deadline() for one in self.properties))
+
+    def request_place(self, desired: Desired[None], now: float, caller: Caller) -> None:
+        """Point at a place, or at none; of a stream the newest is sent when one has ended."""
+        self._drop_next_place(f'superseded by {desired.change.goal}')
+        if caller.is_stream and self.place_changes.desired is not None:
+            self._next_place = desired, caller
+        else:
+            self.place_changes.want(desired, now, caller)
+
+    def cancel_places(self, message: str, now: float, *, superseded: bool = False) -> None:
+        """End the requests that point at a place."""
+        self._drop_next_place(message)
+        self.place_changes.cancel(message, now, superseded=superseded)
+
+    def _drop_next_place(self, message: str) -> None:
+        if self._next_place is not None:
+            desired, caller = self._next_place
+            self._next_place = None
+            self.place_changes.outcomes.append(Outcome(
+                desired, Result(False, message, superseded=True), None, (caller,)))
 
     def pose_frame(self) -> tuple[YawFrame | None, float]:
         """Return the yaw frame of the request for a pose, None for none; since when, s."""
         desired = self.pose_changes.desired
         if desired is None:
             return None, -math.inf
-        return yaw_frame(int(desired.change.params[4])), desired.since
+        return yaw_frame(int(desired.change.params[4])), self.pose_changes.sent_at
 
     @property
     def enforces_control(self) -> bool:
@@ -160,26 +240,29 @@ class RemoteManager:
 
     def confirm_control(self, status: GimbalManagerStatus, now: float) -> None:
         """Compare a status that counts with the requests for control."""
-        self.control_changes.reported(StatusReport(status, now, has_clock=False), now)
+        self.control_changes.reported(status, now)
 
     def confirm_pose(self, status: GimbalDeviceAttitudeStatus, now: float) -> None:
         """Compare a status of the device with the requests for a pose."""
-        self.pose_changes.reported(StatusReport(status, now, has_clock=False), now)
+        self.pose_changes.reported(status, now)
 
     @property
     def is_releasing(self) -> bool:
         """Whether a release of control is under way."""
-        return self.control_changes.may_set(lambda change: change.params[0] == REMOVE_SENDER)
+        desired = self.control_changes.desired
+        return self._release is not None or (
+            desired is not None and desired.change.params[0] == REMOVE_SENDER)
 
     def cancel_moves(self, message: str, now: float, *, superseded: bool = False) -> None:
         """End the requests that may turn the gimbal."""
-        for one in (self.pose_changes, self.place_changes):
-            one.cancel(message, now, superseded=superseded)
+        self.pose_changes.cancel(message, now, superseded=superseded)
+        self.cancel_places(message, now, superseded=superseded)
 
     def cancel(self, message: str, now: float, *, superseded: bool = False) -> None:
         """End all requests."""
-        for one in self.reconcilers:
-            one.cancel(message, now, superseded=superseded)
+        self._end_release(Result(False, message, superseded=superseded))
+        self.control_changes.cancel(message, now, superseded=superseded)
+        self.cancel_moves(message, now, superseded=superseded)
 
 
 class RemoteManagers:
@@ -241,8 +324,7 @@ class RemoteManagers:
         """Lose some managers at once."""
         for manager in [one for one in self.all.values() if one.address in lost]:
             manager.heard_at = min(manager.heard_at, now - SILENCE_LIMIT)
-            for one in manager.reconcilers:
-                one.lost(reason, now)
+            manager.cancel(reason, now)
 
     def close(self, message: str, now: float) -> None:
         """End all requests: the process ends."""

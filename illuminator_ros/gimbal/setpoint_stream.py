@@ -24,7 +24,7 @@ import math
 from .messages import GimbalManagerSetAttitude
 from .rate_stop import ATTITUDE_SPACING, TurningDetector
 from ..mavlink.dialect import mavlink
-from ..payload.attempt import Done, Result
+from ..payload.confirmed_command import Result
 from ..payload.messages import GimbalDeviceAttitudeStatus
 from ..payload.mount_attitude import (
     Components,
@@ -41,6 +41,13 @@ from ..payload.rotation import flu_frd, Quaternion, Vector
 REPEATS = (0.2, 0.4, 0.8)
 # s after an attitude in which the device may still report the yaw lock that it had before.
 LOCK_DELAY = 1.0
+
+
+class Request(Enum):
+    """The requests that a gimbal follows instead of a setpoint."""
+
+    POSE = 'pose'
+    PLACE = 'place'
 
 
 class Kind(Enum):
@@ -87,9 +94,9 @@ class SetpointStream:
     """
     Sends setpoints to one gimbal, and repeats the last one. No I/O; times are s.
 
-    A :class:`~..payload.reconciler.Reconciler` cannot do this: GIMBAL_MANAGER_SET_ATTITUDE is not
-    acknowledged, and the status of a device shows where it points, not what it was given, since
-    it turns slowly, within its ranges, and with the offsets of other players.
+    A :class:`~..payload.device_property.Property` cannot do this: GIMBAL_MANAGER_SET_ATTITUDE is
+    not acknowledged, and the status of a device shows where it points, not what it was given,
+    since it turns slowly, within its ranges, and with the offsets of other players.
 
     :param make: returns the message of a setpoint.
     :param send: sends a message.
@@ -109,6 +116,8 @@ class SetpointStream:
         self._timeout = timeout
         self._requested_frame = requested_frame
         self._last: _Setpoint | None = None
+        # The setpoint that the last request of each kind has suspended, and its place.
+        self._suspended: dict[Request, tuple[_Setpoint | None, _Setpoint]] = {}
         self._reported_frame = YawFrame.VEHICLE
         self._attitude_frame, self._attitude_at = YawFrame.VEHICLE, -math.inf
         self._detector = TurningDetector()
@@ -152,13 +161,13 @@ class SetpointStream:
             return self._attitude_frame
         return requested or self._reported_frame
 
-    def suspend(self, now: float, done: Done, *, is_place: bool = False) -> Done:
+    def suspend(self, now: float, kind: Request, *, is_place: bool = False) -> None:
         """
         End a rate with a zero, and send no attitude again: a request follows.
 
-        :param done: takes the result of the request.
+        :meth:`request_ended` takes its result.
+
         :param is_place: whether the request points the gimbal at a place.
-        :return: takes the result first: the setpoint counts again if the request was refused.
         """
         before, place = self._last, _Setpoint(Kind.PLACE)
         if before is not None and before.kind is Kind.RATE:
@@ -168,18 +177,21 @@ class SetpointStream:
             before.due.clear()
         if is_place:
             self._last = place
+        self._suspended[kind] = before, place
 
-        def ended(result: Result, now: float) -> None:
-            if result.success and before is not None:
-                before.is_over = True
-            # Without an answer the gimbal may follow the place.
-            if result.refused and self._last is place:
-                self._last = before
-            if self._last is not None and self._last.is_over:
-                self._last = None
-            done(result, now)
-
-        return ended
+    def request_ended(self, kind: Request, result: Result) -> None:
+        """Take the result of the last request: the setpoint counts again if it was refused."""
+        before, place = self._suspended.get(kind, (None, None))
+        if result.success and before is not None:
+            before.is_over = True
+        # Without an answer the gimbal may follow the place.
+        if result.refused and self._last is not None and self._last is place:
+            self._last = before
+            # Another request may have suspended the place.
+            self._suspended = {one: (before if suspended is place else suspended, its_place)
+                               for one, (suspended, its_place) in self._suspended.items()}
+        if self._last is not None and self._last.is_over:
+            self._last = None
 
     def hold(self, frame: YawFrame, now: float) -> None:
         """Send a zero whose yaw frame sets the yaw lock: the gimbal stays where it points."""

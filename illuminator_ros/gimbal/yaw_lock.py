@@ -23,10 +23,10 @@ from .commands import Flag
 from .setpoint_stream import REPEATS
 from ..mavlink.command_sender import format_seconds
 from ..mavlink.dialect import flag_names
-from ..payload.attempt import Done, Result
+from ..payload.confirmed_command import Done, Result
+from ..payload.device_property import MAX_CALLERS
 from ..payload.messages import GimbalDeviceAttitudeStatus
 from ..payload.mount_attitude import YawFrame
-from ..payload.reconciler import MAX_CALLERS
 
 # s from a request until it has failed.
 LIMIT = 2.0
@@ -38,9 +38,9 @@ class YawLock:
     """
     Sets the yaw lock with a rate of zero, until the status of the device shows it.
 
-    A :class:`~..payload.reconciler.Reconciler` would need a command. The command with the flag,
-    MAV_CMD_DO_GIMBAL_MANAGER_PITCHYAW, turns the gimbal: PX4 reads its unset angles as 0, it has
-    no roll, and the other yaw frame needs the heading. No I/O; times are s.
+    A :class:`~..payload.device_property.Property` would need a command. The command with the
+    flag, MAV_CMD_DO_GIMBAL_MANAGER_PITCHYAW, turns the gimbal: PX4 reads its unset angles as 0, it
+    has no roll, and the other yaw frame needs the heading. No I/O; times are s.
 
     :param send: sends the rate of zero, whose yaw frame sets the lock.
     """

@@ -29,8 +29,15 @@ from .mount_orientation import MountOrientations
 from ..mavlink.command_sender import Command, CommandSender
 from ..mavlink.component import Payload
 from ..mavlink.dialect import mavlink
-from ..mavlink.messages import Address, ComponentInformationBasic, Heartbeat, Message, sender_of
-from ..payload.attempt import Done, Result
+from ..mavlink.messages import (
+    Address,
+    CommandAck,
+    ComponentInformationBasic,
+    Heartbeat,
+    Message,
+    target_of,
+)
+from ..payload.confirmed_command import Done, Result
 from ..payload.discovery import Discovery
 from ..payload.identity import Identity
 from ..payload.listeners import Listeners
@@ -72,7 +79,7 @@ class IlluminatorClient(Payload):
         self.discovery = Discovery(
             self._make, commands, found=self._found, forgotten=self._forgotten, wanted=wanted)
         self.lights: Mapping[Address, Light] = self.discovery.devices
-        self.messages = (Heartbeat, IlluminatorStatus, ComponentInformationBasic,
+        self.messages = (Heartbeat, IlluminatorStatus, ComponentInformationBasic, CommandAck,
                          *(self.mounts.messages if needs_mounts else ()))
 
     @property
@@ -91,12 +98,7 @@ class IlluminatorClient(Payload):
             if address in self.discovery.devices:
                 self.events.emit(event)
 
-        return Light(address, self._commands, self.settings, emit, self._changed)
-
-    def _changed(self, light: Light, now: float) -> None:
-        self.discovery.changed(light.address)
-        if light.has_answered and light.address not in self.lights:
-            self.discovery.prove(light.address, now)
+        return Light(address, self._commands, self.settings, emit)
 
     def _found(self, light: Light, now: float) -> None:
         self.events.emit(LightFound(light.address))
@@ -120,20 +122,18 @@ class IlluminatorClient(Payload):
         """See :meth:`Payload.link_closed`."""
         for light in self.discovery:
             light.link_closed(now, reason)
-            self.discovery.changed(light.address)
 
     def components_lost(self, lost: Collection[Address], now: float, reason: str) -> None:
         """See :meth:`Payload.components_lost`."""
         for light in self.discovery:
             if light.address in lost:
                 light.lose('the link was lost', now)
-                self.discovery.changed(light.address)
 
     def receive(self, source: Address, message: Message, now: float) -> None:
         """See :meth:`Payload.receive`."""
         if isinstance(message, IlluminatorStatus):
             if light := self.discovery.hear(source, now, proved=True):
-                light.take_status(Status.from_message(message), now, sender_of(message))
+                light.take_status(Status.from_message(message), now)
         elif isinstance(message, Heartbeat) and message.type == mavlink.MAV_TYPE_ILLUMINATOR:
             if light := self.discovery.hear(source, now, proved=False):
                 light.heard(now)
@@ -141,9 +141,12 @@ class IlluminatorClient(Payload):
             if self.mounts.take(source, message, now):
                 self.mount_moved.emit(source.system)
         elif light := self.discovery.get(source):
-            self.discovery.changed(source)
             if isinstance(message, Heartbeat):
                 light.heard(now)
+            elif isinstance(message, CommandAck):
+                # An answer announces it: a heartbeat alone proves nothing.
+                if target_of(message).includes(self._commands.address):
+                    self.discovery.prove(source, now)
             elif isinstance(message, ComponentInformationBasic):
                 self.discovery.prove(source, now)
                 light.take_identity(Identity.from_message(message), now)

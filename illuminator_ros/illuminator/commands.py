@@ -40,27 +40,33 @@ class Switch(NamedTuple):
     note: str = ''
     position: None = None
     command: int = mavlink.MAV_CMD_ILLUMINATOR_ON_OFF
+    is_idempotent: bool = True
+
+    @property
+    def is_repeated(self) -> bool:
+        """See :class:`~..payload.confirmed_command.Change`."""
+        return not self.on
 
     @property
     def params(self) -> tuple[float, ...]:
-        """See :class:`~..payload.attempt.Change`."""
+        """See :class:`~..payload.confirmed_command.Change`."""
         return (float(self.on),)
 
     @property
     def goal(self) -> str:
-        """See :class:`~..payload.attempt.Change`."""
+        """See :class:`~..payload.confirmed_command.Change`."""
         return 'on' if self.on else 'off'
 
     def shown_by(self, status: Status) -> bool:
-        """See :class:`~..payload.attempt.Change`."""
+        """See :class:`~..payload.confirmed_command.Change`."""
         return status.enabled is self.on
 
     def evidence(self, status: Status) -> str:
-        """See :class:`~..payload.attempt.Change`."""
+        """See :class:`~..payload.confirmed_command.Change`."""
         return _despite_heat(status) if self.on else CONFIRMED
 
     def actual(self, status: Status) -> str:
-        """See :class:`~..payload.attempt.Change`."""
+        """See :class:`~..payload.confirmed_command.Change`."""
         shown = {True: 'on', False: 'off', None: 'neither on nor off'}[status.enabled]
         return _with_flags(shown, status)
 
@@ -81,15 +87,17 @@ class Configure(NamedTuple):
     note: str = ''
     position: None = None
     command: int = mavlink.MAV_CMD_DO_ILLUMINATOR_CONFIGURE
+    is_idempotent: bool = True
+    is_repeated: bool = False
 
     @property
     def params(self) -> tuple[float, ...]:
-        """See :class:`~..payload.attempt.Change`."""
+        """See :class:`~..payload.confirmed_command.Change`."""
         return self.configuration.params()
 
     @property
     def goal(self) -> str:
-        """See :class:`~..payload.attempt.Change`."""
+        """See :class:`~..payload.confirmed_command.Change`."""
         return self.configuration.describe(self.names)
 
     def _missing(self, status: Status) -> list[str]:
@@ -104,13 +112,13 @@ class Configure(NamedTuple):
                 if name in different or getattr(status, name) is None]
 
     def shown_by(self, status: Status) -> bool | None:
-        """See :class:`~..payload.attempt.Change`."""
+        """See :class:`~..payload.confirmed_command.Change`."""
         if self._missing(status):
             return False
         return None if self._hidden(status) else True
 
     def evidence(self, status: Status) -> str:
-        """See :class:`~..payload.attempt.Change`."""
+        """See :class:`~..payload.confirmed_command.Change`."""
         hidden = self._hidden(status)
         if not hidden:
             return CONFIRMED
@@ -122,6 +130,6 @@ class Configure(NamedTuple):
         return f'accepted (ILLUMINATOR_STATUS shows {", ".join(shown)})'
 
     def actual(self, status: Status) -> str:
-        """See :class:`~..payload.attempt.Change`."""
+        """See :class:`~..payload.confirmed_command.Change`."""
         reported = status.configuration(self.configuration)
         return _with_flags(reported.describe(self._missing(status)), status)

@@ -31,12 +31,15 @@ class ChangeCause(Enum):
 
     FIRST_STATUS = 'first status'
     REQUEST = 'request'
+    LATE_EFFECT = 'late effect'
     LIGHT = 'light'
     ROUNDING = 'rounding'
 
 
 # The origins of a switch that no request names.
 A_REQUEST, OTHER_SENDER = 'a request', 'another sender'
+# The origin of a change by a command that ended unconfirmed.
+LATE_EFFECT = 'a late effect of our request'
 
 
 @dataclass(frozen=True)
@@ -107,14 +110,14 @@ class StatusReceived(LightEvent):
 
 
 @dataclass(frozen=True)
-class AddressShared(LightEvent):
+class StatesChanging(LightEvent):
     """
-    Statuses have begun, or ceased, to show that several lights send from an address.
+    The state of a light has begun, or ceased, to go back and forth without a command of ours.
 
-    :param shared: whether several lights send.
+    Several lights with one address cause that, or another controller.
     """
 
-    shared: bool
+    is_changing: bool
 
 
 @dataclass(frozen=True)
@@ -132,10 +135,15 @@ class ConfigurationChanged(LightEvent):
 
 @dataclass(frozen=True)
 class ConfigurationRestored(LightEvent):
-    """The result of sending a configuration without a request, such as after a restart."""
+    """
+    The result of sending a configuration without a request, such as after a restart.
+
+    :param is_final: whether it will not be sent again.
+    """
 
     success: bool
     message: str
+    is_final: bool = True
 
 
 @dataclass(frozen=True)
@@ -159,10 +167,12 @@ class LimitExceeded(LightEvent):
 
     :param excess: each value that exceeds a limit, for people; empty if none does.
     :param impossible: why the light cannot strobe within the limits, '' if it can.
+    :param is_again: whether it was brought back within the limits shortly before.
     """
 
     excess: tuple[str, ...]
     impossible: str
+    is_again: bool = False
 
 
 @dataclass(frozen=True)
@@ -181,25 +191,12 @@ class DesiredStateFailed(LightEvent):
 
 
 @dataclass(frozen=True)
-class ChangedByOther(LightEvent):
-    """
-    Another sender has changed a light whose state must be kept.
-
-    :param change: the new values, for people.
-    :param undone: whether the change is undone; False once the limit of repeats is reached.
-    """
-
-    change: str
-    undone: bool
-
-
-@dataclass(frozen=True)
 class AutomaticSwitch(LightEvent):
     """
     A light is switched without a request.
 
     :param reason: for people.
-    :param failure: why the last command was not confirmed, '' before the first one.
+    :param failure: why it is not confirmed, '' before the first command.
     """
 
     on: bool
@@ -212,7 +209,8 @@ class LightSwitched(LightEvent):
     """
     A light was switched on or off, and was not in that state before.
 
-    :param origin: such as ``service``, :data:`A_REQUEST` or :data:`OTHER_SENDER`, for people.
+    :param origin: such as ``service``, :data:`A_REQUEST`, :data:`LATE_EFFECT` or
+        :data:`OTHER_SENDER`, for people.
     """
 
     on: bool
@@ -250,7 +248,7 @@ class LightSnapshot(NamedTuple):
     limit_exceeded: LimitExceeded
     identity: Identity | None
     identity_is_settled: bool
-    shared_address: bool
+    states_are_changing: bool
     unreachable: str
     holder: str | None = None
     held_since: float = 0.0
@@ -263,8 +261,8 @@ class LightSnapshot(NamedTuple):
         if self.status:
             events.append(StatusReceived(
                 self.address, self.status, self.status_at, self.temperature))
-        if self.shared_address:
-            events.append(AddressShared(self.address, True))
+        if self.states_are_changing:
+            events.append(StatesChanging(self.address, True))
         if self.configuration:
             events.append(ConfigurationChanged(
                 self.address, self.configuration, list(FIELDS), ChangeCause.FIRST_STATUS))

@@ -22,17 +22,19 @@ import math
 
 from . import events
 from .command_sources import DesiredState, LightSources
-from .light_configuration import LightConfiguration
+from .light_configuration import IMPLIED_TIME, LightConfiguration, requested
 from .light_queries import LightQueries, STATUS
-from .light_switch import LightSwitch, RULES, SwitchRule
 from .messages import STATUS_ID
 from .model import Changes, SafetyLimits, Status, StrobeRange
-from .status_tracker import NewestStatus, StatusTracker
-from ..mavlink.command_sender import CommandResult, CommandSender, format_seconds
+from .status_order import ChangingStates, Order, StatusOrder
+from .switch import OFF, ON, Silence, Switch
+from ..mavlink.command_sender import CommandSender, format_seconds
+from ..mavlink.dialect import mavlink
 from ..mavlink.messages import Address
 from ..payload.arbitration import Cause, HolderChanged
-from ..payload.attempt import Done, Result, Target
 from ..payload.command_sources import DEFAULT, SourceSettings
+from ..payload.confirmed_command import Done, Result, Target
+from ..payload.device_property import answer, Caller, Outcome
 from ..payload.identity import Identity
 
 
@@ -44,15 +46,13 @@ class Settings:
     :param heartbeat_timeout: s, > 0, without a heartbeat or status, after which a light is lost.
     :param status_interval: s, >= 0, between statuses that the light is asked for; 0 leaves its
         own.
-    :param restore_configuration: whether a light that has restarted gets its confirmed
-        configuration again.
+    :param restore_configuration: whether a light that has restarted gets its agreed configuration
+        again.
     :param limits: apply to everything that is sent.
     :param off_after_silence: s without a request after which a light that is on is switched off;
         0 for never.
-    :param reassert: whether changes by other senders are undone.
     :param sources: the sources of commands, None if commands have no sources.
     :param off_on_release: whether a light is switched off when no source holds it any more.
-    :param switch_rules: the rules that decide whether it is on, the highest first.
     """
 
     heartbeat_timeout: float = 3.0
@@ -60,111 +60,97 @@ class Settings:
     restore_configuration: bool = True
     limits: SafetyLimits = SafetyLimits()
     off_after_silence: float = 0.0
-    reassert: bool = False
     sources: SourceSettings | None = None
     off_on_release: bool = False
-    switch_rules: tuple[SwitchRule, ...] = RULES
 
 
 class Light:
     """
-    One component that is an illuminator: liveness, identity, switch and configuration. No I/O.
+    One component that is an illuminator: liveness, identity, sources, switch and configuration.
 
-    Its fields are its parts, and six values that other classes read.
+    No I/O; times are s. Each method that may send ends with :meth:`_update`, which sends what is
+    desired now and answers the callers whose requests have ended.
 
     :param emit: takes the events.
-    :param changed: called with the light and the time when :meth:`next_deadline` or
-        ``has_answered`` may have changed.
-    :ivar connected: whether it is heard.
-    :ivar heard_at: the time of its last message, s; -inf before the first.
-    :ivar lost_at: when it was lost, s; infinity while it is heard.
-    :ivar restarts: how often it has restarted since it was found.
+    :ivar heard_at: the time of its last message; -inf before the first.
+    :ivar lost_at: when it was lost; infinity while it is heard.
     :ivar was_commanded: whether a user has ever sent it a command.
-    :ivar has_answered: whether it has ever answered a command.
     """
 
     def __init__(
         self, address: Address, commands: CommandSender, settings: Settings,
-        emit: Callable[[events.LightEvent], None], changed: Callable[[Light, float], None],
+        emit: Callable[[events.LightEvent], None],
     ) -> None:
         self.address = address
-        self.connected = False
         self.heard_at = -math.inf
         self.lost_at = math.inf
-        self.restarts = 0
         self.was_commanded = False
-        self.has_answered = False
+        self._commands = commands
         self._settings = settings
         self._emit = emit
-        self._changed = changed
-        self._target = Target(
-            address, commands, self._command_ended, kind='light', status_id=STATUS_ID,
-            status_name=STATUS)
-        self._queries = LightQueries(
-            self._target, settings.status_interval, settings.heartbeat_timeout)
-        self._newest = NewestStatus()
+        target = Target(address, commands, 'light', STATUS_ID, STATUS)
+        self._queries = LightQueries(target, settings.status_interval, settings.heartbeat_timeout)
+        self._switch = Switch(target, emit, settings.off_after_silence)
         self._configuration = LightConfiguration(
-            self._target, emit, self._newest, limits=settings.limits,
-            restore=settings.restore_configuration, reassert=settings.reassert,
-            must_wait=lambda: (
-                bool(commands.refusal) or self._switch.may_brightness_undo_off()))
-        self._switch = LightSwitch(
-            self._target, emit, self._configuration, self._newest,
-            off_after_silence=settings.off_after_silence, reassert=settings.reassert,
-            earliest_on=self._earliest_on, rules=settings.switch_rules)
-        self._tracker = StatusTracker()
-        self._link_failure = ''
+            target, emit, limits=settings.limits, restores=settings.restore_configuration)
         self._sources = LightSources(settings.sources)
-
-    def _command_ended(self, result: CommandResult, now: float) -> None:
-        self.has_answered |= result.result is not None
-        self._changed(self, now)
+        self._order = StatusOrder()
+        self._changing = ChangingStates()
+        self._measures_temperature = False
+        self._link_failure = ''
 
     # Reception
 
     def heard(self, now: float) -> None:
         """Take a heartbeat, or anything else that shows that the light is alive."""
-        self.heard_at = now
-        if not self.connected:
-            self.connected = True
+        was_connected, self.heard_at = self.connected, now
+        if not was_connected:
             self.lost_at = math.inf
-            self._tracker.found(now)
-            self._configuration.retry_required(now)
-            # A status request that was sent to the silent light may be resent only half a second
-            # later.
-            self._target.cancel_status_request(now)
+            self._configuration.found(now)
             self._queries.begin(now)
             self._emit(events.LightConnected(self.address))
+            self._update(now)
 
-    def take_status(self, status: Status, now: float, sender: int = 0) -> None:
-        """
-        Take an ILLUMINATOR_STATUS, unless it is older than the one before.
-
-        :param sender: of the message.
-        """
+    def take_status(self, status: Status, now: float) -> None:
+        """Take an ILLUMINATOR_STATUS, unless it is older than the one before."""
         self.heard(now)
-        report, restarted = self._tracker.take(
-            status, now, sender=sender,
-            commanded=self._switch.is_changing or self._configuration.is_changing)
-        if report is None:
-            if self._tracker.proof_due < math.inf:
-                self._queries.need_status(self._tracker.proof_due)
+        order = self._order.take(status, now, self._expects)
+        if order is Order.LATE:
             return
-        was_shared = self._newest.is_shared
-        self._newest.take(report, now)
-        if restarted:
-            self._restarted(now)
-        if report.shared_address is not was_shared:
-            self._emit(events.AddressShared(self.address, report.shared_address))
-        self._forget_silenced(now)
-        self._switch.reported(report, now, restarted=restarted)
-        self._configuration.reported(
-            report, now, can_follow=self._tracker.conflict.can_follow,
-            switched_at=self._switch.switched_at)
-        self._tracker.checked()
+        # Lights that do not measure send 0 (ArduSub), and a sensor rarely reads exactly 0.
+        self._measures_temperature |= bool(status.temperature)
+        if self._sources.are_ranked:
+            self._forget_silenced(now)
+        if order is Order.RESTARTED:
+            self._restarted(status, now)
+        else:
+            self._take_state(status, now)
         self._queries.take_status(now)
+        self._update(now)
         # Last, so that a caller has its answer before topics show the change.
-        self._emit(events.StatusReceived(self.address, status, now, self._newest.temperature))
+        self._emit(events.StatusReceived(self.address, status, now, self._temperature))
+
+    def _expects(self, status: Status) -> bool:
+        return self._switch.expects(status) or self._configuration.expects(status)
+
+    def _take_state(self, status: Status, now: float) -> None:
+        switch, configuration, states = self._switch, self._configuration, self._changing
+        switched_at, was_changing = switch.sent_at, states.are_changing
+        states.take(status, now, is_commanded=(
+            switch.is_pending or configuration.is_pending
+            or now <= max(switched_at, configuration.sent_at) + IMPLIED_TIME))
+        if states.are_changing and not was_changing:
+            self._emit(events.StatesChanging(self.address, True))
+        is_followed = not states.are_changing
+        switch.reported(status, now, may_be_ours=configuration.may_switch(now),
+                        is_told=is_followed)
+        configuration.reported(status, now, can_follow=is_followed, switched_at=switched_at)
+
+    def _restarted(self, status: Status, now: float) -> None:
+        self._emit(events.LightRestarted(self.address, self._switch.enabled, status.enabled))
+        self._queries.begin(now)
+        self._switch.restarted(status, now)
+        self._configuration.restarted(status, now)
 
     def take_identity(self, identity: Identity, now: float) -> None:
         """Take a COMPONENT_INFORMATION_BASIC."""
@@ -175,15 +161,15 @@ class Light:
     def lose(self, reason: str, now: float) -> None:
         """Note that the light is not heard any more."""
         if self.connected:
-            self.connected = False
             self.lost_at = now
-            self._tracker.lost()
+            self._order.lost()
+            self._changing = ChangingStates()
             self._queries.end()
             self._emit(events.LightLost(self.address, reason))
             message = self.unreachable(now)
-            # An OFF may reach the light at any time.
-            self._switch.lost(message, now)
+            self._switch.cancel(message, now)
             self._configuration.lost(message, now)
+            self._update(now)
 
     def link_opened(self, now: float) -> None:
         """Note that the light can be reached."""
@@ -194,25 +180,36 @@ class Light:
         self._link_failure = f'the link is not open: {reason}'
         self.lose('the link was lost', now)
 
-    def _restarted(self, now: float) -> None:
-        self.restarts += 1
-        self._switch.keep_off()
-        is_on = self.status.enabled if self.status else None
-        self._emit(events.LightRestarted(self.address, self._switch.state.enabled, is_on))
-        self._queries.begin(now)
-        self._configuration.restarted(now)
-
     # Values
+
+    @property
+    def connected(self) -> bool:
+        """Whether it is heard."""
+        return self.lost_at == math.inf != -self.heard_at
 
     @property
     def status(self) -> Status | None:
         """Return the newest status, None before the first."""
-        return self._newest.status
+        return self._order.newest
+
+    @property
+    def restarts(self) -> int:
+        """Return how often it has restarted since it was found."""
+        return self._order.restarts
 
     @property
     def strobe_range(self) -> StrobeRange:
         """Return the strobe periods that the light reports to be possible."""
-        return self._newest.strobe_range
+        return self._configuration.strobe_range
+
+    @property
+    def _temperature(self) -> float | None:
+        """Return the temperature, degC; None where it is not measured, or the sensor fails."""
+        status = self.status
+        if (status is None or not self._measures_temperature
+                or status.error_flags & mavlink.ILLUMINATOR_ERROR_FLAGS_THERMISTOR_FAILURE):
+            return None
+        return status.temperature
 
     def unreachable(self, now: float) -> str:
         """Return why requests cannot reach the light, for people; '' if they can."""
@@ -226,42 +223,30 @@ class Light:
         """Return the state, for any thread."""
         configuration, queries = self._configuration, self._queries
         return events.LightSnapshot(
-            self.address, self.connected, self.heard_at, self.status, self._newest.at,
-            self._settings.status_interval, self.restarts, self._newest.temperature,
-            configuration.agreed.confirmed, configuration.discrepancy,
-            configuration.guard.exceeded, queries.identity, queries.identity_is_settled(now),
-            self._tracker.conflict.detected, self.unreachable(now), self._sources.shown_holder,
-            self._sources.since)
+            self.address, self.connected, self.heard_at, self.status, self._order.newest_at,
+            self._settings.status_interval, self.restarts, self._temperature,
+            configuration.agreed, configuration.discrepancy, configuration.exceeded,
+            queries.identity, queries.identity_is_settled(now), self._changing.are_changing,
+            self.unreachable(now), self._sources.shown_holder, self._sources.since)
 
     def change_settings(self, settings: Settings, now: float) -> None:
         """
         Take other settings.
 
-        Only ``limits``, ``off_after_silence``, ``reassert`` and the time-out of ``sources`` may
-        differ. The silence begins again if ``off_after_silence`` differs.
+        Only ``limits``, ``off_after_silence`` and the time-out of ``sources`` may differ. The
+        silence begins again if ``off_after_silence`` differs.
         """
         before, self._settings = self._settings, settings
         if settings.limits != before.limits:
             self._configuration.change_limits(settings.limits, now)
         if settings.off_after_silence != before.off_after_silence:
             self._forget_silenced(now)
-            self._switch.change_silence(settings.off_after_silence, now)
-        if settings.reassert != before.reassert:
-            self._configuration.change_reassert(settings.reassert)
-            self._switch.change_reassert(settings.reassert, now)
+            self._switch.silence = Silence(settings.off_after_silence, now)
         if settings.sources:
             self._sources.set_lease(settings.sources.timeout)
-        self._changed(self, now)
+        # The next poll sends what they demand: an atomic set that fails takes them back before.
 
     # Requests
-
-    def _can_reach(self, now: float, done: Done, refusal: str = '') -> bool:
-        """Return whether the light takes requests; if not, fail a request with the reason."""
-        closed = self._target.commands.refusal
-        refusal = closed or refusal or self.unreachable(now)
-        if refusal:
-            done(Result(False, refusal, superseded=bool(closed)), now)
-        return not refusal
 
     def enable(
         self, on: bool, now: float, done: Done, *, detail: str = '', source: str = DEFAULT,
@@ -273,113 +258,22 @@ class Light:
         While a higher source holds the light, a request is not sent. One of a stream is then
         remembered, and any other is refused and leaves nothing behind.
 
-        An OFF overtakes: requests for ON that are not confirmed are superseded.
-
         :param detail: how it was requested, for :class:`LightSwitched`.
         :param is_stream: whether it is one of a stream, which its publisher repeats: a newer one
             replaces it.
         """
-        def finished(result: Result, now: float) -> None:
-            if result.success:
-                self._sources.remember(source, desired)
-            done(result, now)
+        caller = Caller(done, now, source, is_stream, detail)
+        if self._may_send(caller, DesiredState(enabled=on), now):
+            if not on:
+                self._prepare_off(now)
+            self._switch.ask(on, now, caller)
+        self._update(now)
 
-        desired = DesiredState(enabled=on)
-        refusal = self._claim(source, now, desired, is_stream=is_stream)
-        if self._can_reach(now, done, refusal):
-            self._switch.ask(on, now, finished, detail, is_stream=is_stream)
-            self._changed(self, now)
-
-    def is_held_by_other(self, source: str) -> bool:
-        """Return whether another source holds the light, so that a request is not sent."""
-        return bool(self._sources.holder and self._sources.refusal(source))
-
-    def release(self, source: str, now: float) -> str:
-        """
-        Release the light: the next lower source that has claimed it then holds it.
-
-        :return: the source that holds it now, '' if none does.
-        """
-        self._change_holder(self._sources.poll(now), now)
-        self._change_holder(self._sources.release(source, now), now)
-        self._changed(self, now)
-        return self._sources.holder or ''
-
-    def _claim(
-        self, source: str, now: float, desired: DesiredState, *, is_stream: bool,
-    ) -> str:
-        """Take a request; return why a source may not command the light, '' if it may."""
-        if refusal := self._target.commands.refusal:
-            return refusal
-        self._change_holder(self._sources.poll(now), now)
-        if not is_stream and (refusal := self._sources.refusal_of_claim(source)):
-            return refusal
-        self.was_commanded = True
-        self._forget_silenced(now)
-        self._switch.note_request(now)
-        self._changed(self, now)
-        self._change_holder(self._sources.claim(source, now), now)
-        # A request to a lost light has no effect later, but an OFF ends a remembered ON.
-        if is_stream and (self.connected or desired.enabled is False):
-            self._sources.remember(source, desired)
-        elif desired.enabled is False:
-            self._sources.forget_switch(source)
-        return self._sources.refusal(source)
-
-    def _forget_silenced(self, now: float) -> None:
-        """Forget what would switch the light on, if it was requested before a silence."""
-        if self._switch.state.is_silent(now):
-            self._switch.keep_off()
-            self._sources.forget_on(brightness_is_switch=self._configuration.brightness.is_switch)
-
-    def _change_holder(self, change: HolderChanged[str] | None, now: float) -> None:
-        if change is None:
-            return
-        if change.after is not None:
-            # The requests of a source that no longer holds the light end, and their resends.
-            self._switch.cancel(f'held by {change.after}', now)
-            self._configuration.end_requests(f'held by {change.after}', now)
-        self._emit(events.LightHeld(self.address, change))
-        if change.after is None:
-            self._switch.stop_on(f'{change.before} no longer holds it', now)
-            if self._settings.off_on_release and not (
-                    self.connected and self._switch.is_known_off(now)):
-                self._switch.require_off(
-                    f'on_release: {change.before} no longer holds it', now)
-        elif change.cause is not Cause.CLAIM:
-            self._send_desired(now)
-
-    def _send_desired(self, now: float) -> None:
-        """Send the values that the new holder of the light has requested before."""
-        self._forget_silenced(now)
-        holder, desired = self._sources.holder, self._sources.desired
-
-        def done(result: Result, now: float) -> None:
-            if not (result.success or result.superseded):
-                self._emit(events.DesiredStateFailed(self.address, holder or '', result.message))
-
-        if not self._can_reach(now, done):
-            return
-        way = f'{holder}, which holds the light now'
-        if desired.enabled is False:
-            self._switch.ask(False, now, done, way)
-        if desired.brightness is not None and not (
-                desired.enabled is False and self._configuration.brightness.is_switch):
-            self._configuration.set_brightness(desired.brightness, now)
-        if desired.enabled:
-            self._switch.ask(True, now, done, way)
-
-    def _earliest_on(self) -> float:
-        """
-        Return the earliest time for an ON, s; infinity until a configuration was sent.
-
-        A light that has restarted has the brightness of its firmware until it is configured.
-        """
-        if self._configuration.must_send_before_on:
-            return math.inf
-        if self._configuration.may_send_after_restart:
-            return self._tracker.check_until
-        return -math.inf
+    def _prepare_off(self, now: float) -> None:
+        """End what an OFF must not be followed by, where the brightness is the switch."""
+        if self._configuration.brightness_is_switch:
+            self._configuration.cancel('superseded by off', now)
+            self._switch.fence_until(self._configuration.fence)
 
     def configure(self, changes: Changes, now: float, done: Done) -> None:
         """
@@ -389,15 +283,10 @@ class Light:
 
         :param changes: values by name, see :data:`~.model.FIELDS`; if one is wrong none is sent.
         """
-        def finished(result: Result, now: float) -> None:
-            if result.success:
-                self._sources.remember(
-                    DEFAULT, DesiredState(brightness=changes.get('brightness')))
-            done(result, now)
-
-        refusal = self._claim(DEFAULT, now, DesiredState(), is_stream=False)
-        if self._can_reach(now, done, refusal):
-            self._configuration.configure(changes, now, finished)
+        caller = Caller(done, now, DEFAULT)
+        if self._may_send(caller, DesiredState(), now):
+            self._configuration.configure(changes, now, caller)
+        self._update(now)
 
     def set_brightness(
         self, brightness: float, now: float, *, source: str = DEFAULT,
@@ -412,10 +301,10 @@ class Light:
             if not (result.superseded or self.is_held_by_other(source)):
                 self._emit(events.SetpointFailed(self.address, result.message))
 
-        refusal = self._claim(
-            source, now, DesiredState(brightness=brightness), is_stream=True)
-        if self._can_reach(now, failed, refusal):
-            self._configuration.set_brightness(brightness, now)
+        if self._may_send(Caller(failed, now, source, is_stream=True),
+                          DesiredState(brightness=brightness), now):
+            self._configuration.set_brightness(brightness)
+        self._update(now)
 
     def set_desired(self, values: Changes, now: float) -> None:
         """
@@ -423,66 +312,228 @@ class Light:
 
         :param values: by name, checked, except against the limits that the light reports.
         """
-        self._configuration.set_desired(values, now)
-        self._changed(self, now)
+        if not self._commands.refusal:
+            self._configuration.require(values, now)
+            self._update(now)
+
+    def refresh(self, now: float, done: Done) -> None:
+        """Ask for identity and status again; ``done`` is called once with the result."""
+        closed = self._commands.refusal
+        if refusal := closed or self.unreachable(now):
+            done(Result(False, refusal, superseded=bool(closed)), now)
+        else:
+            self._queries.refresh(now, done)
+
+    def request_status(self, now: float) -> None:
+        """Ask for a status, unless such a request is under way."""
+        self._queries.request_status(now)
+
+    def _may_send(self, caller: Caller, desired: DesiredState, now: float) -> bool:
+        """Return whether a request may be sent now; if not, answer it with the reason."""
+        closed, sources, source = self._commands.refusal, self._sources, caller.source
+        refusal = closed
+        if not refusal:
+            self._take_holder(sources.poll(now), now)
+            self.was_commanded = True
+            refusal = sources.refusal(source)
+            if desired.enabled is not False and (late := self._commands.lateness(now)):
+                refusal = late
+            elif caller.is_stream:
+                self._take_stream(source, desired, now)
+            elif not refusal and desired.enabled is False:
+                # An OFF ends the ON that is remembered, though it may fail.
+                sources.forget_switch(source)
+            refusal = refusal or self.unreachable(now)
+        if refusal:
+            caller.done(Result(False, refusal, superseded=bool(closed)), now)
+        elif not caller.is_stream:
+            self._take_over(source, now)
+            sources.begin_call(source)
+            self._switch.silence.called_at = now
+        return not refusal
+
+    def _take_stream(self, source: str, desired: DesiredState, now: float) -> None:
+        """Take a request of a stream, which counts at once."""
+        self._forget_silenced(now)
+        self._switch.silence.requested_at = now
+        self._take_over(source, now)
+        self._take_holder(self._sources.claim(source, now), now)
+        # A request to a lost light has no effect later, but an OFF ends a remembered ON.
+        if self.connected or desired.enabled is False:
+            self._sources.remember(source, desired)
+
+    def _take_over(self, source: str, now: float) -> None:
+        """End the requests of another source, unless it is a higher one."""
+        sources = self._sources
+        if sources.are_ranked and sources.commander != source and not sources.refusal(source):
+            self._end_requests(f'held by {source}', now)
+
+    def _end_requests(self, message: str, now: float) -> None:
+        self._switch.cancel(message, now, superseded=True)
+        self._configuration.cancel(message, now)
+
+    def is_held_by_other(self, source: str) -> bool:
+        """Return whether another source holds the light, so that a request is not sent."""
+        return bool(self._sources.refusal(source))
+
+    def release(self, source: str, now: float) -> str:
+        """
+        Release the light: the next lower source that has claimed it then holds it.
+
+        :return: the source that holds it now, '' if none does.
+        """
+        self._take_holder(self._sources.poll(now), now)
+        self._take_holder(self._sources.release(source, now), now)
+        self._update(now)
+        return self._sources.holder or ''
+
+    def _forget_silenced(self, now: float) -> None:
+        """Forget what would switch the light on, if it was requested before a silence."""
+        if now >= self._switch.silence.ends_at:
+            self._sources.forget_on(
+                brightness_is_switch=self._configuration.brightness_is_switch)
+
+    def _take_holder(self, change: HolderChanged[str] | None, now: float) -> None:
+        """Take a change of the source that holds the light."""
+        if change is None:
+            return
+        self._emit(events.LightHeld(self.address, change))
+        if change.after is None:
+            if self._settings.off_on_release and not self._is_known_off(now):
+                self._switch.require_off(f'on_release: {change.before} no longer holds it')
+        elif change.cause is not Cause.CLAIM:
+            self._end_requests(f'held by {change.after}', now)
+            self._send_remembered(change.after, now)
+
+    def _is_known_off(self, now: float) -> bool:
+        return self.connected and self._switch.enabled is False and not self._may_be_on(now)
+
+    def _may_be_on(self, now: float) -> bool:
+        return self._switch.may_be_on(now) or self._configuration.may_switch(now)
+
+    def _send_remembered(self, source: str, now: float) -> None:
+        """Send the values that the new holder of the light has requested before."""
+        self._forget_silenced(now)
+        desired = self._sources.desired
+
+        if not self.connected or self._commands.refusal:
+            return
+        caller = Caller(_reported_failure(self._emit, self.address, source), now, source, True,
+                        f'{source}, which holds the light now')
+        if desired.enabled is False:
+            self._prepare_off(now)
+            self._switch.ask(False, now, caller)
+        if desired.brightness is not None:
+            self._configuration.set_brightness(desired.brightness)
+            self._configuration.update(now, is_off_pending=self._switch.is_off_pending)
+        if desired.enabled:
+            self._switch.ask(True, now, caller)
+
+    # Answers
+
+    def _update(self, now: float) -> None:
+        """Send what is desired now, and answer the callers whose requests have ended."""
+        switch, configuration = self._switch, self._configuration
+        while True:
+            for outcome in (*switch.take_outcomes(now), *configuration.take_outcomes(now)):
+                self._finish(outcome, now)
+            if not self.connected:
+                return
+            # First the configuration, so that an ON finds it.
+            configuration.update(now, is_off_pending=switch.is_off_pending)
+            if configuration.brightness_is_switch and switch.is_off_due(now):
+                self._prepare_off(now)
+            switch.update(now)
+            if not (switch.outcomes or configuration.outcomes):
+                return
+
+    def _finish(self, outcome: Outcome[Status], now: float) -> None:
+        """Take the end of a value: a call that has succeeded counts from now on."""
+        result, status = outcome.result, outcome.status
+        if outcome.desired.change == ON and status and (
+                excess := self._configuration.excess(status)):
+            result = result._replace(
+                message=f'{result.message}; {", ".join(excess)}, and is brought back')
+        for caller in outcome.callers:
+            if caller.is_stream:
+                continue
+            change = self._sources.end_call(caller.source, now, success=result.success)
+            self._take_holder(change, now)
+            if result.success:
+                self._forget_silenced(now)
+                self._switch.silence.requested_at = now
+                self._sources.remember(caller.source, _wish(outcome))
+        if not self._sources.are_calling:
+            self._switch.silence.called_at = -math.inf
+        answer(outcome.callers, result, now)
+
+    # The end of the process
 
     def close(self, now: float) -> None:
         """Answer all requests, and make no change any more but :meth:`switch_off_finally`."""
-        refusal = self._target.commands.refusal
+        refusal = self._commands.refusal
         self._sources = LightSources(None)
         self._switch.close(refusal, now)
-        self._configuration.replace(refusal, now)
+        self._configuration.close(refusal, now)
         self._queries.close(refusal, now)
-        self._changed(self, now)
+        self._update(now)
 
     def switch_off_finally(self, now: float, report: Done) -> None:
         """
         Switch the light off, and again whenever it may be on, after :meth:`close`.
 
-        :param report: see :class:`~..payload.attempt.LastChange`. The failure of a light that
-            is not heard is permanent until it is heard.
+        :param report: called with a failure that is not permanent when the first OFF is sent and
+            when one has failed, and with a success when the light shows it. The failure of a light
+            that is not heard is permanent until it is heard.
         """
-        self._switch.switch_off_finally(now, report, connected=self.connected)
+        self._switch.switch_off_finally(now, report)
         if not self.connected:
             report(Result(False, self.unreachable(now), permanent=True), now)
-        self._changed(self, now)
+        self._update(now)
 
     def may_stay_on(self, now: float) -> bool:
         """Return whether the light is on, or may go on by an ON of ours that was sent."""
-        return self._switch.may_be_on or self._switch.is_own(True, now)
-
-    def refresh(self, now: float, done: Done) -> None:
-        """Ask for identity and status again; ``done`` is called once with the result."""
-        if self._can_reach(now, done):
-            self._queries.refresh(now, done)
-            self._changed(self, now)
-
-    def request_status(self, now: float) -> None:
-        """Ask for a status, unless such a request is under way."""
-        self._target.request_status(now)
+        return self._may_be_on(now)
 
     # Time
-
-    @property
-    def _silent_since(self) -> float:
-        return self.heard_at if self.connected else math.inf
 
     def poll(self, now: float) -> None:
         """Do what is due."""
         # Compute the same sum as next_deadline(); the difference is rounded differently.
         if self.connected and now >= self.heard_at + self._settings.heartbeat_timeout:
             self.lose(f'no heartbeat for {format_seconds(now - self.heard_at)}', now)
-        self._queries.poll(now, self._silent_since)
-        self._change_holder(self._sources.poll(now), now)
-        self._switch.poll(now, connected=self.connected)
-        self._configuration.poll(now, connected=self.connected)
+        if now >= self._changing.until:
+            self._changing = ChangingStates()
+            self._emit(events.StatesChanging(self.address, False))
+        self._queries.poll(now, self.heard_at if self.connected else math.inf)
+        self._take_holder(self._sources.poll(now), now)
+        self._switch.poll(now)
+        self._configuration.poll(now)
+        self._update(now)
 
     def next_deadline(self) -> float:
         """Return when :meth:`poll` has something to do."""
-        connected = self.connected
-        return min(
-            self._queries.next_deadline(self._silent_since),
-            self._switch.next_deadline(connected=connected),
-            self._configuration.next_deadline(connected=connected),
-            self.heard_at + self._settings.heartbeat_timeout if connected else math.inf,
-            self._sources.next_deadline())
+        due = self._queries.next_deadline(self.heard_at if self.connected else math.inf)
+        if self._sources.are_ranked:
+            due = min(due, self._sources.next_deadline())
+        if self.connected:
+            due = min(due, self._switch.next_deadline(), self._configuration.next_deadline(),
+                      self._changing.until, self.heard_at + self._settings.heartbeat_timeout)
+        return due
+
+
+def _wish(outcome: Outcome[Status]) -> DesiredState:
+    """Return the values that a request has set."""
+    change = outcome.desired.change
+    return DesiredState(change == ON if change in (ON, OFF) else None, requested(outcome))
+
+
+def _reported_failure(
+    emit: Callable[[events.LightEvent], None], address: Address, source: str,
+) -> Done:
+    """Return a function that reports that the light does not have what a source requested."""
+    def done(result: Result, now: float) -> None:
+        if not (result.success or result.superseded):
+            emit(events.DesiredStateFailed(address, source, result.message))
+
+    return done

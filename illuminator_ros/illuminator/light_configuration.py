@@ -13,26 +13,25 @@
 # limitations under the License.
 
 """
-The configuration of a light: confirmed, requested, and to be restored.
+The configuration of a light: what was agreed with it, and what it must be set to.
 
-One command carries all fields. So a command holds the values that are wanted now, those of the
-command before it that is not confirmed yet, and the confirmed ones for the rest.
+One command carries all fields. So each command holds the values that are wanted now, those that
+are required (restored after a restart, overrides, limits), and the agreed ones for the rest.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import replace
+from collections.abc import Callable, Iterable, Iterator
+from dataclasses import dataclass, replace
+from enum import Enum
 import math
 
 from . import events
-from .agreed_configuration import AgreedConfiguration
 from .commands import Configure, CONFIRMED
 from .model import (
     Changes,
     checked,
     Configuration,
-    DIMMING_FLAGS,
     FIELDS,
     InvalidValue,
     NOTHING,
@@ -41,99 +40,72 @@ from .model import (
     StrobeRange,
     unexpected_differences,
 )
-from .required_values import (
-    CONFIGURE_LIMIT,
-    RequiredValues,
-    Requirement,
-    RESTORE_INTERVAL,
-)
-from .status_tracker import NewestStatus
-from ..payload.attempt import Done, Result, StatusReport, Target
-from ..payload.reconciler import Desired, Reconciler
-from ..payload.repeat_limit import RepeatLimit
+from ..mavlink.messages import Address
+from ..payload.confirmed_command import Change, Result, Target
+from ..payload.device_property import Caller, Desired, LATE_TIME, Outcome, Property
 
+# s; rqt_reconfigure gives up after 1.0 s, and the answer must arrive before. The middleware waits
+# up to 0.1 s before it sends an answer to a client that it has not discovered yet.
+CONFIGURE_LIMIT = 0.85
 # s to wait for the first status before a complete set of overrides is sent without one.
 FIRST_STATUS_TIMEOUT = 3.0
+# s from a try of required values to the next one: the first wait, doubled each time up to the
+# longest.
+FIRST_RETRY, LONGEST_RETRY = 2.0, 60.0
+# s; a light that exceeds a limit is brought back within it once in this time.
+LIMIT_INTERVAL = 10.0
+# s after a command of ours in which a change of another value counts as implied by it.
+IMPLIED_TIME = 2.0
 # %; set together with a strobe period where the duty cycle is 0, at which a light does not strobe.
 DEFAULT_DUTY_CYCLE = 50.0
-# s after a command of ours in which a change to a commanded value counts as its late effect, and a
-# change of another value, or a switch, as implied by it.
-LATE_TIME = 30.0
-IMPLIED_TIME = 2.0
-# How often in a row a change by another sender is undone, and s between two of these commands or
-# two tries of an OFF that no request has asked for.
-REPEATS = 3
-REPEAT_INTERVAL = 2.0
 
 
-def undoing_limit(reassert: bool) -> RepeatLimit | None:
-    """Return the limit on undoing changes by other senders, None if these are followed."""
-    return RepeatLimit(REPEATS, REPEAT_INTERVAL) if reassert else None
+class Reason(Enum):
+    """Why a field must have a value that no request asks for."""
+
+    RESTORED = 'restored after a restart'
+    OVERRIDE = 'override'
+    LIMIT = 'limit'
 
 
-class LimitGuard:
+@dataclass
+class Required:
     """
-    Whether a light exceeds the limits that the operator has set.
+    The values that must be sent though no request asks for them. Times are s.
 
-    :param limits: apply to each command that is sent.
-    :ivar exceeded: how the light exceeds them.
+    :param fields: the value of each field, and its reason.
+    :param due: when they are sent next.
+    :param wait: from then to the next try.
+    :param is_tried: whether they were sent.
+    :param failure: why they are not confirmed, '' if that is not known.
     """
 
-    def __init__(self, limits: SafetyLimits, emit: Callable[[events.LightEvent], None],
-                 exceeded: events.LimitExceeded) -> None:
-        self.limits = limits
-        self.exceeded = exceeded
-        self._emit = emit
-        self.renew()
+    fields: dict[str, tuple[float, Reason]]
+    due: float = math.inf
+    wait: float = FIRST_RETRY
+    is_tried: bool = False
+    failure: str = ''
 
     @property
-    def is_limiting(self) -> bool:
-        """Return whether there is a limit."""
-        return self.limits != SafetyLimits()
+    def values(self) -> dict[str, float]:
+        """Return the values by field."""
+        return {name: value for name, (value, _) in self.fields.items()}
 
-    def renew(self) -> None:
-        """Bring the light back within the limits once more."""
-        self._repeats = RepeatLimit(1, REPEAT_INTERVAL)
+    def drop(self, names: Iterable[str]) -> None:
+        """Require some fields no more."""
+        for name in names:
+            self.fields.pop(name, None)
+        if not self.fields:
+            self.due, self.wait, self.is_tried, self.failure = math.inf, FIRST_RETRY, False, ''
 
-    def check(self, reported: Configuration, strobe_range: StrobeRange) -> bool:
-        """Return whether the light exceeds a limit, and report a change of that."""
-        exceeded = replace(self.exceeded, excess=self.limits.excess(reported),
-                           impossible=self.limits.impossible(strobe_range))
-        if exceeded != self.exceeded:
-            self.exceeded = exceeded
-            self._emit(exceeded)
-        return bool(exceeded.excess)
-
-    def due(self, now: float) -> float | None:
-        """Return when the light may be brought back, s; None if that has been tried."""
-        return self._repeats.take(now)
+    def merged(self, values: Changes, reason: Reason, due: float) -> Required:
+        """Return these and other values; only restored ones do not replace those that wait."""
+        newer = {name: (value, reason) for name, value in values.items()}
+        return Required({**newer, **self.fields} if reason is Reason.RESTORED
+                        else {**self.fields, **newer}, due)
 
 
-class BrightnessAsSwitch:
-    """
-    Whether a brightness above 0 is the switch of a light (ArduSub).
-
-    :ivar off_brightness: the brightness that the light reports while it is off, None if unknown.
-    :ivar is_switch: whether it was seen to report brightness 0 since it was switched off.
-    """
-
-    def __init__(self) -> None:
-        self.off_brightness: float | None = None
-        self.is_switch = False
-
-    def reported(self, status: Status, *, was_dimmed: bool) -> None:
-        """
-        Take the status of a light that is off.
-
-        :param was_dimmed: whether it was on with a brightness, and no configuration explains the
-            change.
-        """
-        self.off_brightness = status.brightness
-        self.is_switch = self.off_brightness == 0.0 and (self.is_switch or was_dimmed)
-
-
-# The reasons of values in the reconciler; a request has none.
-_REQUIRED, _SETPOINT = 'required values', 'a setpoint'
+NO_FAILURE = ('', None, None)
 
 
 class LightConfiguration:
@@ -141,182 +113,139 @@ class LightConfiguration:
     Keeps one light configured. No I/O; times are s.
 
     :param emit: takes the events.
-    :param newest: the newest status.
     :param limits: apply to each command that is sent.
-    :param restore: whether a light that has restarted gets its confirmed configuration again.
-    :param reassert: whether changes by other senders are undone.
-    :param must_wait: returns whether no required values may be sent now: the process ends, or an
-        OFF is under way and a brightness may be an ON.
-    :ivar agreed: the configuration agreed with the light.
-    :ivar brightness: whether its brightness is the switch of the light.
-    :ivar guard: how the light exceeds the limits.
+    :param restores: whether a light that has restarted gets its agreed configuration again.
+    :ivar agreed: the configuration that the light last accepted from us or, if another sender has
+        changed it since, last reported; None before either.
+    :ivar exceeded: how the light exceeds the limits.
+    :ivar outcomes: of the values that have ended, which :meth:`take_outcomes` returns.
     """
 
     def __init__(
-        self, target: Target, emit: Callable[[events.LightEvent], None], newest: NewestStatus, *,
-        limits: SafetyLimits, restore: bool = True, reassert: bool = False,
-        must_wait: Callable[[], bool] = lambda: False,
+        self, target: Target, emit: Callable[[events.LightEvent], None], *,
+        limits: SafetyLimits, restores: bool,
     ) -> None:
-        self.agreed = AgreedConfiguration(target.address, emit)
-        self.brightness = BrightnessAsSwitch()
-        self.guard = LimitGuard(limits, emit, events.LimitExceeded(target.address, (), ''))
-        self._address = target.address
+        self.agreed: Configuration | None = None
+        self.exceeded = events.LimitExceeded(target.address, (), '')
         self._emit = emit
-        self._newest = newest
-        self._restores = restore
-        self._must_wait = must_wait
-        self._undoing = undoing_limit(reassert)
-        self._reconciler: Reconciler[Status] = Reconciler(target, self._ended)
+        self._commands = target.commands
+        self._limits = limits
+        self._restores = restores
+        self._property: Property[Status] = Property(target)
+        self.outcomes = self._property.outcomes
+        self._required = Required({})
         self._setpoint: float | None = None
-        self._required = RequiredValues()
-        # The result of the last command, None before the first.
-        self._outcome: Result | None = None
+        # Small steps away from it add up to a change.
+        self._reference: Configuration | None = None
+        # Why the light does not have the last configuration that was requested, what that was,
+        # and what the light showed instead.
+        self._failure: tuple[str, Configuration | None, Status | None] = NO_FAILURE
+        self._limited_at = -math.inf
+        # The brightness that it reports while it is off, None if unknown.
+        self._off_brightness: float | None = None
+        self._is_off_pending = False
 
-    @property
-    def discrepancy(self) -> str:
-        """Why the light does not have a configuration that it should have, '' if it has."""
-        return self._required.failure or self.agreed.discrepancy
+    # The desired value
 
-    @property
-    def is_changing(self) -> bool:
-        """Whether a command of ours is under way."""
-        return self._reconciler.under_way is not None
-
-    @property
-    def has_values_to_send(self) -> bool:
-        """Whether a command of ours is under way, or values wait."""
-        return (self._reconciler.is_busy or self._setpoint is not None
-                or bool(self._required.values))
-
-    @property
-    def may_send_after_restart(self) -> bool:
-        """Whether a light that has restarted may be sent a configuration."""
-        return (self.guard.is_limiting or bool(self._required.values)
-                or self._restores and self.agreed.confirmed is not None)
-
-    @property
-    def must_send_before_on(self) -> bool:
-        """Whether the light must be sent a configuration before it is switched on."""
-        return self._required.delays_on
-
-    @property
-    def sent_at(self) -> float:
-        """When the last command was sent, s."""
-        return self._reconciler.last_sent.at if self._reconciler.last_sent else -math.inf
-
-    # Settings
-
-    def change_limits(self, limits: SafetyLimits, now: float) -> None:
-        """Replace the limits, and bring a light that exceeds them back within them."""
-        self.guard.limits = limits
-        self.guard.renew()
-        if self._required.requirement is Requirement.LIMIT:
-            self._required = RequiredValues()
-        desired = self._reconciler.desired
-        if desired is not None and isinstance(desired.change, Configure):
-            goal = desired.change.configuration
-            limited = limits.clipped(goal, self._newest.strobe_range)
-            if limited != goal:
-                # A resend would exceed the limits. The newest setpoint is sent as the limit.
-                if self._is_stream and self._setpoint is None:
-                    self._setpoint = limited.brightness
-                self._reconciler.cancel(
-                    ', '.join(limits.excess(goal)) or 'a limit was changed', now,
-                    superseded=desired.reason == _SETPOINT)
-        status = self._newest.status
-        if status is not None and (self.agreed.confirmed or status.complete):
-            self._keep_limits(status.configuration(self.agreed.confirmed or NOTHING), now)
-
-    def change_reassert(self, reassert: bool) -> None:
-        """Undo changes by other senders from now on, or follow them."""
-        self._undoing = undoing_limit(reassert)
-        if self._required.requirement is Requirement.OTHER_SENDER:
-            self._required = RequiredValues()
-
-    # Requests
-
-    def configure(self, changes: Changes, now: float, done: Done) -> None:
+    def goal(self, now: float) -> Desired[Status] | None:
         """
-        Change some fields with one command; the light must be connected.
+        Return the configuration to send while no request is under way, None if any is fine.
 
-        :param changes: values by name, see :data:`~.model.FIELDS`; if one is wrong none is sent.
-        :param done: called once with the result.
+        Required values go first, since a stream of setpoints may never end.
+
+        :raises InvalidValue: if the light must not get it.
         """
-        try:
-            values = self._checked(changes)
-            for name, value in values.items():
-                self.guard.limits.check(name, value)
-            change = self._change(values)
-        except InvalidValue as error:
-            done(Result(False, str(error), permanent=True), now)
+        values = self._sendable()
+        if values and now >= self._required.due:
+            return Desired(self._change({}), _REQUIRED)
+        if self._setpoint is not None and not (self._is_dark or self._must_wait):
+            return Desired(self._change({'brightness': self._setpoint}), _SETPOINT,
+                           limit=CONFIGURE_LIMIT)
+        return None
+
+    def _sendable(self) -> dict[str, float]:
+        """Return the required values that do not wait until the light is on."""
+        if not self._required.fields or self._must_wait:
+            return {}
+        values = self._required.values
+        if self._is_dark:
+            values.pop('brightness', None)
+        return values
+
+    @property
+    def _must_wait(self) -> bool:
+        """Whether the process ends, or an OFF is under way that a brightness may undo."""
+        return bool(self._commands.refusal) or (
+            self._is_off_pending and self._off_brightness in (None, 0.0))
+
+    @property
+    def _is_dark(self) -> bool:
+        status = self._property.newest
+        return status is not None and status.is_dark
+
+    def update(self, now: float, *, is_off_pending: bool) -> None:
+        """
+        Send what the goal asks for; the light must be connected.
+
+        :param is_off_pending: whether an OFF is under way, which a brightness may undo.
+        """
+        self._is_off_pending = is_off_pending
+        if self._property.desired is not None or not (
+                self._required.fields or self._setpoint is not None):
             return
-        self._reconciler.want(Desired(change, since=now, limit=CONFIGURE_LIMIT), now, done)
-
-    def set_brightness(self, brightness: float, now: float) -> None:
-        """Take a setpoint of a stream, %, checked; the light must be connected."""
+        self._check_required()
         try:
-            self.guard.limits.check('brightness', brightness)
+            desired = self.goal(now)
         except InvalidValue as error:
-            brightness = self.guard.limits.max_brightness
-            self._emit(events.SetpointClipped(self._address, str(error)))
-        under_way = self._reconciler.under_way
-        if (self._is_stream and isinstance(under_way, Configure)
-                and under_way.configuration.brightness == brightness):
-            # A command with this value is under way; a setpoint that waits is outdated.
+            self._not_sent(str(error), now)
+            return
+        if desired is None:
+            return
+        if desired.reason == _SETPOINT:
+            value, self._setpoint = self._setpoint, None
+            if (self.agreed is not None and self.agreed.brightness == value
+                    and self._property.unconfirmed(now) is None):
+                return
+        else:
+            self._required.is_tried = True
+            if any(reason is Reason.LIMIT for _, reason in self._required.fields.values()):
+                self._limited_at = now
+        self._property.want(desired, now)
+
+    def _check_required(self) -> None:
+        """Drop required values that are outside the range that the light reports."""
+        for name, value in self._required.values.items():
+            try:
+                checked(name, value, self.strobe_range)
+            except InvalidValue as error:
+                self._required.drop([name])
+                self._restored(False, str(error))
+
+    def _not_sent(self, reason: str, now: float) -> None:
+        """Note that the goal cannot be sent before the first status."""
+        if self._required.values and now >= self._required.due:
+            self._required.due = math.inf
+            self._required.failure = f'{", ".join(self._required.values)} not sent: {reason}'
+            self._restored(False, self._required.failure)
+        elif self._setpoint is not None:
             self._setpoint = None
-            return
-        self._setpoint = brightness
-        self.poll(now, connected=True)
-
-    def set_desired(self, values: Changes, now: float) -> None:
-        """
-        Send values as soon as the light has reported its configuration.
-
-        :param values: by name, checked, except against the limits that the light reports.
-        """
-        self._required = self._required.merged(
-            values, Requirement.OVERRIDE, self._first_due(now))
-
-    def _first_due(self, now: float) -> float:
-        return now if self.agreed.confirmed else now + FIRST_STATUS_TIMEOUT
-
-    def replace(self, message: str, now: float) -> None:
-        """End all requests, and drop the required values: an OFF or the end replaces them."""
-        self.drop_required()
-        self._setpoint = None
-        self._reconciler.cancel(message, now, superseded=True)
-
-    def end_requests(self, message: str, now: float) -> None:
-        """End all requests, but keep the required values."""
-        self._setpoint = None
-        self._reconciler.cancel(message, now)
-        self.retry_required(now)
-
-    def drop_required(self) -> None:
-        """Drop the required values: an OFF replaces them, and they would be an ON."""
-        if self._required.requirement is Requirement.LIMIT:
-            # The light may be switched on beyond the limit.
-            self.guard.renew()
-        self._required = RequiredValues()
-
-    def _checked(self, changes: Changes) -> dict[str, float]:
-        return {name: checked(name, value, self._newest.strobe_range)
-                for name, value in changes.items()}
+            self._emit(events.SetpointFailed(self._address, reason))
 
     def _change(self, values: Changes) -> Configure:
         """
-        Return the change that sets some fields.
+        Return the change that sets some fields, and those that are required.
 
-        :raises InvalidValue: if nothing is confirmed yet and the values are not complete.
+        :raises InvalidValue: if nothing is agreed yet and the values are not complete.
         """
-        note, names = '', list(values)
-        desired = self._reconciler.desired
-        base = self.agreed.confirmed
+        desired, note = self._property.desired, ''
+        names = [*values, *self._sendable()]
+        values = {**self._sendable(), **values}
+        base = self.agreed
         if desired is not None and isinstance(desired.change, Configure):
+            # A newer request carries the values of the one that it replaces.
             base, names = desired.change.configuration, [*desired.change.names, *names]
         if base is None:
-            missing = [name for name in FIELDS if name not in values]
-            if missing:
+            if missing := [name for name in FIELDS if name not in values]:
                 raise InvalidValue(
                     'the light has not reported its configuration yet, so '
                     f'{", ".join(missing)} must be set in the same call')
@@ -328,284 +257,397 @@ class LightConfiguration:
                 names.append('strobe_duty_cycle')
                 note = ('strobe_duty_cycle was 0 %, at which the light does not strobe, and was '
                         f'set to {DEFAULT_DUTY_CYCLE:g} %')
-            goal = replace(self._sendable(base, values), **values)
+            goal = replace(self._within_range(base, values), **values)
         # Each command is made here, so the limits apply to every command.
-        limited = self.guard.limits.clipped(goal, self._newest.strobe_range)
-        return Configure(limited, list(dict.fromkeys((*names, *goal.differences(limited)))), note)
+        limited = self._limits.clipped(goal, self.strobe_range)
+        ordered = [name for name in FIELDS
+                   if name in names or name in goal.differences(limited)]
+        return Configure(limited, ordered, note)
 
-    def _sendable(self, base: Configuration, changes: Changes) -> Configuration:
+    def _within_range(self, base: Configuration, changes: Changes) -> Configuration:
         """
         Return a configuration with reported values where its own are out of range.
 
         Otherwise a light that once reported a value out of its range would deny every change.
         """
-        if self._newest.status is None:
+        status = self._property.newest
+        if status is None:
             return base
-        reported = self._newest.status.configuration(base)
-        ruled_out = {}
+        reported, ruled_out = status.configuration(base), {}
         for name in FIELDS:
             try:
                 if name != 'mode' and name not in changes:
-                    checked(name, getattr(base, name), self._newest.strobe_range)
+                    checked(name, getattr(base, name), self.strobe_range)
             except InvalidValue:
                 ruled_out[name] = getattr(reported, name)
         return replace(base, **ruled_out)
 
-    def _ended(
-        self, desired: Desired[Status], result: Result, status: Status | None, now: float,
-    ) -> None:
-        change = desired.change
-        assert isinstance(change, Configure)
-        self._outcome = result
-        if result.success:
-            self._required = self._required.without([
-                name for name, value in self._required.values.items()
-                if name in change.names or value == getattr(change.configuration, name)])
-            self.agreed.accept(change.configuration, status)
-        elif result.contradicted:
-            self.agreed.contradicted(change.configuration, self._newest.status, result.message)
-        if desired.reason == _REQUIRED:
-            self._required_ended(result, now)
-        elif desired.reason == _SETPOINT and not (result.success or result.superseded):
-            self._setpoint_failed(result.message)
+    # Requests
 
-    def _required_ended(self, result: Result, now: float) -> None:
-        if result.success:
-            self._restored(True, result.message)
-        elif self._required.is_given_up(result, now):
-            self._required = RequiredValues()
-            self.agreed.failed(result.message)
-            self._restored(False, result.message)
+    def configure(self, changes: Changes, now: float, caller: Caller) -> None:
+        """
+        Change some fields with one command; the light must be connected.
+
+        :param changes: values by name, see :data:`~.model.FIELDS`; if one is wrong none is sent,
+            and the outcome says why.
+        """
+        try:
+            values = {name: checked(name, value, self.strobe_range)
+                      for name, value in changes.items()}
+            for name, value in values.items():
+                self._limits.check(name, value)
+            change = self._change(values)
+        except InvalidValue as error:
+            self.outcomes.append(Outcome(
+                Desired(NOTHING_CHANGED), Result(False, str(error), permanent=True), None,
+                (caller,)))
+            return
+        self._property.want(Desired(change, limit=CONFIGURE_LIMIT), now, caller)
+
+    def set_brightness(self, brightness: float) -> None:
+        """Take a setpoint of a stream, %, checked; the next update sends it."""
+        try:
+            self._limits.check('brightness', brightness)
+        except InvalidValue as error:
+            brightness = self._limits.max_brightness
+            self._emit(events.SetpointClipped(self._address, str(error)))
+        self._setpoint = brightness
+        desired = self._property.desired
+        if (desired is not None and desired.reason == _SETPOINT
+                and isinstance(desired.change, Configure)
+                and desired.change.configuration.brightness == brightness):
+            # A command with this value is under way; a setpoint that waits is outdated.
+            self._setpoint = None
+
+    def require(self, values: Changes, now: float) -> None:
+        """
+        Send overrides as soon as the light has reported its configuration.
+
+        :param values: by name, checked, except against the range that the light reports.
+        """
+        self._required = self._required.merged(values, Reason.OVERRIDE, self._first_due(now))
+
+    def _first_due(self, now: float) -> float:
+        return now if self.agreed else now + FIRST_STATUS_TIMEOUT
+
+    def found(self, now: float) -> None:
+        """Note that the light is heard again: required values are due."""
+        if self._required.fields:
+            self._required.due, self._required.wait = self._first_due(now), FIRST_RETRY
+
+    def cancel(self, message: str, now: float) -> None:
+        """End all requests; required values stay."""
+        self._setpoint = None
+        self._property.cancel(message, now, superseded=True)
+
+    def lost(self, message: str, now: float) -> None:
+        """End all requests, since the light is lost."""
+        if self._setpoint is not None:
+            self._setpoint = None
+            self._emit(events.SetpointFailed(self._address, message))
+        self._property.cancel(message, now)
+
+    def close(self, message: str, now: float) -> None:
+        """End everything, since the process ends."""
+        self._required = Required({})
+        self.cancel(message, now)
+
+    def change_limits(self, limits: SafetyLimits, now: float) -> None:
+        """Replace the limits, and bring a light that exceeds them back within them."""
+        self._limits, self._limited_at = limits, -math.inf
+        self._drop_limits()
+        desired = self._property.desired
+        if desired is not None and isinstance(desired.change, Configure):
+            goal = desired.change.configuration
+            limited = limits.clipped(goal, self.strobe_range)
+            if limited != goal or desired.reason == _REQUIRED:
+                # A resend would exceed the limits. The newest setpoint is sent as the limit.
+                if desired.reason == _SETPOINT and self._setpoint is None:
+                    self._setpoint = limited.brightness
+                self._property.cancel(
+                    ', '.join(limits.excess(goal)) or 'a limit was changed', now,
+                    superseded=bool(desired.reason))
+        if status := self._property.newest:
+            self._keep_limits(status, now)
+
+    def _drop_limits(self) -> None:
+        self._required.drop([name for name, (_, reason) in self._required.fields.items()
+                             if reason is Reason.LIMIT])
+
+    # Known facts
+
+    @property
+    def _address(self) -> Address:
+        return self.exceeded.address
+
+    @property
+    def strobe_range(self) -> StrobeRange:
+        """Return the strobe periods that the light reports to be possible."""
+        status = self._property.newest
+        return status.strobe_range if status is not None else StrobeRange()
+
+    @property
+    def discrepancy(self) -> str:
+        """Why the light does not have a configuration that it should have, '' if it has."""
+        return self._required.failure or self._failure[0]
+
+    @property
+    def is_pending(self) -> bool:
+        """Whether a command is under way."""
+        return self._property.command is not None
+
+    @property
+    def sent_at(self) -> float:
+        """When a command was sent last, s."""
+        return self._property.sent_at
+
+    def expects(self, status: Status) -> bool:
+        """Return whether a status shows what the command under way changes."""
+        desired = self._property.desired
+        return desired is not None and desired.change.shown_by(status) is True
+
+    @property
+    def brightness_is_switch(self) -> bool:
+        """Whether a brightness above 0 switches the light on, as in ArduSub."""
+        return self._off_brightness == 0.0
+
+    @property
+    def fence(self) -> float:
+        """Until when frames of an unconfirmed command may be under way, s."""
+        return self._property.fence
+
+    def may_switch(self, now: float) -> bool:
+        """Return whether a command of ours may have switched the light by its brightness."""
+        return self.brightness_is_switch and (
+            self.is_pending or now <= self._property.sent_at + IMPLIED_TIME)
+
+    def excess(self, status: Status) -> tuple[str, ...]:
+        """Describe how a status exceeds the limits."""
+        return self._limits.excess(status.configuration(self.agreed or NOTHING))
 
     # Reports
 
-    def restarted(self, now: float) -> None:
-        """Note that the light has restarted, so that its configuration may be lost."""
-        if self._restores and self.agreed.confirmed is not None:
-            confirmed = self.agreed.confirmed
-            values = {name: getattr(confirmed, name) for name in FIELDS
-                      if name != 'mode' or confirmed.mode}
-            self._required = self._required.merged(values, Requirement.RESTART, now)
-        elif self._required.is_sent_once:
-            # The light has other values now.
-            self._required = RequiredValues()
-        # The restart may have undone the command that brought the light within the limits.
-        self.guard.renew()
-
-    def retry_required(self, now: float) -> None:
-        """Make required values due, since the light is heard or a command was cancelled."""
-        self._required.retry(self._first_due(now))
-
-    def lost(self, message: str, now: float) -> None:
-        """Note that the light is lost: no request must take effect when it is heard again."""
-        self._reconciler.lost(message, now)
-        # It may restart meanwhile, which cannot be detected where several lights share the
-        # address.
-        self.guard.renew()
-        if self._setpoint is not None:
-            self._setpoint = None
-            self._setpoint_failed(message)
-
     def reported(
-        self, report: StatusReport[Status], now: float, *, can_follow: bool, switched_at: float,
+        self, status: Status, now: float, *, can_follow: bool, switched_at: float,
     ) -> None:
         """
-        Confirm the request under way, or follow the change of another sender.
+        Take a status that is not older than those before.
 
-        :param can_follow: whether the status shows a change for certain.
+        :param can_follow: whether the parameters follow what it shows.
         :param switched_at: when the light was last switched by us, s.
         """
-        was_changing = self.is_changing
-        self._reconciler.reported(report, now)
-        status = report.status
-        if self.agreed.confirmed is None and (was_changing or not status.complete):
-            return
-        reported = status.configuration(self.agreed.confirmed or NOTHING)
-        if not was_changing:
-            self._take(report, reported, now, can_follow=can_follow, switched_at=switched_at)
-        if self.guard.is_limiting:
-            self._keep_limits(reported, now)
+        was_pending = self.is_pending
+        if status.enabled is False:
+            self._off_brightness = status.brightness
+        late = self._property.unconfirmed(now)
+        self._property.reported(status, now)
+        if not was_pending:
+            self._compare(status, now, late=late, can_follow=can_follow, switched_at=switched_at)
+        self._keep_limits(status, now)
 
-    def _take(
-        self, report: StatusReport[Status], reported: Configuration, now: float, *,
-        can_follow: bool, switched_at: float,
+    def restarted(self, status: Status, now: float) -> None:
+        """Take the first status after a restart: the configuration may be lost."""
+        desired, wanted = self._property.desired, self.agreed
+        if desired is not None and isinstance(desired.change, Configure):
+            # A set ends before the fence of the restart, and its values must not be lost with it.
+            wanted = desired.change.configuration
+        if self._restores and wanted is not None:
+            values = {name: getattr(wanted, name) for name in FIELDS
+                      if name != 'mode' or wanted.mode}
+            self._required = self._required.merged(values, Reason.RESTORED, now)
+        else:
+            # The light has other values now.
+            self._drop_limits()
+        self._limited_at = -math.inf
+        self._property.restarted(status, now)
+        if desired is None:
+            self._compare(status, now, late=None, can_follow=True, switched_at=-math.inf)
+        self._keep_limits(status, now)
+
+    def _compare(
+        self, status: Status, now: float, *, late: Change[Status] | None, can_follow: bool,
+        switched_at: float,
     ) -> None:
-        status = report.status
-        self.agreed.end_discrepancy(reported, status.error_flags)
+        """Compare a status with what was agreed and with what is required."""
+        if self.agreed is None and not status.complete:
+            return
+        reported = status.configuration(self.agreed or NOTHING)
+        _, goal, instead = self._failure
+        # It was applied late, or another sender has replaced it.
+        if goal is not None and instead is not None and (
+                not _differ(goal, status) or _differ(instead.configuration(NOTHING), status)):
+            self._failure = NO_FAILURE
+        if self.agreed is None:
+            self._adopt(reported, events.ChangeCause.FIRST_STATUS)
+            if self._required.fields:
+                self._required.due = min(self._required.due, now)
+        self._drop_shown(status, reported)
+        if can_follow:
+            self._follow(status, reported, now, late=late, switched_at=switched_at)
+
+    def _drop_shown(self, status: Status, reported: Configuration) -> None:
+        """Drop the required values that a status shows; overrides are sent once nevertheless."""
         required = self._required
-        if self.agreed.confirmed is None:
-            self.agreed.adopt(reported, events.ChangeCause.FIRST_STATUS)
-            if required.values:
-                required.due, required.has_ended = min(required.due, now), False
-        elif required.values and not report.shared_address and (
-                shown := self._shown_goal(required, self.agreed.confirmed, reported, status)):
-            # The light has kept the values, another sender has restored them, or our command was
-            # acknowledged too late.
-            self._required = RequiredValues()
-            self.agreed.accept(shown, status)
-            if required.has_ended:
-                self._restored(True, f'{shown.describe(list(required.values))}, {CONFIRMED}')
-        elif ((not required.values or required.requirement is Requirement.OVERRIDE)
-                and can_follow and not report.shared_address):
-            self._follow(status, self.agreed.confirmed, reported, switched_at, now)
+        if not required.fields:
+            return
+        assert self.agreed is not None
+        values: Changes = required.values
+        goal = self._limits.clipped(replace(self.agreed, **values), self.strobe_range)
+        hidden = {'brightness'} if status.is_dimmed else set()
+        shown = [name for name, (_, reason) in required.fields.items()
+                 if name not in {*goal.differences(reported), *hidden}
+                 and (required.is_tried or reason is not Reason.OVERRIDE)]
+        was_tried = required.is_tried
+        required.drop(shown)
+        if was_tried and not required.fields:
+            text = goal.describe([name for name in FIELDS if name in shown])
+            self._restored(True, f'{text}, {CONFIRMED}')
 
     def _follow(
-        self, status: Status, confirmed: Configuration, reported: Configuration,
-        switched_at: float, now: float,
+        self, status: Status, reported: Configuration, now: float, *,
+        late: Change[Status] | None, switched_at: float,
     ) -> None:
-        """Follow the change of another sender, or undo it."""
-        names = unexpected_differences(confirmed, reported, status.error_flags, step=False)
+        """Follow a change that no command under way has made."""
+        assert self.agreed is not None
+        waiting = set() if self._required.is_tried else {
+            name for name, (_, reason) in self._required.fields.items()
+            if reason is Reason.RESTORED}
+        flags = status.error_flags
+        names = [name for name in unexpected_differences(self.agreed, reported, flags, step=False)
+                 if name not in waiting]
         if not names:
             return
-        far = self.agreed.changed_fields(reported, status.error_flags)
+        far = [name for name in unexpected_differences(
+            self._reference or reported, reported, flags, step=True) if name in names]
         cause = events.ChangeCause.ROUNDING
         if far:
-            own = all(self._is_own(name, reported, switched_at, now) for name in far)
-            cause = events.ChangeCause.REQUEST if own else events.ChangeCause.LIGHT
-        # Where brightness is the switch, each command to a light that is off is an ON.
-        if not (cause is events.ChangeCause.LIGHT
-                and not (self.brightness.is_switch and status.enabled is False)
-                and self._undo_change(status, confirmed, reported, now)):
-            self.agreed.follow(reported, names, cause)
+            cause = events.ChangeCause.LIGHT
+            if late is not None and late.shown_by(status) and now <= self.sent_at + LATE_TIME:
+                cause = events.ChangeCause.LATE_EFFECT
+            elif now <= IMPLIED_TIME + (switched_at if late else max(switched_at, self.sent_at)):
+                cause = events.ChangeCause.REQUEST
+        self._adopt(replace(self.agreed, **{name: getattr(reported, name) for name in names}),
+                    cause)
 
-    def _is_own(
-        self, name: str, reported: Configuration, switched_at: float, now: float,
-    ) -> bool:
-        """Return whether a change is a late or implied effect of a command of ours."""
-        if now <= switched_at + IMPLIED_TIME:
-            return True
-        sent = self._reconciler.last_sent
-        if sent is None or now > sent.at + LATE_TIME or not isinstance(sent.change, Configure):
-            return False
-        if name not in sent.change.configuration.differences(reported):
-            return True
-        was_accepted = self._outcome and (self._outcome.success or self._outcome.contradicted)
-        return bool(was_accepted and name not in sent.change.names
-                    and now <= sent.at + IMPLIED_TIME)
+    def _adopt(self, configuration: Configuration, cause: events.ChangeCause) -> None:
+        """Agree on a configuration, and report what is new in it."""
+        old, self.agreed = self.agreed, configuration
+        if cause is not events.ChangeCause.ROUNDING:
+            self._reference = configuration
+        names = [name for name in FIELDS
+                 if old is None or getattr(old, name) != getattr(configuration, name)]
+        if names:
+            self._emit(events.ConfigurationChanged(self._address, configuration, names, cause))
 
-    def _shown_goal(
-        self, required: RequiredValues, confirmed: Configuration, reported: Configuration,
-        status: Status,
-    ) -> Configuration | None:
-        """
-        Return the configuration with required values that the light shows, None if it does not.
-
-        Heat hides the brightness. Overrides are sent once even if the light shows them.
-        """
-        if required.requirement is Requirement.OVERRIDE and not required.has_ended:
-            return None
-        goal = self.guard.limits.clipped(
-            replace(confirmed, **required.values), self._newest.strobe_range)
-        not_shown = goal.differences(reported)
-        if status.error_flags & DIMMING_FLAGS:
-            not_shown.append('brightness')
-        return None if any(name in required.values for name in not_shown) else goal
-
-    def _undo_change(
-        self, status: Status, confirmed: Configuration, reported: Configuration, now: float,
-    ) -> bool:
-        """Undo another sender's change up to the limit of repeats; return whether it is undone."""
-        names = unexpected_differences(confirmed, reported, status.error_flags, step=True)
-        if self._undoing is None or not names:
-            return False
-        due = self._undoing.take(now)
-        if due is not None:
+    def _keep_limits(self, status: Status, now: float) -> None:
+        """Bring a light that exceeds a limit back within it."""
+        if self._limits == SafetyLimits() and not self.exceeded.excess or not (
+                self.agreed or status.complete):
+            return
+        reported = status.configuration(self.agreed or NOTHING)
+        excess = self._limits.excess(reported)
+        is_again = bool(excess) and (
+            self.exceeded.is_again if self.exceeded.excess
+            else now < self._limited_at + LIMIT_INTERVAL)
+        exceeded = events.LimitExceeded(
+            self._address, excess, self._limits.impossible(self.strobe_range), is_again)
+        if exceeded != self.exceeded:
+            self.exceeded = exceeded
+            self._emit(exceeded)
+        limited = self._limits.clipped(reported, self.strobe_range)
+        beyond = reported.differences(limited)
+        known = [name for name, (_, reason) in self._required.fields.items()
+                 if reason is Reason.LIMIT]
+        self._required.drop([name for name in known if name not in beyond])
+        values = {name: getattr(limited, name) for name in beyond if name not in known}
+        if excess and values and not self.is_pending:
             self._required = self._required.merged(
-                {name: getattr(confirmed, name) for name in names}, Requirement.OTHER_SENDER, due)
-        self._emit(events.ChangedByOther(
-            self._address, reported.describe(names), due is not None))
-        return due is not None
+                values, Reason.LIMIT, max(now, self._limited_at + LIMIT_INTERVAL))
 
-    def _keep_limits(self, reported: Configuration, now: float) -> None:
-        """Bring a light that exceeds a limit back within it, once."""
-        # Values that undo a change by another sender may be due only later.
-        if (self.guard.check(reported, self._newest.strobe_range)
-                and self._required.requirement is Requirement.OTHER_SENDER
-                and (due := self.guard.due(now)) is not None):
-            limited = self.guard.limits.clipped(reported, self._newest.strobe_range)
-            values = {name: getattr(limited, name) for name in reported.differences(limited)}
-            self._required = self._required.merged(values, Requirement.LIMIT, due)
+    # Outcomes
+
+    def take_outcomes(self, now: float) -> Iterator[Outcome[Status]]:
+        """Return what has ended."""
+        while self.outcomes:
+            outcome = self.outcomes.popleft()
+            desired, result, change = outcome.desired, outcome.result, outcome.desired.change
+            assert isinstance(change, Configure)
+            if result.success:
+                self._accepted(change.configuration, outcome.status)
+                self._required.drop([
+                    name for name, value in self._required.values.items()
+                    if name in change.names or value == getattr(change.configuration, name)])
+            elif result.contradicted:
+                self._failure = result.message, change.configuration, self._property.newest
+            if desired.reason == _REQUIRED and not result.superseded:
+                self._required_ended(result, now)
+            elif desired.reason == _SETPOINT and not (result.success or result.superseded):
+                self._emit(events.SetpointFailed(self._address, result.message))
+            yield outcome
+
+    def _accepted(self, goal: Configuration, status: Status | None) -> None:
+        """
+        Agree on a configuration that a command has set, with the status that shows it.
+
+        Values that the light rounds to its own steps are agreed as it shows them; values that
+        differ for another reason (heat, external sync) as they were sent.
+        """
+        self._failure = NO_FAILURE
+        if status is not None:
+            reported = status.configuration(goal)
+            far = goal.differences(reported)
+            goal = replace(goal, **{
+                name: getattr(reported, name)
+                for name in goal.differences(reported, step=False) if name not in far})
+        self._adopt(goal, events.ChangeCause.REQUEST)
+
+    def _required_ended(self, result: Result, now: float) -> None:
+        """Take the result of a command that no request has asked for."""
+        required = self._required
+        required.due = now + required.wait
+        required.wait = min(2 * required.wait, LONGEST_RETRY)
+        if result.success:
+            self._restored(True, result.message)
+        elif result.permanent:
+            self._required = Required({})
+            self._failure = result.message, None, None
+            self._restored(False, result.message)
+        else:
+            if not required.failure:
+                self._restored(False, f'{result.message}; it will be sent again', is_final=False)
+            required.failure = result.message
+
+    def _restored(self, success: bool, message: str, *, is_final: bool = True) -> None:
+        self._emit(events.ConfigurationRestored(self._address, success, message, is_final))
 
     # Time
 
-    def poll(self, now: float, *, connected: bool) -> None:
-        """Send the values that are due; the light may be lost."""
-        self._reconciler.poll(now)
-        desired = self._reconciler.desired
-        if connected and self._is_free and desired and isinstance(desired.change, Configure):
-            # The light has accepted a setpoint, and a newer one need not wait for the status.
-            self.agreed.accept(desired.change.configuration, None)
-        # Required values go first, since a stream of setpoints may never end.
-        if connected and self._is_free and now >= self._required_due:
-            self._send_required(now)
-        if connected and self._is_free and self._setpoint is not None:
-            value, self._setpoint = self._setpoint, None
-            self._send_setpoint(value, now)
+    def poll(self, now: float) -> None:
+        """Do what is due."""
+        self._property.poll(now)
 
-    @property
-    def _is_stream(self) -> bool:
-        desired = self._reconciler.desired
-        return desired is not None and desired.reason == _SETPOINT
+    def next_deadline(self) -> float:
+        """Return when :meth:`poll` or :meth:`update` has something to do."""
+        due = self._property.next_deadline()
+        if self._property.desired is None and self._sendable():
+            due = min(due, self._required.due)
+        return due
 
-    @property
-    def _is_free(self) -> bool:
-        """Whether values may be sent that no request has asked for."""
-        return not self._reconciler.is_busy or (
-            self._setpoint is not None and self._is_stream and self._reconciler.is_accepted)
 
-    @property
-    def _required_due(self) -> float:
-        return math.inf if self._must_wait() else self._required.due
+# The reasons of values that no request asks for.
+_REQUIRED, _SETPOINT = 'required values', 'a setpoint'
+# Of a request that is refused before a command is made.
+NOTHING_CHANGED = Configure(NOTHING, [])
 
-    def _send_setpoint(self, value: float, now: float) -> None:
-        is_unconfirmed = self._reconciler.is_busy or (
-            self._outcome is not None and not self._outcome.success)
-        if (self.agreed.confirmed is not None and self.agreed.confirmed.brightness == value
-                and not is_unconfirmed and not self._newest.is_shared):
-            return
-        try:
-            change = self._change({'brightness': value})
-        except InvalidValue as error:
-            self._setpoint_failed(str(error))
-        else:
-            self._reconciler.want(
-                Desired(change, _SETPOINT, since=now, limit=CONFIGURE_LIMIT), now)
 
-    def _setpoint_failed(self, message: str) -> None:
-        self._emit(events.SetpointFailed(self._address, message))
+def _differ(configuration: Configuration, status: Status) -> bool:
+    return bool(unexpected_differences(
+        configuration, status.configuration(NOTHING), status.error_flags, step=True))
 
-    def _restored(self, success: bool, message: str) -> None:
-        self._emit(events.ConfigurationRestored(self._address, success, message))
 
-    def _send_required(self, now: float) -> None:
-        for name, value in self._required.values.items():
-            try:
-                checked(name, value, self._newest.strobe_range)
-            except InvalidValue as error:
-                self._required = self._required.without([name])
-                self._restored(False, str(error))
-        required = self._required
-        if not required.values:
-            return
-        limit = required.limit
-        required.due = now + RESTORE_INTERVAL + limit - CONFIGURE_LIMIT
-        try:
-            change = self._change(self._checked(required.values))
-        except InvalidValue as error:
-            # The values stay required until a status comes; report that once.
-            required.due = math.inf
-            required.has_ended = True
-            required.failure = f'{", ".join(required.values)} not sent: {error}'
-            self._restored(False, required.failure)
-            return
-        if self.agreed.confirmed is None:
-            required.due += FIRST_STATUS_TIMEOUT
-        required.is_sent = True
-        self._reconciler.want(Desired(change, _REQUIRED, since=now, limit=limit), now)
-
-    def next_deadline(self, *, connected: bool) -> float:
-        """Return when :meth:`poll` has something to do."""
-        due = self._reconciler.next_deadline()
-        if not connected or not self._is_free:
-            return due
-        return -math.inf if self._setpoint is not None else min(due, self._required_due)
+def requested(outcome: Outcome[Status]) -> float | None:
+    """Return the brightness that a request has set, %; None if it has set none."""
+    change = outcome.desired.change
+    if isinstance(change, Configure) and 'brightness' in change.names:
+        return change.configuration.brightness
+    return None

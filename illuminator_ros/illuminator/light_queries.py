@@ -21,10 +21,16 @@ import functools
 import math
 
 from .messages import IlluminatorStatus, STATUS_ID
-from ..mavlink.command_sender import CommandResult, format_seconds
+from ..mavlink.command_sender import (
+    Command,
+    CommandResult,
+    CommandStatus,
+    format_seconds,
+    request_message,
+)
 from ..mavlink.dialect import mavlink
 from ..mavlink.messages import ComponentInformationBasic
-from ..payload.attempt import Done, Result, Target
+from ..payload.confirmed_command import Done, Result, Target
 from ..payload.identity import Identity
 
 # s without a status after which the light is asked for one, and between the requests.
@@ -43,6 +49,7 @@ class MessageQuery:
     Requests one message until it has come, or the light does not send it. Times are s.
 
     :ivar first_asked: the time of the first request, infinity before it.
+    :ivar message_until: when :meth:`poll` has something to do.
     :ivar failure: why the light did not send the message, '' if it did or an answer is awaited.
     """
 
@@ -54,7 +61,7 @@ class MessageQuery:
         self._waiting: list[Callable[[str, float], None]] = []
         # The number of requests that were sent, 0 while none is under way.
         self._questions = 0
-        self._message_until = math.inf
+        self.message_until = math.inf
 
     def ask(self, now: float, done: Callable[[str, float], None] | None = None) -> None:
         """Ask; ``done`` is called with '' once the message has come, else with the failure."""
@@ -64,20 +71,34 @@ class MessageQuery:
             self.first_asked = min(self.first_asked, now)
             self._send(now)
 
+    @property
+    def is_asking(self) -> bool:
+        """Whether an answer is awaited."""
+        return bool(self._questions)
+
+    def ask_again(self, now: float) -> None:
+        """Ask at once, though an answer may still be awaited."""
+        self._questions = 0
+        self.ask(now)
+
     def _send(self, now: float) -> None:
         self._questions += 1
-        self._message_until = math.inf
-        self._target.request_message(self._message_id, now, self._answered)
+        self.message_until = math.inf
+        self._target.commands.start(
+            request_message(self._target.address, self._message_id), now, self._answered)
 
     def _answered(self, result: CommandResult, now: float) -> None:
+        if result.status is CommandStatus.CANCELLED:
+            # A newer request has replaced it.
+            return
         if self._questions and result.accepted:
-            self._message_until = now + MESSAGE_TIMEOUT
+            self.message_until = now + MESSAGE_TIMEOUT
         elif self._questions:
             self.finish(result.describe_failure(), now)
 
     def finish(self, failure: str, now: float) -> None:
         """End the requests: the message has come, or will not come for the reason given."""
-        self._message_until = math.inf
+        self.message_until = math.inf
         self._questions = 0
         self.failure = failure
         waiting, self._waiting = self._waiting, []
@@ -86,16 +107,12 @@ class MessageQuery:
 
     def poll(self, now: float) -> None:
         """Ask again for a message that does not come, or give up."""
-        if now < self._message_until:
+        if now < self.message_until:
             return
         if self._questions < MAX_QUESTIONS:
             self._send(now)
         else:
             self.finish('acknowledged, but not sent', now)
-
-    def next_deadline(self) -> float:
-        """Return when :meth:`poll` has something to do."""
-        return self._message_until
 
 
 class LightQueries:
@@ -115,19 +132,30 @@ class LightQueries:
         # s of silence after which the light is asked for a status, so that its answer arrives
         # within the heartbeat timeout.
         self._longest_silence = min(STATUS_TIMEOUT, heartbeat_timeout / 1.2)
+        self._status_request = request_message(target.address, STATUS_ID)
         self._asked_at = -math.inf
         self._due = math.inf
-        self._queries = {STATUS: MessageQuery(target, STATUS_ID),
-                         IDENTITY: MessageQuery(target, ComponentInformationBasic.id)}
+        self._status = MessageQuery(target, STATUS_ID)
+        self._identity = MessageQuery(target, ComponentInformationBasic.id)
 
     def begin(self, now: float) -> None:
         """Request interval, status and identity: the light is heard, or has restarted."""
         if self._interval > 0:
-            self._target.send(mavlink.MAV_CMD_SET_MESSAGE_INTERVAL,
-                              (float(STATUS_ID), self._interval * 1e6), now)
+            self._target.commands.start(Command(
+                self._target.address, mavlink.MAV_CMD_SET_MESSAGE_INTERVAL,
+                (float(STATUS_ID), self._interval * 1e6)), now)
         self._due = now + STATUS_TIMEOUT
-        self._target.request_status(now)
-        self._queries[IDENTITY].ask(now)
+        # A request that was sent to the silent light would be resent only later.
+        if self._status.is_asking:
+            self._status.ask_again(now)
+        else:
+            self._target.commands.start(self._status_request, now)
+        self._identity.ask(now)
+
+    def request_status(self, now: float) -> None:
+        """Request a status, unless such a request is under way."""
+        if not self._target.commands.is_sending(self._status_request):
+            self._target.commands.start(self._status_request, now)
 
     def end(self) -> None:
         """Request no status: the light is lost."""
@@ -135,28 +163,25 @@ class LightQueries:
 
     def close(self, reason: str, now: float) -> None:
         """Answer all who wait for a message."""
-        for query in self._queries.values():
-            query.finish(reason, now)
+        self._status.finish(reason, now)
+        self._identity.finish(reason, now)
 
     def take_status(self, now: float) -> None:
         """Note that a status has come."""
         self._due = now + self._timeout
-        self._queries[STATUS].finish('', now)
+        if self._status.is_asking:
+            self._status.finish('', now)
 
     def take_identity(self, identity: Identity, now: float) -> None:
         """Take the identity."""
         self.identity = identity
-        self._queries[IDENTITY].finish('', now)
+        self._identity.finish('', now)
 
     def identity_is_settled(self, now: float) -> bool:
         """Return whether the identity is known, or will not be known soon."""
-        query = self._queries[IDENTITY]
+        query = self._identity
         return (self.identity is not None or bool(query.failure)
                 or now >= query.first_asked + SETTLING_TIME)
-
-    def need_status(self, due: float) -> None:
-        """Request a status at a time, s, or before."""
-        self._due = min(self._due, due)
 
     def refresh(self, now: float, done: Done) -> None:
         """
@@ -164,17 +189,18 @@ class LightQueries:
 
         It is a success when a status has come: not every light has an identity.
         """
+        queries = {STATUS: self._status, IDENTITY: self._identity}
         outcomes: dict[str, str] = {}
 
         def answered(name: str, failure: str, at: float) -> None:
             outcomes[name] = failure
-            if len(outcomes) == len(self._queries):
-                parts = [f'{one}: {outcomes[one] or "received"}' for one in self._queries]
+            if len(outcomes) == len(queries):
+                parts = [f'{one}: {outcomes[one] or "received"}' for one in queries]
                 refusal = self._target.commands.refusal
                 done(Result(not (refusal or outcomes[STATUS]), refusal or (
                     f'{", ".join(parts)} ({format_seconds(at - now)})')), at)
 
-        for name, query in self._queries.items():
+        for name, query in queries.items():
             query.ask(now, functools.partial(answered, name))
 
     def poll(self, now: float, silent_since: float) -> None:
@@ -185,9 +211,9 @@ class LightQueries:
         """
         if now >= self._status_due(silent_since):
             self._asked_at, self._due = now, now + STATUS_TIMEOUT
-            self._target.request_status(now)
-        for query in self._queries.values():
-            query.poll(now)
+            self.request_status(now)
+        self._status.poll(now)
+        self._identity.poll(now)
 
     def _status_due(self, silent_since: float) -> float:
         # The light may have no heartbeat, and a status interval above the heartbeat timeout.
@@ -195,5 +221,5 @@ class LightQueries:
 
     def next_deadline(self, silent_since: float) -> float:
         """Return when :meth:`poll` has something to do."""
-        return min(self._status_due(silent_since),
-                   *(query.next_deadline() for query in self._queries.values()))
+        status, identity = self._status, self._identity
+        return min(self._status_due(silent_since), status.message_until, identity.message_until)

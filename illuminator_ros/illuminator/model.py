@@ -271,7 +271,7 @@ class SafetyLimits:
                 f'longest period of the light, {shortest(longest):g} s')
 
 
-@dataclass(slots=True)
+@dataclass(slots=True, unsafe_hash=True)
 class Status:
     """
     An ILLUMINATOR_STATUS. A field that is not plausible is None and named in ``invalid``.
@@ -321,6 +321,16 @@ class Status:
             message.gimbal_device_id)
 
     @property
+    def is_dimmed(self) -> bool:
+        """Whether heat makes the light less bright than it was set, or has switched it off."""
+        return bool(self.error_flags & DIMMING_FLAGS)
+
+    @property
+    def is_dark(self) -> bool:
+        """Whether it is off with a brightness of 0, so that a brightness may switch it on."""
+        return self.enabled is False and self.brightness == 0.0
+
+    @property
     def complete(self) -> bool:
         """Whether each number of the configuration is plausible."""
         return None not in (self.brightness, self.strobe_period, self.strobe_duty_cycle)
@@ -340,6 +350,12 @@ class Status:
             otherwise.brightness if brightness is None else shortest(brightness),
             otherwise.strobe_period if period is None else shortest(period),
             otherwise.strobe_duty_cycle if duty is None else shortest(duty))
+
+
+    def shows_the_state_of(self, other: Status) -> bool:
+        """Return whether a light may send both without having been changed."""
+        return self.enabled == other.enabled and not unexpected_differences(
+            self.configuration(NOTHING), other.configuration(NOTHING), 0, step=True)
 
 
 NOTHING = Configuration(Mode.UNKNOWN, 0.0, 0.0, 0.0)

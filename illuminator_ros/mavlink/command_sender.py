@@ -18,46 +18,41 @@ The sending side of the MAVLink command protocol; no I/O, and time is passed in.
 https://mavlink.io/en/services/command.html: a command is resent, with ``confirmation`` counted
 up, until it is acknowledged; MAV_RESULT_IN_PROGRESS lengthens the wait and ends the resending.
 An acknowledgement names only the command, so one command of a kind at a time is sent to a
-component, and the others wait.
+component: a newer one replaces it.
 """
 
 from __future__ import annotations
 
-import bisect
 from collections import deque
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from enum import Enum
 import math
-from typing import NamedTuple
+from typing import NamedTuple, TypeVar
 
 from . import messages
 from .dialect import mavlink
 from .messages import Address, Message
 
+# s; each wait for an acknowledgement is twice as long as the one before, up to this.
+LONGEST_WAIT = 1.0
 # s between two reports of progress. The specification does not define it; MAVSDK also uses 3 s.
 PROGRESS_TIMEOUT = 3.0
 # s between tries of a command that was temporarily rejected: the first, doubling up to the last.
 REJECTED_BACKOFF = (0.1, 0.8)
-# Commands of one kind that may wait for one target. More are refused, so memory is bounded.
-MAX_WAITING = 32
-# s. A shorter time-out is unsafe on a 57,600 baud line, where another frame may be on the wire for
-# 49 ms before our command and another before the answer.
-MIN_TIMEOUT = 0.2
-# The most round-trip times of one target, and the most targets with round-trip times.
-MAX_SAMPLES = 64
-MAX_TARGETS = 128
-# With fewer samples than this the given time-out is used.
-MIN_SAMPLES = 4
-# s for which an acknowledgement, or a copy of it, may be under way.
-ACK_LIFETIME = 5.0
+# s after a stop of the process in which requests may have waited as long.
+LATE_TIME = 1.0
 # s between the tries of a command while the process ends, which has less than a second.
 CLOSING_TIMEOUT = 0.1
+# The most targets whose last round trip, or missing answer, is kept.
+MAX_TARGETS = 128
 # COMMAND_INT: x and y are degrees * 1e7 in the global frames and metres * 1e4 in the local ones.
 GLOBAL_FRAMES = frozenset((0, 3, 5, 6, 10, 11))
 DEGREE_SCALE, METRE_SCALE = 1e7, 1e4
 # COMMAND_INT: represents NaN in x and y.
 INT32_UNSET = 0x7FFFFFFF
+
+V = TypeVar('V')
 
 
 class CommandStatus(Enum):
@@ -69,7 +64,6 @@ class CommandStatus(Enum):
     OUT_OF_TIME = 'not finished in time'
     LINK_LOST = 'the link was lost'
     CANCELLED = 'cancelled'
-    REFUSED_LOCALLY = 'too many commands are waiting for this component'
     CLOSED = 'the bridge is ending'
 
 
@@ -124,8 +118,8 @@ class Command(NamedTuple):
 
     @property
     def key(self) -> Key:
-        """Return the kind: commands of one kind wait for each other."""
-        # As in MAVSDK: a request for one message must not wait for a request for another.
+        """Return the kind: a command replaces another one of its kind."""
+        # As in MAVSDK: requests for two messages do not exclude each other.
         is_request = self.command == mavlink.MAV_CMD_REQUEST_MESSAGE and self.params
         return self.target, self.command, self.params[0] if is_request else 0.0
 
@@ -145,27 +139,9 @@ class Command(NamedTuple):
             *self.target, frame, self.command, 0, 0, p1, p2, p3, p4, x, y, z)
 
 
-class EarlierCommand(NamedTuple):
-    """
-    The last command of the same kind, and how it ended.
-
-    :param result: its MAV_RESULT, None if there was no answer.
-    :param ended_at: s, on the clock of the calls.
-    :param tries: how often it was sent.
-    :param elapsed: s, from the first sending to the end.
-    :param last_ack_at: from then on an acknowledgement answers the last try, so that ``elapsed``
-        was the round trip of the first; infinity where it was not one.
-    :param is_doubtful: whether acknowledgements with another result than its own may still come:
-        its own, if an earlier command's was taken for it, or a copy of an earlier command's.
-    """
-
-    command: Command
-    result: int | None
-    ended_at: float
-    tries: int
-    elapsed: float
-    last_ack_at: float
-    is_doubtful: bool
+def request_message(target: Address, message_id: int) -> Command:
+    """Return the command that requests one message of a component."""
+    return Command(target, mavlink.MAV_CMD_REQUEST_MESSAGE, (float(message_id),))
 
 
 class CommandResult(NamedTuple):
@@ -176,8 +152,6 @@ class CommandResult(NamedTuple):
     :param tries: how often it was sent.
     :param elapsed: s, from the first sending.
     :param progress: %, the last that was reported, None where unknown.
-    :param earlier: the command of the same kind that had ended before this one was answered,
-        None if there was none. See :meth:`may_answer_earlier`.
     """
 
     status: CommandStatus
@@ -185,7 +159,6 @@ class CommandResult(NamedTuple):
     tries: int = 0
     elapsed: float = 0.0
     progress: int | None = None
-    earlier: EarlierCommand | None = None
 
     @property
     def accepted(self) -> bool:
@@ -196,19 +169,6 @@ class CommandResult(NamedTuple):
     def refused(self) -> bool:
         """Whether the target acknowledged with another MAV_RESULT."""
         return self.status is CommandStatus.ANSWERED and self.result != mavlink.MAV_RESULT_ACCEPTED
-
-    def may_answer_earlier(self, now: float) -> bool:
-        """
-        Return whether the acknowledgement may belong to the earlier command of this kind.
-
-        That is possible if the earlier command got the same result, which may come twice, or none,
-        which may still come, or if its own result is doubtful. A status must then decide.
-
-        :param now: when this command was answered.
-        """
-        return (self.status is CommandStatus.ANSWERED and self.earlier is not None
-                and (self.earlier.is_doubtful or self.earlier.result in (None, self.result))
-                and now - self.earlier.ended_at <= ACK_LIFETIME)
 
     def describe(self) -> str:
         """Return the outcome for people, with the name of the MAV_RESULT."""
@@ -223,13 +183,8 @@ class CommandResult(NamedTuple):
         """Return why it was not accepted, for people."""
         return f'{"refused: " if self.refused else ""}{self.describe()}'
 
-    def timing(self, elapsed: float | None = None) -> str:
-        """Return the number of tries and the time taken, or another time (s)."""
-        time = format_seconds(self.elapsed if elapsed is None else elapsed)
-        return f'{self.tries} {"try" if self.tries == 1 else "tries"}, {time}'
-
     def __str__(self) -> str:
-        return f'{self.describe()} ({self.timing()})'
+        return f'{self.describe()} ({timing(self.tries, self.elapsed)})'
 
 
 Done = Callable[[CommandResult, float], None]
@@ -240,64 +195,9 @@ def format_seconds(seconds: float) -> str:
     return f'{seconds * 1000:.0f} ms' if seconds < 0.9995 else f'{seconds:.2f} s'
 
 
-class RttEstimator:
-    """The last :data:`MAX_SAMPLES` round-trip times of one target, s."""
-
-    def __init__(self) -> None:
-        self._ambiguous_until = -math.inf
-        # Each sample, and whether it is unambiguous.
-        self._samples: list[tuple[float, bool]] = []
-        self._sorted: list[float] = []
-
-    def __len__(self) -> int:
-        return len(self._sorted)
-
-    def add(self, seconds: float, now: float) -> None:
-        """Add a sample, s."""
-        self._samples.append((seconds, not self.is_ambiguous(now)))
-        bisect.insort(self._sorted, seconds)
-        if len(self._samples) > MAX_SAMPLES:
-            del self._sorted[bisect.bisect_left(self._sorted, self._samples.pop(0)[0])]
-
-    def expect_ambiguous(self, now: float) -> None:
-        """Note that acknowledgements may belong to an earlier try or be copies from now on."""
-        self._ambiguous_until = now + ACK_LIFETIME
-
-    def quantile(self, share: float) -> float | None:
-        """Return the round-trip time that this share (0..1) does not exceed, None if unknown."""
-        if not self._sorted:
-            return None
-        return self._sorted[min(int(share * len(self._sorted)), len(self._sorted) - 1)]
-
-    def is_ambiguous(self, now: float) -> bool:
-        """Return whether acknowledgements may belong to an earlier try or be copies."""
-        return now < self._ambiguous_until
-
-    def shortest(self, now: float) -> float:
-        """
-        Return a time after a command within which no answer to it can come, s.
-
-        While the line stays ambiguous its delay may change, so the last unambiguous samples may be
-        outdated.
-
-        :return: the lower quartile of the last eight unambiguous samples, or the median of all
-            samples if there are none; 0 while acknowledgements are not ambiguous.
-        """
-        if not self.is_ambiguous(now):
-            return 0.0
-        unambiguous = sorted([seconds for seconds, known in self._samples if known][-8:])
-        return unambiguous[len(unambiguous) // 4] if unambiguous else self.quantile(0.5) or 0.0
-
-    def timeout(self, longest: float) -> float:
-        """
-        Return the wait for an acknowledgement, s: four times the 95th percentile, bounded.
-
-        :param longest: s; the wait while fewer than :data:`MIN_SAMPLES` samples are known.
-        """
-        slow = self.quantile(0.95)
-        if slow is None or len(self._sorted) < MIN_SAMPLES:
-            return longest
-        return min(max(4 * slow, MIN_TIMEOUT), longest)
+def timing(tries: int, seconds: float) -> str:
+    """Return the number of tries and the time taken, for people."""
+    return f'{tries} {"try" if tries == 1 else "tries"}, {format_seconds(seconds)}'
 
 
 class CommandState(Enum):
@@ -305,10 +205,9 @@ class CommandState(Enum):
     The state of a command that has not ended.
 
     SENT waits for an acknowledgement, BACKOFF to send a rejected command again, IN_PROGRESS for
-    the next report of progress. WAITING was not sent, since another of its kind was.
+    the next report of progress.
     """
 
-    WAITING = 'waiting'
     SENT = 'sent'
     BACKOFF = 'backoff'
     IN_PROGRESS = 'in progress'
@@ -326,44 +225,41 @@ TRANSITIONS: dict[tuple[CommandState, int], CommandState] = {
 }
 
 
-@dataclass(eq=False, slots=True)
-class _PendingCommand:
+@dataclass
+class Transmission:
     """
-    A command that has not ended. Times are s.
+    A command that is being sent.
 
-    :param deadline: the time by which it ends.
+    :param done: called once, with the outcome and the time.
+    :param deadline: s, the time by which it ends.
+    :param retries: resends of an unacknowledged try.
     :param as_int: whether it is sent as COMMAND_INT.
-    :param rejected: tries that were answered with a reason to try again: these were not lost.
-    :param due: when it is sent again, or ends.
-    :param tries_end: the time from which it is not sent again.
+    :param follow_up: a request that each try carries, None for none.
+    :ivar tries: how often it was sent.
+    :ivar last_sent: when it was sent last, s.
     """
 
     command: Command
-    key: Key
     done: Done
     deadline: float
+    retries: int
     as_int: bool
-    state: CommandState = CommandState.WAITING
+    follow_up: Command | None
+    state: CommandState = CommandState.SENT
     tries: int = 0
+    # Tries that were answered with a result that is not final, and are not resends.
     rejected: int = 0
-    first_sent: float = 0.0
-    last_sent: float = 0.0
+    first_sent: float = -math.inf
+    last_sent: float = -math.inf
     due: float = math.inf
-    tries_end: float = math.inf
     result: int | None = None
     progress: int | None = None
 
-    def answers_another_try(self, result: int) -> bool:
-        """
-        Return whether an acknowledgement is for a try whose answer has no effect.
-
-        A target rejects a try that arrives while it executes an earlier try or a copy of it. It
-        may also refuse another COMMAND_LONG after the COMMAND_INT was sent.
-        """
-        if result == mavlink.MAV_RESULT_COMMAND_INT_ONLY:
-            return self.as_int
-        return result == mavlink.MAV_RESULT_TEMPORARILY_REJECTED and (
-            self.state is CommandState.IN_PROGRESS or self.rejected == self.tries)
+    @property
+    def is_last_try(self) -> bool:
+        """Whether no further try is sent unless an acknowledgement asks for it."""
+        return self.state is CommandState.SENT and (
+            self.tries - self.rejected > self.retries or self.due >= self.deadline)
 
 
 @dataclass
@@ -381,26 +277,27 @@ class CommandSender:
     Sends commands to any number of components, in parallel across them.
 
     :param address: our own address, which acknowledgements are matched against.
-    :param timeout: s, > 0: the longest wait for the acknowledgement of one try.
+    :param timeout: s, > 0: the wait for the acknowledgement of the first try; each further wait is
+        twice as long, up to :data:`LONGEST_WAIT`.
     :param retries: resends after the first try, >= 0.
     :ivar outgoing: messages to send, each with the address that sends it.
     :ivar unanswering: the targets whose last command got no acknowledgement, at most
         :data:`MAX_TARGETS`.
+    :ivar round_trips: the last round-trip time of each target, s, at most :data:`MAX_TARGETS`.
     :raises ValueError: if ``timeout`` or ``retries`` is out of its range.
     """
 
     address: Address
-    timeout: float = 0.5
+    timeout: float = 0.25
     retries: int = 3
     outgoing: deque[tuple[Address, Message]] = field(default_factory=deque)
     counters: CommandCounters = field(default_factory=CommandCounters)
     unanswering: dict[Address, None] = field(default_factory=dict)
+    round_trips: dict[Address, float] = field(default_factory=dict)
     _may_send: Callable[[Command | Message], bool] | None = None
-    # In the order of sending: the sent command first, then the waiting ones.
-    _pending: dict[Address, list[_PendingCommand]] = field(default_factory=dict)
-    # In the order of their ends; those that ended more than ACK_LIFETIME ago do not matter.
-    _earlier: dict[Key, EarlierCommand] = field(default_factory=dict)
-    _round_trips: dict[Address, RttEstimator] = field(default_factory=dict)
+    _pending: dict[Key, Transmission] = field(default_factory=dict)
+    # For how long the process was stopped, and until when, s.
+    _stall: tuple[float, float] = 0.0, -math.inf
 
     def __post_init__(self) -> None:
         if not (math.isfinite(self.timeout) and self.timeout > 0):
@@ -410,7 +307,7 @@ class CommandSender:
 
     def __len__(self) -> int:
         """Return how many commands have not ended."""
-        return sum(map(len, self._pending.values()))
+        return len(self._pending)
 
     def close(self, now: float, may_send: Callable[[Command | Message], bool]) -> None:
         """
@@ -423,8 +320,21 @@ class CommandSender:
             requests for messages.
         """
         self._may_send = may_send
-        self.timeout = min(self.timeout, CLOSING_TIMEOUT)
-        self.end_all(now, CommandStatus.CLOSED, ends=self._is_refused)
+        for pending in list(self._pending.values()):
+            if self._is_refused(pending.command):
+                self._end(pending, CommandStatus.CLOSED, now)
+
+    def stalled(self, seconds: float, now: float) -> None:
+        """Note that the process was stopped: requests that come now may be as old, s."""
+        self._stall = seconds, now
+
+    def lateness(self, now: float) -> str:
+        """Return why a request that comes now may be late, for people; '' if it is not."""
+        seconds, at = self._stall
+        if now >= at + LATE_TIME:
+            return ''
+        return (f'the request may be {format_seconds(seconds)} old, since this process was '
+                'stopped as long; repeat it')
 
     @property
     def refusal(self) -> str:
@@ -442,102 +352,70 @@ class CommandSender:
         if not self._is_refused(message):
             self.outgoing.append((self.address, message))
 
+    def send_once(self, command: Command) -> None:
+        """Send a command once; its acknowledgement has no receiver."""
+        self.outgoing.append((self.address, command.message(0, command.position is not None)))
+
     def start(
         self, command: Command, now: float, done: Done = lambda result, now: None, *,
-        deadline: float = math.inf, overtake: bool = False,
-    ) -> None:
+        deadline: float = math.inf, retries: int | None = None, tried: int = 0,
+        follow_up: Command | None = None,
+    ) -> Transmission:
         """
-        Send a command, or queue it behind the one of its kind that was sent.
+        Send a command, in the place of the one of its kind, which ends with CANCELLED.
 
         :param done: called once, with the outcome and the time.
         :param deadline: s, the time by which it ends, even if it is in progress.
-        :param overtake: end all commands of its kind that are not in progress, with CANCELLED, and
-            send this one at once, even beside a command in progress.
+        :param retries: as of the sender, or others.
+        :param tried: how often it was sent before, which ``confirmation`` counts.
+        :param follow_up: a request that is sent with each try.
         """
+        sending = Transmission(command, done, deadline,
+                               self.retries if retries is None else retries,
+                               command.position is not None, follow_up)
         if self._is_refused(command):
             done(CommandResult(CommandStatus.CLOSED), now)
-            return
-        if now >= deadline:
+        elif now >= deadline:
             done(CommandResult(CommandStatus.OUT_OF_TIME), now)
-            return
-        key = command.key
-        pending = _PendingCommand(command, key, done, deadline, command.position is not None)
-        queue = self._pending.setdefault(command.target, [])
-        kind = [other for other in queue if other.key == key] if queue else []
-        if not kind or overtake:
-            queue.append(pending)
-            self._begin(pending, now)
-            # End the waiting ones first, so that none is sent in the place of another.
-            for other in reversed(kind):
-                if other.state is not CommandState.IN_PROGRESS:
-                    self._end(other, CommandStatus.CANCELLED, now)
-        elif sum(other.state is CommandState.WAITING for other in kind) >= MAX_WAITING:
-            done(CommandResult(CommandStatus.REFUSED_LOCALLY), now)
         else:
-            queue.append(pending)
+            if older := self._pending.get(command.key):
+                self._end(older, CommandStatus.CANCELLED, now)
+            self._pending[command.key] = sending
+            sending.first_sent = now
+            sending.tries = sending.rejected = tried
+            self._transmit(sending, now)
+        return sending
 
-    def cancel(self, command: Command, now: float) -> None:
-        """End a command that was started with CANCELLED, if it has not ended."""
-        self.end_all(now, CommandStatus.CANCELLED, command.target, lambda one: one is command)
+    def is_sending(self, command: Command) -> bool:
+        """Return whether a command of the kind of another one has not ended."""
+        return command.key in self._pending
 
-    def round_trip(self, target: Address) -> RttEstimator:
-        """Return the round-trip times of a target's acknowledgements."""
-        estimator = self._round_trips.get(target)
-        return RttEstimator() if estimator is None else estimator
-
-    def _estimator(self, target: Address) -> RttEstimator:
-        """Return the estimator of a target; a new one replaces the one not used for longest."""
-        estimator = self._round_trips.pop(target, None)
-        if estimator is None:
-            estimator = RttEstimator()
-            if len(self._round_trips) >= MAX_TARGETS:
-                del self._round_trips[next(iter(self._round_trips))]
-        self._round_trips[target] = estimator
-        return estimator
+    def cancel(self, sending: Transmission, now: float) -> None:
+        """End a command with CANCELLED, if it has not ended."""
+        self._end(sending, CommandStatus.CANCELLED, now)
 
     def acknowledge(self, source: Address, ack: messages.CommandAck, now: float) -> None:
         """
         Receive a COMMAND_ACK.
 
         It counts if its source and command match a command that was sent, and if its target is our
-        address or 0, since the extension fields may be missing. It answers the oldest of several
-        commands, but progress belongs to the command in progress.
+        address or 0, since the extension fields may be missing.
         """
         if not messages.target_of(ack).includes(self.address):
             return
         self.unanswering.pop(source, None)
-        is_expected = False
-        for pending in self._pending.get(source, ()):
-            if (pending.command.command == ack.command
-                    and pending.state is not CommandState.WAITING):
-                is_expected = True
-                # A rejection belongs not to a command in progress but to a command sent beside it.
-                if not pending.answers_another_try(ack.result):
-                    self._answered(pending, ack, now)
-                    return
-        if not is_expected and source in self._round_trips:
-            self._estimator(source).expect_ambiguous(now)
-            self._measure_resent(source, ack.command, now)
-
-    def _measure_resent(self, source: Address, command: int, now: float) -> None:
-        """
-        Take the round trip of a command whose last try is acknowledged as late as the first was.
-
-        An earlier acknowledgement may be a copy. Without this, each command would be sent twice
-        for ever where a line has become slower than the wait for one try, since a resent command
-        is not measured.
-        """
-        for key, earlier in self._earlier.items():
-            if key[:2] == (source, command) and now >= earlier.last_ack_at:
-                self._earlier[key] = earlier._replace(last_ack_at=math.inf)
-                self._estimator(source).add(earlier.elapsed, now)
+        for pending in self._pending.values():
+            if pending.command.command == ack.command and pending.command.target == source:
+                self._answered(pending, ack, now)
                 return
 
-    def _answered(self, pending: _PendingCommand, ack: messages.CommandAck, now: float) -> None:
-        if pending.tries == 1 and pending.result is None:
-            # An acknowledgement after a resend may be of either try and is not measured (RFC
-            # 6298).
-            self._estimator(pending.command.target).add(now - pending.last_sent, now)
+    def _answered(self, pending: Transmission, ack: messages.CommandAck, now: float) -> None:
+        if (pending.state is CommandState.IN_PROGRESS
+                and ack.result == mavlink.MAV_RESULT_TEMPORARILY_REJECTED):
+            # The target rejects an earlier resend, since it executes the try before that.
+            return
+        if pending.result is None:
+            _keep(self.round_trips, pending.command.target, now - pending.last_sent)
         pending.result = ack.result
         state = TRANSITIONS.get((pending.state, ack.result))
         if state is CommandState.IN_PROGRESS:
@@ -547,12 +425,10 @@ class CommandSender:
             first, last = REJECTED_BACKOFF
             pending.due = now + min(first * 2 ** min(pending.rejected, 8), last)
             pending.rejected += 1
-            if pending.due >= min(pending.tries_end, pending.deadline):
-                # The target may be busy with a try that was never answered.
-                self._end(pending, CommandStatus.ANSWERED if pending.rejected == pending.tries
-                          else CommandStatus.OUT_OF_TIME, now)
+            if pending.due >= min(pending.first_sent + self._patience, pending.deadline):
+                self._end(pending, CommandStatus.ANSWERED, now)
                 return
-        elif state is CommandState.SENT and now < min(pending.tries_end, pending.deadline):
+        elif state is CommandState.SENT and not pending.as_int:
             pending.as_int = True
             pending.rejected += 1
             self._transmit(pending, now)
@@ -561,121 +437,81 @@ class CommandSender:
             return
         pending.state = state
 
+    @property
+    def _patience(self) -> float:
+        """Return s from the first try of a command to its end without an acknowledgement."""
+        return sum(map(self._wait, range(self.retries + 1)))
+
+    def _wait(self, resends: int) -> float:
+        """Return the wait for an acknowledgement after so many resends, s."""
+        if self._may_send is not None:
+            return min(self.timeout, CLOSING_TIMEOUT)
+        return max(self.timeout, min(self.timeout * (1 << min(max(resends, 0), 16)), LONGEST_WAIT))
+
     def poll(self, now: float) -> None:
         """Resend or end what is due."""
-        for queue in list(self._pending.values()):
-            for pending in list(queue):
-                if pending in queue and now >= min(pending.due, pending.deadline):
-                    self._overdue(pending, now)
+        for pending in list(self._pending.values()):
+            if now >= min(pending.due, pending.deadline):
+                self._overdue(pending, now)
 
-    def _overdue(self, pending: _PendingCommand, now: float) -> None:
+    def _overdue(self, pending: Transmission, now: float) -> None:
         if now >= pending.deadline:
-            unanswered = pending.state is CommandState.SENT and not pending.rejected
+            unanswered = pending.state is CommandState.SENT and pending.result is None
             self._end(pending, CommandStatus.NO_ANSWER if unanswered
                       else CommandStatus.OUT_OF_TIME, now)
         elif pending.state is CommandState.IN_PROGRESS:
             self._end(pending, CommandStatus.PROGRESS_STOPPED, now)
-        elif self._may_send is None and (
-                pending.tries - pending.rejected > self.retries or now >= pending.tries_end):
+        elif pending.is_last_try and self._may_send is None:
             self._end(pending, CommandStatus.NO_ANSWER, now)
         else:
             pending.state = CommandState.SENT
-            self._estimator(pending.command.target).expect_ambiguous(now)
             self._transmit(pending, now)
 
     def next_deadline(self) -> float:
         """Return when :meth:`poll` has something to do, infinity if never."""
         due = math.inf
-        for queue in self._pending.values():
-            for pending in queue:
-                due = min(due, pending.due, pending.deadline)
+        for pending in self._pending.values():
+            due = min(due, pending.due, pending.deadline)
         return due
 
     def end_all(
         self, now: float, status: CommandStatus, target: Address | None = None,
-        ends: Callable[[Command], bool] = lambda command: True,
     ) -> None:
-        """
-        End commands that were started, to one target or to all.
+        """End all commands, or those to one target."""
+        for pending in list(self._pending.values()):
+            if target is None or pending.command.target == target:
+                self._end(pending, status, now)
 
-        :param ends: returns whether a command ends.
-        """
-        ended = [pending for queue in self._pending.values() for pending in queue
-                 if (target is None or pending.command.target == target)
-                 and ends(pending.command)]
-        # End the sent command last, so that no waiting one is sent in its place.
-        for pending in reversed(ended):
-            self._end(pending, status, now)
-
-    def stop_resending(
-        self, now: float, target: Address, which: Callable[[Command], bool],
-    ) -> None:
-        """
-        Resend no more of some commands to a target, which may still answer them.
-
-        Those that wait for another command of their kind end with CANCELLED.
-        """
-        for pending in list(self._pending.get(target, ())):
-            if which(pending.command):
-                pending.tries_end = min(pending.tries_end, now)
-                if pending.state is CommandState.WAITING:
-                    self._end(pending, CommandStatus.CANCELLED, now)
-
-    def _begin(self, pending: _PendingCommand, now: float) -> None:
-        pending.state = CommandState.SENT
-        pending.first_sent = now
-        pending.tries_end = now + self.timeout * (self.retries + 1)
-        self._transmit(pending, now)
-
-    def _transmit(self, pending: _PendingCommand, now: float) -> None:
-        command = pending.command
-        self.outgoing.append((self.address, command.message(pending.tries, pending.as_int)))
+    def _transmit(self, pending: Transmission, now: float) -> None:
+        self.outgoing.append(
+            (self.address, pending.command.message(pending.tries, pending.as_int)))
+        if pending.follow_up is not None:
+            self.send_once(pending.follow_up)
+        pending.due = now + self._wait(pending.tries - pending.rejected)
         pending.tries += 1
         self.counters.sent += 1
         self.counters.resent += pending.tries > 1
         pending.last_sent = now
-        timeout = self.round_trip(command.target).timeout(self.timeout)
-        lost = pending.tries - pending.rejected - 1
-        if lost > 0:
-            timeout = min(timeout * 2 ** min(lost, 16), self.timeout)
-        pending.due = now + timeout
 
-    def _end(self, pending: _PendingCommand, status: CommandStatus, now: float) -> None:
-        command, key = pending.command, pending.key
-        queue = self._pending.get(command.target, [])
-        if pending not in queue:
+    def _end(self, pending: Transmission, status: CommandStatus, now: float) -> None:
+        key = pending.command.key
+        if self._pending.get(key) is not pending:
             return
-        queue.remove(pending)
-        if not queue:
-            del self._pending[command.target]
-        if pending.state is CommandState.WAITING:
-            pending.done(CommandResult(status), now)
-            return
-        result = CommandResult(
-            status, pending.result, pending.tries, now - pending.first_sent, pending.progress,
-            self._earlier.pop(key, None))
-        answered = status is CommandStatus.ANSWERED
-        if not answered:
-            self._estimator(command.target).expect_ambiguous(now)
-        while self._earlier and now > (
-                oldest := next(iter(self._earlier.values()))).ended_at + ACK_LIFETIME:
-            del self._earlier[oldest.command.key]
-        is_measure = answered and pending.tries > 1 and not pending.rejected
-        between = pending.last_sent - pending.first_sent
-        self._earlier[key] = EarlierCommand(
-            command, pending.result if answered else None, now, pending.tries, result.elapsed,
-            now + between / 2 if is_measure else math.inf,
-            self.round_trip(command.target).is_ambiguous(now))
+        del self._pending[key]
         if status is CommandStatus.NO_ANSWER:
             self.counters.unanswered += 1
-            self.unanswering[command.target] = None
-            if len(self.unanswering) > MAX_TARGETS:
-                del self.unanswering[next(iter(self.unanswering))]
-        # The next poll ends those whose deadline has passed.
-        following = [one for one in queue if one.key == key and now < one.deadline]
-        if following and following[0].state is CommandState.WAITING:
-            self._begin(following[0], now)
-        pending.done(result, now)
+            _keep(self.unanswering, pending.command.target, None)
+        pending.done(CommandResult(
+            status, pending.result, pending.tries, now - pending.first_sent, pending.progress),
+            now)
+
+
+def _keep(values: dict[Address, V], target: Address, value: V) -> None:
+    """Keep a value of a target; drop the one not renewed for longest if there are too many."""
+    values.pop(target, None)
+    values[target] = value
+    if len(values) > MAX_TARGETS:
+        del values[next(iter(values))]
 
 
 def _int32(value: float) -> int:

@@ -69,6 +69,9 @@ class MessageHandler(ABC):
     def link_closed(self, now: float, reason: str) -> None:  # noqa: B027 - optional
         """Note that nothing can be sent any more, and why."""
 
+    def stalled(self, seconds: float, now: float) -> None:  # noqa: B027 - optional
+        """Note that the process was stopped: requests that come now may be as old, s."""
+
     def components_lost(  # noqa: B027 - optional
         self, lost: Collection[Address], now: float, reason: str,
     ) -> None:
@@ -229,6 +232,10 @@ class Component(Endpoint):
         self.commands.end_all(now, CommandStatus.LINK_LOST)
         for payload in self._payloads:
             payload.link_closed(now, reason)
+
+    def stalled(self, seconds: float, now: float) -> None:
+        """See :meth:`Endpoint.stalled`."""
+        self.commands.stalled(seconds, now)
 
     def components_lost(self, lost: Collection[Address], now: float, reason: str) -> None:
         """See :meth:`Endpoint.components_lost`."""

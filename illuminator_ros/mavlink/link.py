@@ -72,7 +72,8 @@ class Link:
         self._store_due = 0.0 if store else math.inf
         self._faults = FaultLog(clock)
         self._thread = LinkThread(
-            label, self._work, self._finish, self._faults, clock, selector)
+            label, self._work, self._finish, self._faults, clock, selector,
+            stalled=lambda seconds: endpoint.stalled(seconds, clock()))
         self.lines = Lines(
             [(label, url), *further.items()], endpoint, faults=self._faults,
             selector=self._thread.selector, call=self._thread.call,

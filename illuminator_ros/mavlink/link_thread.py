@@ -25,6 +25,7 @@ import select
 import selectors
 import socket
 import threading
+import time
 
 # s; the longest wait.
 MAX_WAIT = 10.0
@@ -36,6 +37,8 @@ MAX_CALLS = 2
 ROOM_TIMEOUT = 0.25
 # s; the pause of a loop after an exception, and the shortest time between log lines.
 FAULT_PAUSE = 0.1
+# s by which a wait may be longer than intended before the process counts as stopped meanwhile.
+STALL_TIME = 2.0
 FAULT_LOG_INTERVAL = 1.0
 
 _log = logging.getLogger(__name__)
@@ -83,7 +86,9 @@ class LinkThread:
     :param label: names the link in errors.
     :param work: called after each wait; returns when it must be called again, s.
     :param finish: called at the end.
+    :param stalled: called with s for which the process was stopped, before the calls that wait.
     :param clock: s, monotonic.
+    :param monotonic: s, the machine's own clock, which shows such a stop.
     :ivar selector: the ``data`` of its keys is a function, called with the object that is ready
         and its events.
     """
@@ -91,7 +96,9 @@ class LinkThread:
     def __init__(
         self, label: str, work: Callable[[], float], finish: Callable[[], None],
         faults: FaultLog, clock: Callable[[], float],
-        selector: selectors.BaseSelector | None = None,
+        selector: selectors.BaseSelector | None = None, *,
+        stalled: Callable[[float], None] = lambda seconds: None,
+        monotonic: Callable[[], float] = time.monotonic,
     ) -> None:
         self.selector = selector or selectors.DefaultSelector()
         self._label = label
@@ -99,7 +106,11 @@ class LinkThread:
         self._finish = finish
         self._faults = faults
         self._clock = clock
+        self._stalled = stalled
         self._due = 0.0
+        # When the last wait ended, s.
+        self._monotonic = monotonic
+        self._woken_at = monotonic()
         # When the turn begins no more messages and calls, s.
         self._turn_ends = math.inf
         self._calls: deque[Callable[[float], None]] = deque()
@@ -191,7 +202,11 @@ class LinkThread:
         # A stop of the process (SIGSTOP, docker pause) interrupts the wait, which then finds
         # nothing. Frames that came meanwhile precede the deadlines that have passed.
         ready = self.selector.select(min(wait, MAX_WAIT)) or self.selector.select(0)
+        before, self._woken_at = self._woken_at, self._monotonic()
         self._turn_ends = self._clock() + TURN_TIME
+        stall = self._woken_at - before - min(max(wait, 0.0), MAX_WAIT)
+        if stall > STALL_TIME:
+            self._faults.call(self._stalled, stall)
         for key, events in ready:
             key.data(key.fileobj, events)
         self._run_calls()

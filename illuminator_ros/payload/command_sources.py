@@ -47,6 +47,9 @@ class Sources(Arbiter[str]):
     """
     Decides which source holds a device. No I/O.
 
+    A stream claims the device with its first message, a call when it has succeeded. While a call
+    is under way, lower sources are refused as if its source held the device.
+
     :param settings: None if commands have no sources, so that none holds the device.
     :ivar are_ranked: whether one of them may hold the device.
     """
@@ -56,19 +59,43 @@ class Sources(Arbiter[str]):
         ranked = settings or SourceSettings((DEFAULT,))
         super().__init__(
             Policy.PRIORITY, ranked.names.index, lease=ranked.timeout, remembers=True)
+        # The sources of the calls under way, once for each call.
+        self._calling: list[str] = []
+
+    @property
+    def commander(self) -> str | None:
+        """Return the highest source that holds the device or has a call under way."""
+        if not self.are_ranked:
+            return None
+        sources = [*self._calling, *([self.holder] if self.holder else [])]
+        return min(sources, key=self._rank, default=None)
 
     def claim(self, source: str, now: float) -> HolderChanged[str] | None:
         """See :meth:`Arbiter.claim`."""
         return super().claim(source, now) if self.are_ranked else None
 
+    def begin_call(self, source: str) -> None:
+        """Note that a call of a source is under way."""
+        self._calling.append(source)
+
+    @property
+    def are_calling(self) -> bool:
+        """Whether a call is under way."""
+        return bool(self._calling)
+
+    def end_call(
+        self, source: str, now: float, *, success: bool,
+    ) -> HolderChanged[str] | None:
+        """Note that a call has ended: it claims the device if it has succeeded."""
+        if source in self._calling:
+            self._calling.remove(source)
+        return self.claim(source, now) if success else None
+
     def refusal(self, source: str) -> str:
         """Return why a source may not command the device, '' if it may."""
-        may = source == self.holder or not self.are_ranked
-        return '' if may else f'held by {self.holder or "no source"}'
-
-    def refusal_of_claim(self, source: str) -> str:
-        """Return why a claim of a source would be refused, '' if it would not."""
-        return '' if self.may_hold(source) else self.refusal(source)
+        commander = self.commander
+        is_lower = commander is not None and self._rank(commander) < self._rank(source)
+        return f'held by {commander}' if is_lower else ''
 
     @property
     def shown_holder(self) -> str | None:

@@ -27,7 +27,6 @@ import math
 from typing import Generic, Protocol, TypeVar
 
 from ..mavlink.command_sender import CommandSender, CommandStatus
-from ..mavlink.deadline_queue import DeadlineQueue
 from ..mavlink.messages import Address
 
 # Devices of one kind; one more is ignored, so that memory is bounded.
@@ -78,8 +77,6 @@ class Discovery(Generic[D]):
     :ivar devices: the announced devices, by address, in the order of their announcement.
     :ivar candidates: the devices that are not announced yet, by address.
     :ivar ignored: the first devices that are not wanted, by address.
-    :ivar changed: must be called with the address of a device whose deadline may have changed.
-    :ivar next_deadline: returns when :meth:`poll` is due, infinity if never.
     :ivar limit_reached: whether more than :data:`MAX_DEVICES` have been heard.
     """
 
@@ -99,9 +96,6 @@ class Discovery(Generic[D]):
         self._wanted = wanted
         self.candidates: dict[Address, D] = {}
         self._found_at: dict[Address, float] = {}
-        self._deadlines: DeadlineQueue[Address] = DeadlineQueue()
-        self.changed = self._deadlines.changed
-        self.next_deadline = self._deadlines.next_deadline
 
     def __iter__(self) -> Iterator[D]:
         """Return the devices and the candidates."""
@@ -122,13 +116,10 @@ class Discovery(Generic[D]):
         """
         device = self.devices.get(address)
         if device is not None:
-            self._deadlines.changed(address)
             return device
         device = self.candidates.get(address) or self._candidate(address, now, proved=proved)
-        if device is not None:
-            self.changed(address)
-            if proved:
-                self.prove(address, now)
+        if device is not None and proved:
+            self.prove(address, now)
         return device
 
     def _candidate(self, address: Address, now: float, *, proved: bool) -> D | None:
@@ -162,7 +153,6 @@ class Discovery(Generic[D]):
         self._found_at.pop(address, None)
         self.candidates.pop(address, None)
         device = self.devices.pop(address, None)
-        self.changed(address)
         self._commands.end_all(now, CommandStatus.CANCELLED, address)
         if device is not None:
             self.limit_reached = False
@@ -170,12 +160,17 @@ class Discovery(Generic[D]):
 
     def poll(self, now: float) -> None:
         """Poll the devices that have something to do, and forget silent ones."""
-        for address in self._deadlines.due(now):
-            device = self.get(address)
-            if device is not None and now >= self._forgotten_at(device):
-                self._drop(address, now)
-                device = None
-            if device is not None:
+        for device in list(self):
+            if now >= self._forgotten_at(device):
+                self._drop(device.address, now)
+            elif now >= device.next_deadline():
                 device.poll(now)
-            self._deadlines.set(address, math.inf if device is None else min(
-                device.next_deadline(), self._forgotten_at(device)))
+
+    def next_deadline(self) -> float:
+        """Return when :meth:`poll` is due, infinity if never."""
+        due = math.inf
+        for devices in (self.devices, self.candidates):
+            for device in devices.values():
+                due = min(due, device.next_deadline(), device.lost_at + FORGET_AFTER
+                          if not device.was_commanded else math.inf)
+        return due

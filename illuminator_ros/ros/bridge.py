@@ -63,7 +63,7 @@ SWITCH_INTERVAL = 0.0005
 # s in which other processes read the last messages; no event tells that they have.
 READING_TIME = 0.02
 # s between checks of the diagnostics, and the minimum between two checks after events.
-TICK = 0.25
+TICK = 1.0
 CHECK_INTERVAL = 0.02
 # s between attempts to start a thread while the system has none to spare.
 START_RETRY = 0.5

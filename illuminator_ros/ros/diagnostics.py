@@ -73,8 +73,7 @@ LINK_VALUES = {
                     'of the device of this node, by its sequence numbers'),
     'loss_percent': 'of this device, recently; WARN above 5 %; `unknown`, as `frames_lost` is, '
                     'behind [a router](routers.md#effects-of-a-router)',
-    **dict.fromkeys(('round_trip_p50_ms', 'round_trip_p95_ms'),
-                    'from a command to its acknowledgement'),
+    'round_trip_ms': 'from the last command to its acknowledgement',
     **dict.fromkeys(('commands_sent', 'commands_resent', 'commands_unanswered'),
                     'to all devices'),
     **dict.fromkeys(('signatures_good', 'signatures_bad', 'signatures_replayed',
@@ -211,15 +210,13 @@ def link_diagnostics(
     commands, copies = component.commands, link.lines.copies(now)
     devices: dict[Address, Mapping[str, Value]] = {}
     for address, counter in lines[0].traffic.sources.items():
-        trip = commands.round_trip(address)
-        p50, p95 = trip.quantile(0.5), trip.quantile(0.95)
+        trip = commands.round_trips.get(address)
         devices[address] = {
             'frames_lost': _known(counter.lost),
             'frames_duplicate': counter.duplicate,
             'frames_reordered': counter.reordered,
             'loss_percent': _known(counter.recent_loss),
-            'round_trip_p50_ms': None if p50 is None else p50 * 1000,
-            'round_trip_p95_ms': None if p95 is None else p95 * 1000,
+            'round_trip_ms': None if trip is None else trip * 1000,
         }
     own: dict[str, Value] = {
         'commands_sent': commands.counters.sent,

@@ -158,7 +158,7 @@ LINK_PARAMETERS = (
     ParameterSpec('component_id', 193, 'our MAVLink component id', low=1, high=255),
     ParameterSpec('mavlink_version', 2, 'MAVLink version of sent frames; both are received',
                   low=1, high=2),
-    ParameterSpec('command_timeout', 0.5, 'longest wait for one acknowledgement', 's', 0.05,
+    ParameterSpec('command_timeout', 0.25, 'first wait for an acknowledgement', 's', 0.05,
                   60.0),
     ParameterSpec('command_retries', 3, 'resends of an unacknowledged command', low=0, high=20),
     ParameterSpec('diagnostics_period', 1.0, 'period of /diagnostics', 's', 0.1, 60.0),

@@ -35,8 +35,8 @@ from illuminator_ros.mavlink import messages as mav
 from illuminator_ros.mavlink.command_sender import CommandSender
 from illuminator_ros.mavlink.component import Component
 from illuminator_ros.mavlink.dialect import mavlink
-from illuminator_ros.payload.attempt import Result
 from illuminator_ros.payload.command_sources import SourceSettings
+from illuminator_ros.payload.confirmed_command import Result
 from illuminator_ros.payload.mount_attitude import STILL, YawFrame
 from illuminator_ros.payload.rotation import Quaternion
 import pytest

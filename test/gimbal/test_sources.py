@@ -155,7 +155,7 @@ def test_a_check_of_a_claim_gives_no_source_the_gimbal(source: str, refusal: str
     rig = shared()
     point(rig, 'operator')
 
-    assert rig.gimbal.refusal_of_claim(source) == refusal
+    assert rig.gimbal.refusal(source) == refusal
     assert holder(rig) == 'operator'
 
 
@@ -163,7 +163,7 @@ def test_without_sources_all_are_alike() -> None:
     rig = in_control()
 
     assert [point(rig, source) for source in NAMES] == [''] * 4
-    assert rig.gimbal.refusal_of_claim('autonomy') == ''
+    assert rig.gimbal.refusal('autonomy') == ''
     assert rig.gimbal.release('autonomy', rig.now) == ''
     assert holder(rig) is None
     assert rig.all_of(GimbalHeld) == []

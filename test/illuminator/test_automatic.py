@@ -12,23 +12,23 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Commands without a request: off after silence, and undoing changes by other senders."""
+"""Commands without a request: off after silence, and lights for which brightness is the switch."""
 
 from collections.abc import Callable
-import math
-from typing import Any
 
-from illuminator_ros.illuminator.events import AutomaticSwitch, ChangedByOther
+from illuminator_ros.illuminator.events import (
+    AutomaticSwitch,
+    LATE_EFFECT,
+    LightSwitched,
+    StatesChanging,
+)
 from illuminator_ros.illuminator.light import Settings
-from illuminator_ros.illuminator.light_configuration import LATE_TIME
 from illuminator_ros.illuminator.model import SafetyLimits
 from illuminator_ros.mavlink.dialect import mavlink
-from illuminator_ros.payload.command_sources import SourceSettings
 import pytest
-from support.back_to_back import Pair, START
+from support.back_to_back import Pair
 from support.fake_light import FakeLight
 from support.faulty_wire import Faults
-from support.shared_address import SharedAddress
 
 ON_OFF, CONFIGURE = mavlink.MAV_CMD_ILLUMINATOR_ON_OFF, mavlink.MAV_CMD_DO_ILLUMINATOR_CONFIGURE
 SILENCE = 5.0
@@ -37,18 +37,6 @@ SILENCE = 5.0
 def silenced(light: FakeLight | None = None, **faults: float) -> Pair:
     return Pair(light or FakeLight(), settings=Settings(off_after_silence=SILENCE),
                 there=Faults(**faults)).settle()
-
-
-def reasserting(**fields: Any) -> tuple[FakeLight, Pair]:
-    light = FakeLight(brightness=50.0, **fields)
-    return light, Pair(light, settings=Settings(reassert=True)).settle()
-
-
-def insist(light: FakeLight, pair: Pair, seconds: float, **fields: object) -> None:
-    """Act as a sender that restores its values of the light ten times a second."""
-    for _ in range(round(seconds * 10)):
-        light.fields |= fields
-        pair.run(0.1)
 
 
 @pytest.mark.parametrize(('act', 'on'), [
@@ -80,41 +68,6 @@ def test_a_light_goes_off_after_silence_however_it_was_switched_on(way: str) -> 
 
     assert light.fields['enable'] == 0
     assert [one.on for one in pair.recorder.others if isinstance(one, AutomaticSwitch)] == [False]
-
-
-def test_two_lights_that_share_an_address_go_off_after_silence() -> None:
-    lights = FakeLight(), FakeLight()
-    lights[1].applies = False
-    pair = Pair(SharedAddress(*lights, offset=0.3),
-                settings=Settings(off_after_silence=SILENCE)).settle()
-    pair.ask_enable(True)
-    # It takes some seconds until the statuses show that there are two.
-    pair.run(40.0)
-
-    assert lights[0].fields['enable'] == 0
-
-
-def test_one_of_two_lights_that_share_an_address_and_report_at_once_goes_off_after_silence(
-) -> None:
-    lights = FakeLight(enable=1), FakeLight()
-    pair = Pair(SharedAddress(*lights), settings=Settings(off_after_silence=SILENCE)).settle()
-    pair.run(20.0)
-
-    assert lights[0].fields['enable'] == 0
-    # It is repeated until their statuses are those of one light.
-    assert len(pair.commands(ON_OFF)) <= 2
-
-
-def test_an_off_that_one_of_two_lights_at_an_address_refuses_is_repeated_after_2_s() -> None:
-    lights = FakeLight(enable=1), FakeLight()
-    pair = Pair(SharedAddress(*lights, offset=0.3),
-                settings=Settings(off_after_silence=20.0)).settle()
-    lights[0].results[ON_OFF] = mavlink.MAV_RESULT_FAILED
-    pair.run(28.0)
-    times = [at for at, _ in pair.commands_at(ON_OFF)]
-
-    assert len(times) > 2
-    assert min(after - before for before, after in zip(times, times[1:], strict=False)) >= 2.0
 
 
 def test_off_after_silence_is_repeated_until_the_light_shows_it() -> None:
@@ -161,22 +114,6 @@ def test_an_on_under_way_ends_at_the_silence_with_an_off(
     assert set(sent) == {0.0}
 
 
-def test_an_on_that_waits_is_not_sent_after_silence() -> None:
-    light = FakeLight(stream=0.0)
-    pair = Pair(light, settings=Settings(off_after_silence=1.0)).settle()
-    pair.configure(brightness=50.0)
-    pair.close()
-    light.answers.clear()
-    pair.run(5.0)
-    pair.open()
-    pair.run_until(lambda: pair.light.connected)
-    answer = pair.ask_enable(True)
-    pair.run(5.0)
-
-    assert answer.result.message == 'off_after_silence: no request for 1.00 s'
-    assert not any(command.param1 for command in pair.commands(ON_OFF))
-
-
 @pytest.mark.parametrize('before', [0.0, SILENCE + 0.5])
 def test_a_light_that_is_lost_before_or_during_its_off_goes_off_when_it_is_heard_again(
         before: float) -> None:
@@ -209,15 +146,32 @@ def test_a_light_that_overheats_and_cools_down_goes_off_after_silence() -> None:
     assert light.fields['enable'] == 0
 
 
-def test_an_on_that_takes_effect_after_it_has_failed_does_not_count_as_another_request() -> None:
+def test_an_on_that_takes_effect_after_it_has_failed_does_not_count_as_a_request() -> None:
     light = FakeLight()
     pair = silenced(light)
+    assert pair.enable(False).success
+    silent_at = pair.now + SILENCE
     light.results[ON_OFF] = None
     assert not pair.enable(True).success
     light.results.clear()
-    pair.run(1.0)
     light.fields['enable'] = 1
-    pair.run(SILENCE - 2.0)
+    pair.run(silent_at - pair.now - 0.1)
+    assert light.fields['enable'] == 1
+    assert [(one.on, one.origin) for one in pair.recorder.others
+            if isinstance(one, LightSwitched)] == [(True, LATE_EFFECT)]
+    pair.run(0.2)
+
+    assert light.fields['enable'] == 0
+
+
+def test_calls_that_are_refused_do_not_postpone_the_off_after_silence() -> None:
+    light = FakeLight()
+    pair = silenced(light)
+    assert pair.enable(True).success
+    light.results[CONFIGURE] = mavlink.MAV_RESULT_DENIED
+    for _ in range(6):
+        assert not pair.configure(brightness=20.0).success
+        pair.run(1.0)
 
     assert light.fields['enable'] == 0
 
@@ -240,203 +194,18 @@ def test_a_light_that_another_sender_switches_on_stays_on_until_silence(before: 
     assert light.fields['enable'] == 1
 
 
-@pytest.mark.parametrize(('before', 'change', 'undone'), [
-    ({}, {'brightness': 30.0, 'strobe_period': 1.0}, True),
-    ({}, {'mode': 2}, True),
-    ({'enable': 1}, {'enable': 0}, True),
-    ({}, {'enable': 1}, True),
-    ({}, {'brightness': 30.0, 'error_status': 1}, False),
-    # It is off, and brightness is not the switch.
-    ({}, {'brightness': 0.0}, True),
-], ids=str)
-def test_a_change_by_another_sender_is_undone_unless_the_light_is_hot(
-        before: dict[str, int], change: dict[str, float], undone: bool) -> None:
-    light, pair = reasserting()
-    if before:
-        pair.enable(True)
-    agreed = dict(light.fields)
-    light.fields |= change
-    pair.run(3.0)
-
-    assert (light.fields == agreed) is undone
-    assert pair.snapshot.configuration
-    assert pair.snapshot.configuration.brightness == 50.0
-
-
-def test_a_light_that_no_request_has_switched_on_is_not_switched_on_again() -> None:
-    light, pair = reasserting(enable=1)
-    light.fields['enable'] = 0
-    pair.run(5.0)
-
-    assert pair.commands(ON_OFF) == []
-
-
-@pytest.mark.parametrize(('fields', 'kind', 'change'), [
-    ({'brightness': 90.0}, CONFIGURE, 'brightness 90 %'), ({'enable': 1}, ON_OFF, 'on')])
-def test_a_sender_that_insists_is_left_alone_after_three_times_in_a_row(
-        fields: dict[str, float], kind: int, change: str) -> None:
-    light, pair = reasserting()
-    insist(light, pair, 20.0, **fields)
-    times = [at for at, command in pair.commands_at(kind) if not command.confirmation]
-
-    assert len(times) == 3
-    assert min(after - before for before, after in zip(times, times[1:], strict=False)) >= 2.0
-    assert [one.change for one in pair.recorder.others
-            if isinstance(one, ChangedByOther) and not one.undone] == [change]
-    assert light.fields == light.fields | fields
-
-    pair.run(60.0)
-    pair.configure(brightness=50.0)
-    pair.enable(False)
-    # A change in the 2 s after a command counts as its effect.
-    pair.run(2.5)
-    light.fields |= fields
-    pair.run(4.0)
-
-    assert light.fields != light.fields | fields
-    assert math.isfinite(pair.light.next_deadline())
-
-
-def switched_off_twice(pair: Pair, light: FakeLight) -> None:
-    """Let another sender switch a light off, so that the second time is undone 2 s later."""
-    for _ in range(2):
-        light.fields['enable'] = 0
-        light.send(light.status(pair.now))
-        pair.turn()
-        pair.run(0.1)
-    assert light.fields['enable'] == 0
-
-
-@pytest.mark.parametrize('switched_off', ['before', 'while lost', 'after'])
-def test_an_off_by_another_sender_is_not_undone_after_a_loss(switched_off: str) -> None:
-    light, pair = reasserting()
-    assert pair.enable(True).success
-    if switched_off == 'before':
-        switched_off_twice(pair, light)
-    pair.close()
-    if switched_off != 'after':
-        light.fields['enable'] = 0
-    pair.run(10.0)
-    pair.open()
-    pair.run(5.0)
-    light.fields['enable'] = 0
-    pair.run(5.0)
-
-    assert light.fields['enable'] == 0
-
-
-def test_an_off_by_another_sender_is_not_undone_after_an_off_that_failed() -> None:
-    light, pair = reasserting()
-    assert pair.enable(True).success
-    light.results[ON_OFF] = None
-    assert not pair.enable(False).success
-    light.results.clear()
-    # The bridge takes a change to off for the effect of its own OFF meanwhile.
-    pair.run(LATE_TIME + 1.0)
-    light.fields['enable'] = 0
-    pair.run(5.0)
-
-    assert light.fields['enable'] == 0
-
-
-def test_an_off_by_another_sender_is_not_undone_after_a_restart() -> None:
-    light, pair = reasserting()
-    assert pair.enable(True).success
-    light.restart(pair.now, enable=1)
-    pair.run(5.0)
-    assert pair.light.restarts == 1
-    light.fields['enable'] = 0
-    pair.run(5.0)
-
-    assert light.fields['enable'] == 0
-
-
-@pytest.mark.parametrize('case', ['waiting', 'waiting, and another request', 'lost'])
-def test_an_off_by_another_sender_is_not_undone_after_silence(case: str) -> None:
-    light = FakeLight()
-    pair = Pair(light, settings=Settings(reassert=True, off_after_silence=SILENCE)).settle()
-    assert pair.enable(True).success
-    pair.run(SILENCE - 1.5)
-    if case == 'lost':
-        pair.close()
-        light.fields['enable'] = 0
-        pair.run(SILENCE)
-        pair.open()
-    else:
-        switched_off_twice(pair, light)
-    silent_at = START + 4.0 + SILENCE
-    if case == 'waiting, and another request':
-        pair.run(silent_at - pair.now)
-        pair.light.set_brightness(20.0, pair.now)
-    pair.run(SILENCE)
-
-    assert light.fields['enable'] == 0
-    assert not any(command.param1 for command in pair.commands(ON_OFF, since=silent_at))
-
-
-def test_an_off_of_a_light_that_no_source_holds_is_not_undone_where_release_is_off() -> None:
-    light = FakeLight(heartbeat_type=None)
-    pair = Pair(light, settings=Settings(
-        reassert=True, sources=SourceSettings(('default',), 3.0), off_on_release=True)).settle()
-    assert pair.enable(True).success
-    pair.close()
-    pair.run(10.0)
-    light.fields['enable'] = 0
-    light.delay_status(-10.0)
-    reopened_at = pair.now
-    pair.open()
-    pair.run(5.0)
-
-    assert not any(command.param1 for command in pair.commands(ON_OFF, since=reopened_at))
-
-
-def test_an_off_whose_undoing_failed_is_not_undone_after_a_restart() -> None:
-    light, pair = reasserting()
-    assert pair.enable(True).success
-    light.results[ON_OFF] = mavlink.MAV_RESULT_FAILED
-    light.fields['enable'] = 0
-    pair.run_until(lambda: pair.commands(ON_OFF)[1:])
-    # The answer arrives, and the next try is due later.
-    pair.run(0.5)
-    light.restart(pair.now)
-    light.results.clear()
-    pair.run(10.0)
-
-    assert light.fields['enable'] == 0
-
-
-def test_an_off_that_cannot_be_undone_three_times_is_left_and_reported() -> None:
-    light, pair = reasserting()
-    assert pair.enable(True).success
-    light.results[ON_OFF] = mavlink.MAV_RESULT_FAILED
-    light.fields['enable'] = 0
-    pair.run(30.0)
-
-    assert [(one.change, one.undone) for one in pair.recorder.others
-            if isinstance(one, ChangedByOther)] == [('off', False)]
-
-
 # Lights for which brightness is the switch
 
-@pytest.mark.parametrize('by_request', [True, False])
-def test_an_off_is_not_undone_by_a_brightness_where_that_is_the_switch(by_request: bool) -> None:
-    light, pair = reasserting(enable=1)
-    light.brightness_is_switch = True
-    pair.run(5.0)
-    if by_request:
-        assert pair.enable(True).success
-        pair.run(5.0)
-        pair.ask_enable(False)
-        # It is carried out, and no status arrives for longer than an effect is expected.
-        pair.run_until(lambda: light.fields['enable'] == 0)
-        pair.far.wire.switch(is_open=False)
-        pair.run(2.5)
-        pair.far.wire.switch(is_open=True)
-    else:
-        light.fields |= {'enable': 0, 'brightness': 0.0, 'strobe_period': 1.0}
-    pair.run(10.0)
+def test_a_light_whose_states_change_goes_off_after_silence_each_time_it_shows_that_it_is_on(
+) -> None:
+    light = FakeLight()
+    pair = silenced(light)
+    for number in range(60):
+        light.fields['enable'] = number % 2
+        pair.run(1.0)
 
-    assert light.fields['enable'] == 0
+    assert any(isinstance(one, StatesChanging) for one in pair.recorder.others)
+    assert len(pair.commands(ON_OFF)) > 10
 
 
 @pytest.mark.parametrize('setpoints', [[30.0], [30.0, 35.0]], ids=['sent again', 'waiting'])
@@ -471,16 +240,6 @@ def learned(light: FakeLight, settings: Settings | None = None) -> Pair:
     return pair
 
 
-def test_a_brightness_of_a_light_that_is_on_is_undone_where_that_is_the_switch() -> None:
-    light = FakeLight(brightness=50.0)
-    pair = learned(light, Settings(reassert=True))
-    agreed = light.fields['brightness']
-    light.fields['brightness'] = 90.0
-    pair.run(5.0)
-
-    assert (light.fields['enable'], light.fields['brightness']) == (1, agreed)
-
-
 def test_a_configuration_that_is_restored_is_not_sent_after_an_off_where_brightness_is_the_switch(
 ) -> None:
     light = FakeLight(brightness=50.0)
@@ -503,6 +262,19 @@ def test_a_setpoint_that_an_off_replaces_is_not_reported_where_brightness_is_the
 
     assert pair.enable(False).success
     assert pair.recorder.failed_setpoints == []
+
+
+def test_a_setpoint_waits_for_an_off_of_a_light_that_has_not_been_off_yet() -> None:
+    light = FakeLight(brightness=50.0, enable=1, results={ON_OFF: [None, None, 0]})
+    pair = Pair(light).settle()
+    off = pair.ask_enable(False)
+    pair.light.set_brightness(30.0, pair.now)
+    pair.run(0.5)
+    assert (off.results, pair.commands(CONFIGURE)) == ([], [])
+    # It reports a brightness while it is off, so that a brightness does not switch it on.
+    pair.run(2.0)
+    assert off.result.success
+    assert [command.param2 for command in pair.commands(CONFIGURE)] == [30.0]
 
 
 def test_a_set_beside_an_off_succeeds_once_a_light_has_shown_a_brightness_while_off() -> None:
@@ -555,6 +327,8 @@ def test_no_configuration_is_sent_during_or_after_an_off_where_brightness_is_the
 def test_a_light_that_is_switched_on_beyond_a_limit_after_an_off_is_brought_back_within_it(
 ) -> None:
     light, pair, _ = limited_off('beyond a limit')
+    # The light executes the last of the repeated OFFs.
+    pair.run(1.0)
     light.fields |= {'enable': 1, 'brightness': 90.0}
     pair.run(5.0)
 

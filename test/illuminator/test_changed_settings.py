@@ -85,7 +85,7 @@ def test_a_limit_that_is_removed_before_the_light_has_answered_is_not_sent_again
 
 def test_a_limit_that_is_removed_ends_the_warning_and_changes_no_light() -> None:
     light, pair = served(Settings(limits=LOWER))
-    light.fields['brightness'] = 80.0
+    light.applies, light.fields['brightness'] = False, 80.0
     pair.run(10.0)
     assert pair.snapshot.limit_exceeded.excess
 
@@ -118,6 +118,7 @@ def test_a_setpoint_beyond_a_limit_that_is_set_meanwhile_is_sent_as_the_limit() 
     light, pair = served(brightness=20.0)
     light.results[CONFIGURE] = None
     pair.light.set_brightness(90.0, pair.now)
+    pair.turn()
     pair.run(0.2)
 
     changed_at = change(pair, limits=LOWER)
@@ -160,35 +161,6 @@ def test_nothing_that_was_requested_before_a_silence_follows_its_change() -> Non
     pair.run(5.0)
 
     assert light.fields['enable'] == 0
-
-
-@pytest.mark.parametrize('reassert', [False, True])
-def test_changes_by_others_are_undone_or_followed_from_the_change_on(reassert: bool) -> None:
-    light, pair = served(Settings(reassert=not reassert))
-    pair.run(60.0)
-
-    changed_at = change(pair, reassert=reassert)
-    light.fields |= {'enable': 1, 'brightness': 30.0}
-    pair.run(5.0)
-
-    assert (light.fields['enable'], light.fields['brightness']) == (
-        (0, 80.0) if reassert else (1, 30.0))
-    assert bool(pair.commands(ON_OFF, since=changed_at)) is reassert
-
-
-def test_an_undoing_that_is_not_confirmed_ends_when_changes_are_followed() -> None:
-    light, pair = served(Settings(reassert=True))
-    light.results |= {ON_OFF: None, CONFIGURE: None}
-    light.fields |= {'enable': 1, 'brightness': 30.0}
-    pair.run_until(lambda: pair.commands(ON_OFF))
-    pair.run(1.2)
-
-    changed_at = change(pair, reassert=False)
-    pair.run(10.0)
-
-    assert pair.commands(ON_OFF, since=changed_at) == []
-    assert pair.commands(CONFIGURE, since=changed_at) == []
-    assert light.fields['enable'] == 1
 
 
 def test_a_source_that_is_silent_for_longer_than_a_shorter_timeout_loses_the_light_at_once(

@@ -22,10 +22,9 @@ from typing import Any
 from illuminator_ros.illuminator.events import ChangeCause
 from illuminator_ros.illuminator.light import Settings
 from illuminator_ros.illuminator.model import Configuration, float32, Mode, SafetyLimits
-from illuminator_ros.illuminator.required_values import RESTORE_INTERVAL
 from illuminator_ros.mavlink.dialect import mavlink
 from illuminator_ros.mavlink.messages import CommandAck, result_name
-from illuminator_ros.payload.attempt import Result
+from illuminator_ros.payload.confirmed_command import Result
 import pytest
 from support.back_to_back import Pair, START
 from support.fake_light import FakeLight
@@ -238,16 +237,19 @@ def test_under_external_sync_only_the_mode_is_followed(fake: FakeLight, strobe: 
         before, brightness=90.0, strobe_period=0.0, strobe_duty_cycle=0.0)
 
 
-@pytest.mark.parametrize(('change', 'cause'), [
-    ({'brightness': 30.0}, ChangeCause.REQUEST), ({'strobe_period': 2.0}, ChangeCause.LIGHT)],
+@pytest.mark.parametrize(('during', 'change', 'cause'), [
+    (False, {'brightness': 30.0}, ChangeCause.LATE_EFFECT),
+    (True, {'strobe_period': 2.0}, ChangeCause.LIGHT)],
     ids=['ours that takes effect late', 'by another sender meanwhile'])
-def test_a_change_during_a_failed_command_is_followed_after_it(
-    fake: FakeLight, strobe: Pair, change: dict[str, Any], cause: ChangeCause,
+def test_a_change_by_a_failed_command_or_during_it_is_followed_after_it(
+    fake: FakeLight, strobe: Pair, during: bool, change: dict[str, Any], cause: ChangeCause,
 ) -> None:
     fake.results[CONFIGURE] = None
     answer = strobe.ask_configure(brightness=30)
-    fake.fields |= change
+    if during:
+        fake.fields |= change
     assert not strobe.wait_for(answer).success
+    fake.fields |= change
     strobe.run(2.0)
     assert strobe.recorder.changes[1:] == [(cause, change)]
 
@@ -337,13 +339,11 @@ def test_a_setpoint_is_sent_once_with_the_other_fields_as_confirmed(pair: Pair) 
 
 @pytest.mark.parametrize(('values', 'light', 'then', 'last'), [
     # The light takes 30 and cannot report it: it may be at 30 or at 100.
-    ([30.0], {'results': {CONFIGURE: None}, 'stream': 0.0,
+    ([30.0], {'results': {CONFIGURE: None}, 'stream': 0.0, 'answers': set(),
               'fields': {'brightness': 30.0}}, ACCEPTED, 100.0),
     # The light has accepted 40 and shows 100.
     ([40.0], {'applies': False}, ACCEPTED, 40.0),
-    # The light accepts 30 without applying it; 40 supersedes it and is refused.
-    ([30.0], {'applies': False}, [DENIED, ACCEPTED], 30.0),
-], ids=['not acknowledged', 'not done', 'superseded'])
+], ids=['not acknowledged', 'not done'])
 def test_a_setpoint_is_sent_again_where_the_light_may_have_another_value(
     fake: FakeLight, faked: Pair, values: list[float], light: dict[str, Any], then: Any,
     last: float,
@@ -352,13 +352,10 @@ def test_a_setpoint_is_sent_again_where_the_light_may_have_another_value(
     fake.applies = light.get('applies', True)
     publish(faked, *values)
     fake.fields |= light.get('fields', {})
-    fake.stream = light.get('stream', 1.0)
-    faked.run(0.1 if isinstance(then, list) else 1.5)
+    fake.stream, fake.answers = light.get('stream', 1.0), light.get('answers', fake.answers)
+    faked.run(1.5)
     fake.applies = True
     fake.results[CONFIGURE] = then
-    if isinstance(then, list):
-        publish(faked, 40.0)
-        faked.run(0.1)
     publish(faked, last)
     faked.run(1.0)
     assert fake.fields['brightness'] == last
@@ -376,7 +373,7 @@ def test_the_last_setpoint_is_verified(fake: FakeLight, faked: Pair) -> None:
     fake.applies = False
     publish(faked, 30.0, 40.0)
     faked.run(2.0)
-    (message,) = faked.recorder.failed_setpoints
+    _, message = faked.recorder.failed_setpoints
     assert 'brightness 40 % not confirmed: MAV_RESULT_ACCEPTED, but' in message
 
 
@@ -469,11 +466,13 @@ def test_overrides_that_fail_otherwise_are_sent_until_they_succeed(
 ) -> None:
     fake.results[CONFIGURE] = result
     pair = overriding(fake, brightness=30.0).settle(20.0)
-    assert pair.recorder.restorations == []
+    # A warning, once.
+    assert successes(pair) == [False]
+    assert pair.recorder.restorations[0][1].endswith('; it will be sent again')
     assert pair.snapshot.discrepancy
     fake.results[CONFIGURE] = ACCEPTED
-    pair.run(RESTORE_INTERVAL + 1.0)
-    assert successes(pair) == [True]
+    pair.run(20.0)
+    assert successes(pair) == [False, True]
     assert pair.snapshot.discrepancy == ''
 
 
@@ -497,27 +496,25 @@ def test_overrides_and_a_restored_configuration_reach_a_light_that_answers_too_l
     fake.fields['brightness'] = 5.0
     pair.run(10.0)
     assert (confirmed(pair).brightness, fake.fields['brightness']) == (5.0, 5.0)
-    assert successes(pair) == [True, True]
 
 
-@pytest.mark.parametrize('latency', [0.3, 0.4, 0.6, 1.5])
-@pytest.mark.parametrize(('result', 'text'), [
-    (DENIED, 'refused: MAV_RESULT_DENIED'), (ACCEPTED, 'shows brightness 100 %')])
-def test_overrides_that_a_light_does_not_take_and_answers_late_are_given_up(
-    fake: FakeLight, latency: float, result: int, text: str,
+def test_overrides_that_a_light_accepts_and_does_not_show_are_sent_at_growing_intervals(
+    fake: FakeLight,
 ) -> None:
-    fake.results[CONFIGURE] = result
+    # A light that clamps: it takes 100 % and shows 80 %.
     fake.applies = False
-    pair = Pair(fake, there=Faults(latency=latency),
-                on_light=lambda light: light.set_desired({'brightness': 30.0}, START))
-    pair.run(60.0)
+    fake.fields['brightness'] = 80.0
+    pair = overriding(fake, brightness=100.0).settle(600.0)
+    times = [at for at, message in pair.commands_at(CONFIGURE) if not message.confirmation]
+    waits = [after - before for before, after in zip(times, times[1:], strict=False)]
+    # Each try ends 1 s after its acknowledgement.
+    assert [round(wait) for wait in waits[:6]] == [3, 5, 9, 17, 33, 61]
+    assert max(waits) < 62.0
     (success, message), = pair.recorder.restorations
     assert not success
-    assert text in message
-    assert pair.snapshot.discrepancy == message
-    count = len(sent(pair))
-    pair.run(60.0)
-    assert len(sent(pair)) == count
+    assert 'shows brightness 80 %' in message
+    assert 'shows brightness 80 %' in pair.snapshot.discrepancy
+    assert confirmed(pair).brightness == 80.0
 
 
 def test_an_override_that_the_status_cannot_show_is_sent_until_it_is_acknowledged(
@@ -526,10 +523,10 @@ def test_an_override_that_the_status_cannot_show_is_sent_until_it_is_acknowledge
     fake.fields['mode'] = 2
     fake.results[CONFIGURE] = None
     pair = overriding(fake, brightness=30.0).settle(10.0)
-    assert pair.recorder.restorations == []
+    assert successes(pair) == [False]
     fake.results[CONFIGURE] = ACCEPTED
-    pair.run(RESTORE_INTERVAL + 1.0)
-    assert successes(pair) == [True]
+    pair.run(20.0)
+    assert successes(pair) == [False, True]
 
 
 def test_an_off_does_not_replace_overrides_that_wait(fake: FakeLight) -> None:
@@ -550,25 +547,6 @@ def test_another_sender_is_followed_while_overrides_get_no_answer(fake: FakeLigh
     fake.results[CONFIGURE] = ACCEPTED
     pair.run(5.0)
     assert (fake.fields['brightness'], fake.fields['strobe_period']) == (30.0, 2.0)
-
-
-def test_overrides_that_are_accepted_and_not_shown_are_given_up_until_a_restart(
-    fake: FakeLight,
-) -> None:
-    # A light that clamps: it takes 100 % and shows 80 %.
-    fake.applies = False
-    fake.fields['brightness'] = 80.0
-    pair = overriding(fake, brightness=100.0).settle(60.0)
-    (success, message), = pair.recorder.restorations
-    assert not success
-    assert 'shows brightness 80 %' in message
-    assert confirmed(pair).brightness == 80.0
-    given_up = len(sent(pair))
-    assert given_up <= 5
-    fake.restart(pair.now, brightness=20.0)
-    pair.run(60.0)
-    assert len(sent(pair)) == 2 * given_up
-    assert successes(pair) == [False, False]
 
 
 def test_a_field_that_was_set_meanwhile_is_not_overridden(fake: FakeLight) -> None:
@@ -596,6 +574,18 @@ def test_overrides_that_wait_for_a_status_are_reported_once(fake: FakeLight) -> 
     fake.fields['strobe_duty_cycle'] = 0.0
     pair.run(3.0)
     assert fake.fields['brightness'] == 60.0
+
+
+def test_overrides_that_wait_for_another_try_are_sent_as_soon_as_the_light_is_heard_again(
+    fake: FakeLight,
+) -> None:
+    fake.results[CONFIGURE] = None
+    pair = overriding(fake, brightness=30.0).settle(60.0)
+    fake.results.clear()
+    pair.close()
+    pair.open()
+    pair.run(0.1)
+    assert fake.fields['brightness'] == 30.0
 
 
 # Restarts
@@ -674,8 +664,9 @@ def test_setting_all_values_to_be_restored_ends_the_restoration(
     assert pair.configure(brightness=30).success
     fake.results[CONFIGURE] = None
     fake.restart(pair.now)
-    pair.run(1.2)
+    pair.run(5.0)
     fake.results[CONFIGURE] = ACCEPTED
+    pair.run_until(lambda: not pair.light.snapshot(pair.now).discrepancy)
     assert pair.configure(**{name: value for name, value in ALL.items()
                              if not is_stream or name != 'brightness'}).success
     if is_stream:

@@ -24,9 +24,9 @@ from typing import Any
 from illuminator_ros.mavlink import messages as mav
 from illuminator_ros.mavlink.dialect import CRC_EXTRA
 from illuminator_ros.mavlink.signing import MAX_STREAMS, SigningMode
-from illuminator_ros.payload.attempt import Result
+from illuminator_ros.payload.confirmed_command import Result
+from illuminator_ros.payload.device_property import MAX_CALLERS
 from illuminator_ros.payload.discovery import MAX_DEVICES
-from illuminator_ros.payload.reconciler import MAX_CALLERS
 import pytest
 from support.attacked_link import ATTACKED, AttackedBridge, AttackedLink, GENUINE
 from support.fake_light import status_message

@@ -133,7 +133,7 @@ def test_a_restart_is_one_event_after_the_light_is_heard_again(
     (1.0, {}, 1, 1),
     (0.0, {}, 22, 27),
     # Each request is tried four times.
-    (0.0, {REQUEST: None}, 60, 108),
+    (0.0, {REQUEST: None}, 45, 108),
 ], ids=['it streams', 'it does not', 'it has no requests'])
 def test_a_light_that_sends_no_status_is_asked_for_one_at_a_limited_rate(
     stream: float, results: dict[int, Any], least: int, most: int,

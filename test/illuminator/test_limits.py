@@ -19,6 +19,7 @@ from typing import Any
 from hypothesis import given, settings, strategies
 from illuminator_ros.illuminator.events import LimitExceeded, SetpointClipped
 from illuminator_ros.illuminator.light import Settings
+from illuminator_ros.illuminator.light_configuration import LIMIT_INTERVAL
 from illuminator_ros.illuminator.model import float32, SafetyLimits
 from illuminator_ros.mavlink.dialect import mavlink
 import pytest
@@ -100,26 +101,61 @@ def test_a_stream_beyond_a_limit_is_clipped_and_reported() -> None:
         'brightness 90 % is above max_brightness 60 %'}
 
 
-def test_a_light_beyond_the_limits_is_reported_and_brought_back_once_until_it_is_lost() -> None:
+def test_a_light_beyond_the_limits_is_reported_and_brought_back_each_time() -> None:
     light, pair = limited(brightness=80.0, strobe_period=0.1, strobe_duty_cycle=10.0)
-    assert [(one.param2, one.param3) for one in pair.commands(CONFIGURE)] == [(60.0, 0.34)]
-    assert not pair.snapshot.limit_exceeded.excess
-
-    light.fields |= {'brightness': 80.0, 'strobe_period': 0.1}
-    pair.run(60.0)
-
-    assert len(pair.commands(CONFIGURE)) == 1
-    assert pair.snapshot.limit_exceeded.excess == EXCEEDED
-    assert [one.excess for one in pair.recorder.others if isinstance(one, LimitExceeded)] == [
-        EXCEEDED, (), EXCEEDED]
-
-    pair.close()
-    pair.open()
-    for _ in range(2):
-        pair.run(10.0)
+    for _ in range(3):
+        pair.run(LIMIT_INTERVAL)
+        assert not pair.snapshot.limit_exceeded.excess
         light.fields |= {'brightness': 80.0, 'strobe_period': 0.1}
+        pair.run(2.0)
 
-    assert len(pair.commands(CONFIGURE)) == 2
+    assert [(one.param2, one.param3) for one in pair.commands(CONFIGURE)] == [(60.0, 0.34)] * 4
+    assert [(one.excess, one.is_again) for one in pair.recorder.others
+            if isinstance(one, LimitExceeded)] == [(EXCEEDED, False), ((), False)] * 4
+
+
+def test_a_light_that_goes_beyond_a_limit_again_at_once_is_brought_back_once_in_10_s() -> None:
+    light, pair = limited(brightness=80.0)
+    light.fields['brightness'] = 80.0
+    for _ in range(600):
+        pair.run(0.1)
+        if pair.snapshot.configuration and pair.snapshot.configuration.brightness == 60.0:
+            light.fields['brightness'] = 80.0
+    times = [at for at, _ in pair.commands_at(CONFIGURE)]
+
+    assert len(times) in (6, 7)
+    assert min(after - before for before, after in zip(times, times[1:], strict=False)
+               ) >= LIMIT_INTERVAL
+    assert pair.snapshot.limit_exceeded.is_again
+
+
+def test_a_light_that_restarts_beyond_a_limit_is_brought_back_at_once() -> None:
+    light = FakeLight()
+    pair = Pair(light, settings=replace(LIMITED, restore_configuration=False)).settle()
+    assert light.fields['brightness'] == 60.0
+    light.restart(pair.now)
+    pair.run(0.1)
+    assert (pair.light.restarts, light.fields['brightness']) == (1, 60.0)
+
+
+def test_a_light_whose_on_resets_its_brightness_is_brought_back_and_the_answer_says_so() -> None:
+    light, pair = limited(brightness=50.0)
+    apply = light._apply
+
+    def reset(message: Any, now: float) -> None:
+        apply(message, now)
+        if message.command != CONFIGURE and message.param1:
+            light.fields['brightness'] = 100.0
+
+    light._apply = reset  # type: ignore[method-assign]
+    for _ in range(2):
+        result = pair.enable(True)
+        assert result.success
+        assert 'brightness 100 % is above max_brightness 60 %, and is brought back' in (
+            result.message)
+        pair.run(LIMIT_INTERVAL + 1.0)
+        assert light.fields['brightness'] == 60.0
+        assert pair.enable(False).success
 
 
 def test_a_light_that_restarts_within_the_limits_is_not_sent_what_it_had_beyond_them() -> None:

@@ -20,6 +20,7 @@ from typing import Any
 from illuminator_ros.illuminator.simulated_properties import IlluminatorProperties, PROFILES
 from illuminator_ros.mavlink.dialect import encode, mavlink
 from illuminator_ros.mavlink.messages import CommandInt
+from illuminator_ros.payload.confirmed_command import FENCE
 import pytest
 from support.back_to_back import Pair
 from support.light_bench import LightBench
@@ -47,7 +48,10 @@ def test_each_kind_of_light_is_found_switched_configured_restored_and_never_lost
         assert pair.light.status is not None and pair.light.status.enabled is on
     assert pair.configure(brightness=30).success
     assert pair.configure(strobe_period=1).success is strobes
+    # A set that follows a refused one within 1.5 s cannot be confirmed in its time.
+    pair.run(FENCE)
     assert pair.configure(mode='external_sync').success is strobes
+    pair.run(FENCE)
     assert pair.configure(mode='internal_control').success
     pair.run(60.0)
     assert pair.recorder.events == ['connected']
@@ -65,6 +69,11 @@ def test_each_kind_of_light_is_found_switched_configured_restored_and_never_lost
     pair.run(10.0)
     pair.open()
     pair.run(10.0)
+    if not strobes:
+        # A brightness would switch it on.
+        assert not pair.lamp.enabled
+        assert pair.enable(True).success
+        pair.run(2.0)
     assert pair.lamp.configuration.brightness == 30.0
 
 

@@ -26,17 +26,14 @@ from illuminator_ros.illuminator.events import (
     LightSwitched,
     StatusReceived,
 )
-from illuminator_ros.illuminator.light import Settings
+from illuminator_ros.illuminator.messages import STATUS_ID
 from illuminator_ros.illuminator.model import Mode
-from illuminator_ros.mavlink.command_sender import MAX_SAMPLES
 from illuminator_ros.mavlink.dialect import mavlink
 from illuminator_ros.mavlink.messages import CommandAck
-from illuminator_ros.payload.command_sources import SourceSettings
+from illuminator_ros.payload.confirmed_command import CONFIRMATION_TIMEOUT, FENCE
 import pytest
 from support.back_to_back import BRIDGE, Pair
-from support.fake_light import FakeLight, LIGHT, status_message
-from support.faulty_wire import Faults
-from support.records import Answer
+from support.fake_light import FakeLight
 
 ON_OFF, CONFIGURE = mavlink.MAV_CMD_ILLUMINATOR_ON_OFF, mavlink.MAV_CMD_DO_ILLUMINATOR_CONFIGURE
 
@@ -72,171 +69,30 @@ def test_a_status_that_comes_late_neither_confirms_nor_restarts(
     assert faked.light.restarts == 0
 
 
-class Delayed(FakeLight):
-    """A light without a clock whose statuses are late."""
-
-    delay = 0.9
-
-    def __init__(self) -> None:
-        super().__init__(stream=0.1)
-        self.boot = None
-        self._late: list[tuple[float, Any]] = []
-
-    def status(self, now: float) -> Any:
-        self._late.append((now, super().status(now)))
-        return next(one for at, one in reversed(self._late)
-                    if at <= now - self.delay or at == self._late[0][0])
-
-
-def test_a_late_status_without_a_time_does_not_confirm() -> None:
-    light = Delayed()
-    pair = Pair(light).settle()
-    for _ in range(2):
-        pair.enable(True)
-        pair.enable(False)
-    for _ in range(6):
-        light.applies = True
-        pair.enable(True)
-        pair.run(2.0)
-        light.fields['enable'] = 0
-        light.applies = False
-        pair.run(0.1)
-        assert not pair.enable(True).success
-        pair.run(2.0)
-
-
-def test_off_is_sent_until_an_acknowledgement_cannot_be_that_of_on(
-    fake: FakeLight, faked: Pair,
+@pytest.mark.parametrize('late', [
+    [CommandAck(ON_OFF, mavlink.MAV_RESULT_ACCEPTED, 0, 0, *BRIDGE)],
+    [CommandAck(ON_OFF, mavlink.MAV_RESULT_DENIED, 0, 0, *BRIDGE)]], ids=['accepted', 'denied'])
+@pytest.mark.parametrize('applies', [True, False])
+def test_what_comes_within_the_fence_neither_confirms_nor_refuses(
+    fake: FakeLight, faked: Pair, late: list[CommandAck], applies: bool,
 ) -> None:
-    # The light acknowledges before it switches, its acknowledgement of ON is late, and OFF is
-    # lost.
+    # An ON is not acknowledged; its acknowledgement, and a status from before it was executed,
+    # come while an OFF is under way, which the light gets only after the fence.
     fake.results[ON_OFF] = None
     assert not faked.enable(True).success
-    fake.applies = False
-    faked.near.wire.faults = Faults(drop=1.0)
-    answer = faked.ask_enable(False)
-    fake.send(CommandAck(ON_OFF, mavlink.MAV_RESULT_ACCEPTED, 0, 0, *BRIDGE))
-    faked.run(0.01)
-    assert not answer.results
-    faked.run(4.0)
-    assert not answer.result.success
-
-
-def test_a_status_from_before_the_last_repeat_does_not_confirm(
-    fake: FakeLight, faked: Pair,
-) -> None:
-    # The light executes OFF and then a late ON: its status between the two arrives after the
-    # repeat.
-    fake.results[ON_OFF] = None
-    assert not faked.enable(True).success
-    fake.stream, fake.applies = 0.0, False
-    fake.answers.clear()
-    answer = faked.ask_enable(False)
-    faked.run(0.3)
     shows_off = fake.status(faked.now)
     fake.fields['enable'] = 1
-    for _ in range(10):
-        fake.send(CommandAck(ON_OFF, mavlink.MAV_RESULT_ACCEPTED, 0, 0, *BRIDGE))
-        faked.run(0.05)
-    fake.send(shows_off)
-    assert not faked.wait_for(answer).success
-
-
-@pytest.mark.parametrize('retries', [0, 2])
-def test_a_command_is_acknowledged_once_more_than_the_tries_of_a_lost_one_before_it(
-    fake: FakeLight, retries: int,
-) -> None:
-    # Each acknowledgement may belong to a late ON, which undoes the OFF before it.
-    pair = Pair(fake, command_retries=retries).settle()
-    fake.results[ON_OFF] = None
-    assert not pair.enable(True).success
-    fake.results[ON_OFF] = mavlink.MAV_RESULT_ACCEPTED
-    begun = pair.now
-    assert pair.enable(False).success
-    assert [one.param1 for one in pair.commands(ON_OFF, since=begun)] == [0.0] * (retries + 2)
-
-
-def test_a_status_that_comes_sooner_than_any_answer_does_not_confirm(fake: FakeLight) -> None:
-    # A copy of an earlier ON arrives late, and is undone before the present ON arrives. The light
-    # acknowledges and shows the copy after the present ON was sent and before it can arrive.
-    pair = Pair(fake, there=Faults(latency=0.2)).settle()
-    for on in (True, False, True, False):
-        assert pair.enable(on).success
-        pair.run(6.0)
-    fake.applies, fake.stream = False, 0.0
-    acknowledgement = CommandAck(ON_OFF, mavlink.MAV_RESULT_ACCEPTED, 0, 0, *BRIDGE)
-    fake.send(acknowledgement)
-    pair.run(0.5)
-    fake.send(acknowledgement)
-    fake.send(status_message(fake.uptime_ms(pair.now), **{**fake.fields, 'enable': 1}))
-    pair.run(0.1)
-    assert not pair.enable(True).success
-
-
-def test_a_status_that_shows_a_cancelled_command_does_not_confirm_the_next_one(
-    fake: FakeLight,
-) -> None:
-    pair = Pair(fake, there=Faults(latency=0.2), settings=Settings(
-        sources=SourceSettings(('safety', 'default')))).settle()
-    for on in (False, True) * 3:
-        assert pair.enable(on).success
-        pair.run(6.0)
-    fake.pushes = True
-    pair.ask_enable(False)
-    pair.run(0.3)
-    # The light has executed it, and a button switches the light on before the status arrives.
-    fake.fields['enable'] = 1
-    fake.pushes, fake.stream = False, 0.0
-    pair.near.wire.faults = Faults(drop=1.0)
-    answer = Answer(pair.now)
-    pair.light.enable(False, pair.now, answer, source='safety')
-    pair.turn()
-    assert not pair.wait_for(answer).success
-
-
-@pytest.mark.parametrize(('before', 'latency'), [(None, 0.2), (0.01, 0.2), (0.24, 0.05)])
-def test_a_line_that_stays_ambiguous_confirms_changes_and_nothing_else(
-    fake: FakeLight, before: float | None, latency: float,
-) -> None:
-    # Acknowledgements that no command waits for keep arriving. Earlier there were none, and the
-    # line had another latency.
-    pair = Pair(fake, there=Faults(latency=before or latency)).settle()
     fake.stream = 0.0
-    if before:
-        for on in (True, False) * 4:
-            assert pair.enable(on).success
-            pair.run(6.0)
-    pair.near.wire.faults = pair.far.wire.faults = Faults(latency=latency)
-    for on in (True, False) * MAX_SAMPLES:
-        fake.send(CommandAck(1, mavlink.MAV_RESULT_ACCEPTED, 0, 0, *BRIDGE))
-        pair.run(0.1)
-        begun = pair.now
-        assert pair.enable(on).success
-        taken = pair.now - begun
-    assert taken < 4 * latency + 0.1
-
-    fake.applies = False
-    fake.send(CommandAck(ON_OFF, mavlink.MAV_RESULT_ACCEPTED, 0, 0, *BRIDGE))
-    fake.send(status_message(fake.uptime_ms(pair.now), **{**fake.fields, 'enable': 1}))
-    pair.run(latency / 2)
-    assert not pair.enable(True).success
-
-
-def test_a_late_copy_of_a_refusal_does_not_refuse_the_next_command(
-    fake: FakeLight, faked: Pair,
-) -> None:
-    fake.results[ON_OFF] = mavlink.MAV_RESULT_DENIED
-    assert faked.enable(True).message.startswith('refused: MAV_RESULT_DENIED')
-    # The first statuses contradict.
-    fake.results[ON_OFF], fake.apply_after = mavlink.MAV_RESULT_ACCEPTED, 0.1
-    answer = faked.ask_enable(True)
-    faked.controller.receive(
-        LIGHT, CommandAck(ON_OFF, mavlink.MAV_RESULT_DENIED, 0, 0, *BRIDGE), faked.now)
-    result = faked.wait_for(answer)
-    assert result.success
-    assert result.message.startswith(
-        'on, confirmed by ILLUMINATOR_STATUS: the status decides, since MAV_RESULT_DENIED may '
-        'belong to an earlier command (1 try, ')
+    fake.answers.clear()
+    answer = faked.ask_enable(False)
+    for message in (*late, shows_off):
+        fake.send(message)
+    faked.run(FENCE - CONFIRMATION_TIMEOUT - 0.1)
+    assert not answer.results
+    fake.results.clear()
+    fake.answers.add(STATUS_ID)
+    fake.applies = applies
+    assert faked.wait_for(answer).success is applies
 
 
 @pytest.mark.parametrize('fields', [
@@ -253,6 +109,7 @@ def test_each_refusal_counts_where_the_status_cannot_show_the_change(
         result = faked.configure(brightness=50.0)
         assert not result.success
         assert result.message.startswith('refused: MAV_RESULT_DENIED')
+        faked.run(FENCE)
     fake.results[CONFIGURE] = mavlink.MAV_RESULT_ACCEPTED
     faked.run(10.0)
     fake.applies = False
@@ -267,22 +124,6 @@ def test_a_value_that_the_status_lacks_is_not_called_confirmed(
     assert faked.configure(brightness=50.0).message.startswith(
         'brightness 50 %, accepted (ILLUMINATOR_STATUS shows no valid brightness): '
         'MAV_RESULT_ACCEPTED')
-
-
-@pytest.mark.parametrize(('before', 'text'), [
-    (False, 'on not confirmed: MAV_RESULT_DENIED, which may belong to an earlier command'),
-    # Each try of the same request may be refused.
-    (True, 'refused: MAV_RESULT_DENIED')])
-def test_a_refusal_that_may_answer_another_request_is_reported_as_doubtful(
-    fake: FakeLight, faked: Pair, before: bool, text: str,
-) -> None:
-    fake.results[ON_OFF] = None
-    assert not faked.enable(before).success
-    answer = faked.ask_enable(True)
-    fake.send(CommandAck(ON_OFF, mavlink.MAV_RESULT_DENIED, 0, 0, *BRIDGE))
-    result = faked.wait_for(answer)
-    assert not result.success
-    assert result.message.startswith(text)
 
 
 # Events
@@ -316,7 +157,20 @@ def test_a_switch_that_takes_effect_late_is_ours(fake: FakeLight, faked: Pair) -
     events = events_of(faked)
     assert not faked.enable(True).success
     faked.run(6.0)
-    assert switches(events) == [(True, 'a request')]
+    assert switches(events) == [(True, 'a late effect of our request')]
+
+
+def test_a_switch_that_was_shown_before_its_request_failed_is_ours(
+    fake: FakeLight, faked: Pair,
+) -> None:
+    fake.results[ON_OFF] = None
+    events = events_of(faked)
+    answer = faked.ask_enable(True)
+    fake.fields['enable'] = 1
+    faked.run(1.1)
+    faked.close()
+    assert not answer.result.success
+    assert switches(events) == [(True, 'a late effect of our request')]
 
 
 @pytest.mark.parametrize('change', [

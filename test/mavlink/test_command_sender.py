@@ -20,42 +20,31 @@ from collections.abc import Sequence
 import math
 from typing import Any
 
-from hypothesis import given
-from hypothesis import strategies as st
 from illuminator_ros.mavlink.command_sender import (
-    ACK_LIFETIME,
+    CLOSING_TIMEOUT,
     Command,
     CommandResult,
     CommandSender,
     CommandStatus,
     format_seconds,
-    MAX_SAMPLES,
     MAX_TARGETS,
-    MAX_WAITING,
-    MIN_SAMPLES,
-    MIN_TIMEOUT,
     Position,
     PROGRESS_TIMEOUT,
-    RttEstimator,
+    request_message,
 )
 from illuminator_ros.mavlink.dialect import mavlink
 from illuminator_ros.mavlink.messages import Address, CommandInt, CommandLong, heartbeat, Message
 import pytest
-from support.command_rig import (
-    ACCEPTED,
-    DENIED,
-    FAILED,
-    IN_PROGRESS,
-    LIGHT,
-    LONG,
-    OURS,
-    REJECTED,
-    Rig,
-)
+from support.command_rig import DELAY, LIGHT, OURS, Rig
 
 OTHER = Address(1, 244)
-INT_ONLY, LONG_ONLY = mavlink.MAV_RESULT_COMMAND_INT_ONLY, mavlink.MAV_RESULT_COMMAND_LONG_ONLY
-STATUS = CommandStatus
+REQUEST = mavlink.MAV_CMD_REQUEST_MESSAGE
+ACCEPTED, REJECTED, DENIED, FAILED, IN_PROGRESS, INT_ONLY, LONG_ONLY = (
+    mavlink.MAV_RESULT_ACCEPTED, mavlink.MAV_RESULT_TEMPORARILY_REJECTED,
+    mavlink.MAV_RESULT_DENIED, mavlink.MAV_RESULT_FAILED, mavlink.MAV_RESULT_IN_PROGRESS,
+    mavlink.MAV_RESULT_COMMAND_INT_ONLY, mavlink.MAV_RESULT_COMMAND_LONG_ONLY)
+# The times of the tries that get no answer, s.
+SILENT = [0.0, 0.25, 0.75, 1.75]
 
 
 # The answers to each try, 20 ms apart; retries and the limit -> the result as text, and when the
@@ -63,42 +52,40 @@ STATUS = CommandStatus
 @pytest.mark.parametrize(('answers', 'options', 'said', 'times'), [
     ([[ACCEPTED]], {}, 'MAV_RESULT_ACCEPTED (1 try, 20 ms)', [0.0]),
     ([[FAILED]], {}, 'MAV_RESULT_FAILED (1 try, 20 ms)', [0.0]),
-    ([[], [ACCEPTED]], {}, 'MAV_RESULT_ACCEPTED (2 tries, 520 ms)', [0.0, 0.5]),
-    ([[], [FAILED]], {}, 'MAV_RESULT_FAILED (2 tries, 520 ms)', [0.0, 0.5]),
-    ([], {}, 'no acknowledgement (4 tries, 2.00 s)', [0.0, 0.5, 1.0, 1.5]),
-    ([], {'retries': 0}, 'no acknowledgement (1 try, 500 ms)', [0.0]),
+    ([[], [ACCEPTED]], {}, 'MAV_RESULT_ACCEPTED (2 tries, 270 ms)', SILENT[:2]),
+    ([[], [FAILED]], {}, 'MAV_RESULT_FAILED (2 tries, 270 ms)', SILENT[:2]),
+    ([], {}, 'no acknowledgement (4 tries, 2.75 s)', SILENT),
+    ([], {'retries': 0}, 'no acknowledgement (1 try, 250 ms)', [0.0]),
     ([[IN_PROGRESS, ACCEPTED]], {}, 'MAV_RESULT_ACCEPTED (1 try, 40 ms)', [0.0]),
     ([[IN_PROGRESS, FAILED]], {}, 'MAV_RESULT_FAILED (1 try, 40 ms)', [0.0]),
     ([[IN_PROGRESS]], {}, 'no final acknowledgement, last answer MAV_RESULT_IN_PROGRESS at 0 % '
      '(1 try, 3.02 s)', [0.0]),
-    ([[77]], {}, 'MAV_RESULT 77 (unknown) (1 try, 20 ms)', [0.0]),
-    # Progress ends the resending.
+    # Each wait is twice the one before it, up to 1 s, or as long as the time-out.
+    ([], {'retries': 5}, 'no acknowledgement (6 tries, 4.75 s)', [*SILENT, 2.75, 3.75]),
+    ([], {'retries': 1, 'timeout': 1.5}, 'no acknowledgement (2 tries, 3.00 s)', [0.0, 1.5]),
+    # Progress ends the resending; then an earlier resend may still be rejected.
     ([[], [IN_PROGRESS]], {}, 'no final acknowledgement, last answer MAV_RESULT_IN_PROGRESS at '
-     '0 % (2 tries, 3.52 s)', [0.0, 0.5]),
+     '0 % (2 tries, 3.27 s)', SILENT[:2]),
     ([[REJECTED, IN_PROGRESS]], {}, 'no final acknowledgement, last answer '
      'MAV_RESULT_IN_PROGRESS at 0 % (1 try, 3.04 s)', [0.0]),
     ([[IN_PROGRESS, REJECTED, ACCEPTED]], {}, 'MAV_RESULT_ACCEPTED (1 try, 60 ms)', [0.0]),
-    # A temporary rejection is tried again with growing pauses, and is not one of the retries.
+    # A temporary rejection is tried again with growing pauses, and is not one of the retries; it
+    # ends with the time that a command without an answer has.
     ([[REJECTED], [REJECTED], [REJECTED], [ACCEPTED]], {}, 'MAV_RESULT_ACCEPTED (4 tries, '
      '780 ms)', [0.0, 0.12, 0.34, 0.76]),
-    ([[REJECTED] * 3, [ACCEPTED]], {}, 'MAV_RESULT_ACCEPTED (2 tries, 140 ms)', [0.0, 0.12]),
-    ([[REJECTED]] * 100, {}, 'MAV_RESULT_TEMPORARILY_REJECTED (5 tries, 1.60 s)',
-     [0.0, 0.12, 0.34, 0.76, 1.58]),
+    ([[REJECTED]] * 100, {}, 'MAV_RESULT_TEMPORARILY_REJECTED (6 tries, 2.42 s)',
+     [0.0, 0.12, 0.34, 0.76, 1.58, 2.4]),
     ([[REJECTED], [REJECTED]], {'retries': 1}, 'no acknowledgement, last answer '
-     'MAV_RESULT_TEMPORARILY_REJECTED (4 tries, 1.34 s)', [0.0, 0.12, 0.34, 0.84]),
-    # The try without an answer may keep the target busy, and may still succeed.
-    ([[], *[[REJECTED]] * 100], {}, 'not finished in time, last answer '
-     'MAV_RESULT_TEMPORARILY_REJECTED (5 tries, 1.28 s)', [0.0, 0.5, 0.62, 0.84, 1.26]),
+     'MAV_RESULT_TEMPORARILY_REJECTED (4 tries, 1.09 s)', [0.0, 0.12, 0.34, 0.59]),
     # COMMAND_INT is sent only after the target has requested it.
-    ([[INT_ONLY], [], [ACCEPTED]], {}, 'MAV_RESULT_ACCEPTED (3 tries, 540 ms)',
-     [0.0, 0.02, 0.52]),
-    ([[INT_ONLY], [LONG_ONLY]], {}, 'MAV_RESULT_COMMAND_LONG_ONLY (2 tries, 40 ms)',
-     [0.0, 0.02]),
-    ([[INT_ONLY]] * 20, {}, 'no acknowledgement, last answer MAV_RESULT_COMMAND_INT_ONLY '
-     '(5 tries, 2.02 s)', [0.0, 0.02, 0.52, 1.02, 1.52]),
+    ([[INT_ONLY], [], [ACCEPTED]], {}, 'MAV_RESULT_ACCEPTED (3 tries, 290 ms)',
+     [0.0, 0.02, 0.27]),
+    ([[REJECTED, INT_ONLY], [ACCEPTED]], {}, 'MAV_RESULT_ACCEPTED (2 tries, 60 ms)', [0.0, 0.04]),
+    ([[INT_ONLY], [LONG_ONLY]], {}, 'MAV_RESULT_COMMAND_LONG_ONLY (2 tries, 40 ms)', [0.0, 0.02]),
+    ([[INT_ONLY]] * 20, {}, 'MAV_RESULT_COMMAND_INT_ONLY (2 tries, 40 ms)', [0.0, 0.02]),
     ([[IN_PROGRESS, INT_ONLY]], {}, 'MAV_RESULT_COMMAND_INT_ONLY (1 try, 40 ms)', [0.0]),
     # The deadline ends a command in any state.
-    ([], {'limit': 0.9}, 'no acknowledgement (2 tries, 900 ms)', [0.0, 0.5]),
+    ([], {'limit': 0.9}, 'no acknowledgement (3 tries, 900 ms)', SILENT[:3]),
     ([], {'limit': 0.0}, 'not finished in time (0 tries, 0 ms)', []),
     ([[IN_PROGRESS] * 250], {'limit': 1.5}, 'not finished in time, last answer '
      'MAV_RESULT_IN_PROGRESS at 0 % (1 try, 1.50 s)', [0.0]),
@@ -107,348 +94,184 @@ STATUS = CommandStatus
 def test_command_ends_as_its_answers_say(
         answers: Sequence[Sequence[int]], options: dict[str, Any], said: str,
         times: list[float]) -> None:
-    rig = Rig(*answers, retries=options.get('retries', 3))
-    run = rig.ended(limit=options.get('limit', math.inf))
-    assert (str(run.outcome), rig.times, rig.idle) == (said, times, True)
-    assert run.outcome.accepted == said.startswith('MAV_RESULT_ACCEPTED')
+    rig = Rig(*answers, **{name: options[name] for name in options if name != 'limit'})
+    run = rig.start(limit=options.get('limit', math.inf))
+    rig.run()
+    assert (str(run.outcome), [round(at - 1000.0, 6) for at, _ in run.frames]) == (said, times)
+    assert rig.sender.next_deadline() == math.inf
 
 
-def test_command_int_carries_the_params_of_the_command_long() -> None:
-    rig = Rig([INT_ONLY], [], [ACCEPTED])
-    rig.ended(406, params=(1.0, 50.0, 0.5, 25.0, 5.0, 6.0, 7.0))
-    as_int = CommandInt(*LIGHT, 0, 406, 0, 0, 1.0, 50.0, 0.5, 25.0, 5, 6, 7.0)
-    assert rig.messages == [
-        CommandLong(*LIGHT, 406, 0, 1.0, 50.0, 0.5, 25.0, 5.0, 6.0, 7.0), as_int, as_int]
-
-
-def test_second_refusal_of_the_command_long_does_not_end_the_command_int() -> None:
-    # Two tries were sent before the first was refused, so the refusal comes twice.
+@pytest.mark.parametrize('result', range(256))
+def test_each_result_but_three_ends_a_command_at_once(result: int) -> None:
     rig = Rig()
     run = rig.start()
-    rig.run(0.6)
-    for result in (INT_ONLY, INT_ONLY, ACCEPTED):
-        assert run.outcomes == []
-        rig.ack(result)
-    assert run.outcome.accepted
-    assert [type(message) for message in rig.messages] == [CommandLong, CommandLong, CommandInt]
+    rig.ack(result)
+    ends_it = result not in (IN_PROGRESS, REJECTED, INT_ONLY)
+    assert bool(run.outcomes) is ends_it
+    if ends_it:
+        assert (run.outcome.result, run.outcome.accepted, run.outcome.refused) == (
+            result, result == ACCEPTED, result != ACCEPTED)
 
 
-def test_refusal_of_the_command_long_after_the_deadline_ends_the_command() -> None:
-    rig = Rig()
-    run = rig.start(limit=0.3)
-    rig.now += 0.4
-    rig.ack(INT_ONLY)
-    assert (run.status, run.result, len(rig.frames)) == (STATUS.ANSWERED, INT_ONLY, 1)
+def test_command_int_carries_the_params_and_each_resend_its_number_and_its_follow_up() -> None:
+    rig = Rig([], [], [INT_ONLY], [], [ACCEPTED])
+    params, request = (1.0, 50.0, 0.5, 25.0, 5.0, 6.0, 7.0), request_message(LIGHT, 440)
+    rig.sender.start(Command(LIGHT, 406, params), rig.now, follow_up=request)
+    rig.flush()
+    rig.run()
+    assert [message for _, message in rig.frames] == [
+        *(message for one in (
+            CommandLong(*LIGHT, 406, 0, *params), CommandLong(*LIGHT, 406, 1, *params),
+            CommandInt(*LIGHT, 0, 406, 0, 0, *params[:4], 5, 6, 7.0))
+          for message in (one, CommandLong(*LIGHT, 512, 0, 440.0, *[0.0] * 6)))]
 
 
-def test_confirmation_counts_the_resends_up_to_255() -> None:
-    rig = Rig(timeout=0.1, retries=300)
-    rig.ended()
-    assert [message.confirmation for message in rig.messages] == [*range(256), *[255] * 45]
+def test_confirmation_counts_the_resends_and_earlier_tries_up_to_255() -> None:
+    rig = Rig(retries=300)
+    run = rig.start(tried=3)
+    rig.run(400.0)
+    assert [message.confirmation for _, message in rig.frames] == [*range(3, 256), *[255] * 48]
+    assert (run.outcome.tries, rig.times[:4]) == (304, SILENT)
 
 
 # Acknowledgements
 
-@pytest.mark.parametrize('changes', [
-    *({'source': source} for source in (
+@pytest.mark.parametrize(('changes', 'counts'), [
+    *(({'source': source}, False) for source in (
         Address(1, 1), Address(2, 243), OTHER, Address(0, 0), OURS)),
-    {'command': 406},
+    ({'command': 406}, False),
     # A ground station may command the same light.
-    *({'target': target} for target in (
-        Address(255, 190), Address(1, 191), Address(2, 193), Address(255, 0), Address(0, 191)))])
-def test_acknowledgement_of_another_source_command_or_target_does_not_count(
-        changes: dict[str, Any]) -> None:
+    *(({'target': Address(*target)}, False) for target in (
+        (255, 190), (1, 191), (2, 193), (255, 0), (0, 191))),
+    *(({'target': Address(*target)}, True) for target in (OURS, (0, 0), (1, 0), (0, 193)))])
+def test_acknowledgement_counts_from_the_target_for_the_command_and_for_us_or_all(
+        changes: dict[str, Any], counts: bool) -> None:
     rig = Rig()
     run = rig.start()
+    rig.now += 0.1
     rig.ack(DENIED, **changes)
-    assert run.outcomes == []
-    assert len(rig.sender.round_trip(LIGHT)) == 0
-
-
-@pytest.mark.parametrize('target', [OURS, Address(0, 0), Address(1, 0), Address(0, 193)])
-def test_acknowledgement_to_us_or_without_target_counts(target: Address) -> None:
-    rig = Rig()
-    run = rig.start()
-    rig.ack(ACCEPTED, target=target)
-    assert run.outcome.accepted
+    assert bool(run.outcomes) is counts
+    assert rig.sender.round_trips == ({LIGHT: pytest.approx(0.1)} if counts else {})
 
 
 def test_acknowledgements_before_a_command_and_after_its_end_change_nothing() -> None:
     rig = Rig()
     rig.ack(ACCEPTED)
-    run, silent = rig.start(), rig.start(406)
+    run, silent, to_all = rig.start(), rig.start(406), rig.start(407, Address(1, 0))
     for result in (DENIED, ACCEPTED, DENIED):
         rig.ack(result)
-    rig.run(LONG)
+    rig.ack(ACCEPTED, 407)
+    rig.run()
     rig.ack(ACCEPTED, 406)
-    assert (run.result, silent.status) == (DENIED, STATUS.NO_ANSWER)
+    assert run.outcome.result == DENIED
+    assert [one.outcome.status for one in (silent, to_all)] == [CommandStatus.NO_ANSWER] * 2
 
 
-def test_component_does_not_answer_a_command_to_all_components() -> None:
-    rig = Rig()
-    run = rig.start(target=Address(1, 0))
-    rig.ack(ACCEPTED, source=LIGHT)
-    rig.run(LONG)
-    assert run.status is STATUS.NO_ANSWER
-
-
-# Progress
-
-def test_each_report_of_progress_lengthens_the_wait_and_nothing_is_resent() -> None:
+@pytest.mark.parametrize(('last', 'said'), [(0, ' at 0 %'), (100, ' at 100 %'), (101, '')])
+def test_each_report_of_progress_lengthens_the_wait_and_nothing_is_resent(
+        last: int, said: str) -> None:
     rig = Rig()
     run = rig.start()
-    for percent in (0, 40, 80):
+    for percent in (0, 40, 80, last):
         rig.ack(IN_PROGRESS, progress=percent)
-        assert rig.sender.next_deadline() == pytest.approx(rig.now + PROGRESS_TIMEOUT)
-        rig.run(2.99)
-    assert run.outcomes == []
-    rig.run(0.02)
-    assert (run.status, run.outcome.progress, len(run.frames)) == (
-        STATUS.PROGRESS_STOPPED, 80, 1)
-    assert run.outcome.elapsed == pytest.approx(8.98)
-
-
-@pytest.mark.parametrize(('reported', 'known'), [(0, 0), (100, 100), (101, None), (255, None)])
-def test_progress_above_100_is_unknown(reported: int, known: int | None) -> None:
-    rig = Rig()
-    run = rig.start()
-    rig.ack(IN_PROGRESS, progress=reported)
-    rig.ack(FAILED)
-    assert run.outcome.progress == known
-    assert '%' not in str(run.outcome)
-
-
-def test_rejection_of_a_resend_does_not_end_the_try_in_progress() -> None:
-    rig = Rig()
-    run = rig.start()
-    rig.run(0.6)
-    for result in (IN_PROGRESS, REJECTED, ACCEPTED):
+        rig.run(PROGRESS_TIMEOUT - 0.01)
         assert run.outcomes == []
-        rig.ack(result)
-    assert run.outcome.accepted
+    rig.run(0.02)
+    assert (str(run.outcome), len(run.frames)) == (
+        f'no final acknowledgement, last answer MAV_RESULT_IN_PROGRESS{said} (1 try, 11.97 s)', 1)
+    assert rig.sender.round_trips == {LIGHT: 0.0}
 
 
 # Several commands
 
-def test_commands_of_one_kind_are_sent_one_after_the_other() -> None:
+def test_newer_command_replaces_the_one_of_its_kind_and_no_other() -> None:
     rig = Rig()
-    runs = [rig.start() for _ in range(3)]
-    rig.run(1.2)
-    assert [len(run.frames) for run in runs] == [3, 0, 0]
-    for place, result in enumerate((ACCEPTED, DENIED, FAILED)):
-        rig.ack(result)
-        assert runs[place].result == result
-        assert [bool(run.frames) for run in runs] == [True, True, place > 0]
-    assert runs[1].frames[0][1].confirmation == 0
+    kinds: list[dict[str, Any]] = [
+        {}, {'command': 406}, {'target': OTHER}, {'command': REQUEST, 'param1': 148.0},
+        {'command': REQUEST, 'param1': 259.0}]
+    first, second = ([rig.start(**kind) for kind in kinds] for _ in range(2))
+    assert [str(run.outcome) for run in first] == ['cancelled (1 try, 0 ms)'] * 5
+    assert [(run.frames[0][1].confirmation, run.outcomes) for run in second] == [(0, [])] * 5
+    assert len(rig.sender) == 5
+    rig.ack(ACCEPTED)
+    assert [len(run.outcomes) for run in second] == [1, 0, 0, 0, 0]
+    # The acknowledgement of a request does not name the message.
+    rig.ack(DENIED, REQUEST)
+    assert [len(run.outcomes) for run in second] == [1, 0, 0, 1, 0]
 
 
-def test_command_behind_one_without_answer_is_sent_and_its_time_begins_then() -> None:
-    rig = Rig([], [], [], [], [ACCEPTED])
-    first, second = rig.start(), rig.start()
-    rig.run(LONG)
-    assert first.status is STATUS.NO_ANSWER
-    assert str(second.outcome) == 'MAV_RESULT_ACCEPTED (1 try, 20 ms)'
-
-
-@pytest.mark.parametrize('ended_by', ['acknowledgement', 'late poll', 'poll'])
-def test_command_whose_deadline_passes_while_it_waits_is_never_sent(ended_by: str) -> None:
+@pytest.mark.parametrize('status', [CommandStatus.LINK_LOST, CommandStatus.CANCELLED])
+@pytest.mark.parametrize('target', [None, LIGHT])
+def test_all_commands_or_those_of_one_target_can_be_ended_for_good(
+        status: CommandStatus, target: Address | None) -> None:
     rig = Rig()
-    first, second = rig.start(), rig.start(limit=0.4)
-    begun = rig.now
-    if ended_by == 'poll':
-        rig.run(0.45)
-        assert second.ended_at == pytest.approx(begun + 0.4)
-    rig.now = begun + 0.45
-    if ended_by == 'acknowledgement':
-        rig.ack(ACCEPTED)
-    rig.poll()
-    assert str(second.outcome) == 'not finished in time (0 tries, 0 ms)'
-    rig.run(LONG)
-    assert (second.frames, len(first.outcomes), len(second.outcomes)) == ([], 1, 1)
-
-
-def test_command_beyond_the_bound_of_waiting_ones_is_refused() -> None:
-    rig = Rig()
-    runs = [rig.start() for _ in range(MAX_WAITING + 2)]
-    assert [len(run.outcomes) for run in runs] == [0] * (MAX_WAITING + 1) + [1]
-    assert str(runs[-1].outcome) == (
-        'too many commands are waiting for this component (0 tries, 0 ms)')
-
-
-def test_commands_of_other_kinds_and_targets_do_not_wait() -> None:
-    rig = Rig()
-    runs = [rig.start(405), rig.start(406), rig.start(405, OTHER),
-            rig.start(512, params=(148.0,)), rig.start(512, params=(259.0,))]
-    assert [message.command for message in rig.messages] == [405, 406, 405, 512, 512]
-    for command, source in ((406, LIGHT), (405, OTHER), (512, LIGHT), (512, LIGHT)):
-        rig.ack(ACCEPTED, command, source=source)
-    assert [len(run.outcomes) for run in runs] == [0, 1, 1, 1, 1]
-
-
-# Ended from outside
-
-@pytest.mark.parametrize('ending', [STATUS.LINK_LOST, STATUS.CANCELLED])
-def test_all_commands_that_are_sent_or_wait_can_be_ended_for_good(ending: CommandStatus) -> None:
-    rig = Rig()
-    for command, target in ((405, LIGHT), (405, LIGHT), (406, LIGHT), (405, OTHER)):
-        rig.start(command, target)
+    runs = [rig.start(), rig.start(406), rig.start(target=OTHER)]
     rig.ack(IN_PROGRESS, 406, progress=30)
     rig.now += 0.1
-    for status in (ending, STATUS.OUT_OF_TIME):
-        rig.sender.end_all(rig.now, status)
+    for one in (status, CommandStatus.OUT_OF_TIME):
+        rig.sender.end_all(rig.now, one, target)
     rig.ack(ACCEPTED)
-    rig.run(LONG)
-    assert [run.status for run in rig.runs] == [ending] * 4
-    assert (len(rig.frames), rig.idle) == (3, True)
-    assert str(rig.runs[2].outcome) == (
-        f'{ending.value}, last answer MAV_RESULT_IN_PROGRESS at 30 % (1 try, 100 ms)')
-    again = rig.start()
-    rig.ack(ACCEPTED)
-    assert again.outcome.accepted
-
-
-def test_commands_of_one_target_can_be_ended_without_those_of_others() -> None:
-    rig = Rig()
-    rig.start()
-    rig.start()
-    kept = rig.start(target=OTHER)
-    rig.sender.end_all(rig.now, STATUS.CANCELLED, LIGHT)
-    assert [len(run.outcomes) for run in rig.runs] == [1, 1, 0]
+    assert str(runs[1].outcome) == (
+        f'{status.value}, last answer MAV_RESULT_IN_PROGRESS at 30 % (1 try, 100 ms)')
     rig.ack(ACCEPTED, source=OTHER)
-    assert kept.outcome.accepted
+    assert [run.outcome.status for run in runs] == [
+        status, status, status if target is None else CommandStatus.ANSWERED]
+    assert (len(rig.frames), len(rig.sender)) == (3, 0)
+
+
+def test_cancelled_command_ends_and_cancelling_it_again_leaves_the_next_one() -> None:
+    rig = Rig()
+    run = rig.start()
+    rig.sender.cancel(run.sending, rig.now)
+    assert not rig.sender.is_sending(Command(LIGHT, 405))
+    newer = rig.start()
+    rig.sender.cancel(run.sending, rig.now)
+    assert run.outcome.status is CommandStatus.CANCELLED
+    assert (newer.outcomes, rig.sender.is_sending(Command(LIGHT, 405, (1.0,)))) == ([], True)
 
 
 def test_closed_sender_ends_all_commands_and_sends_no_others_than_those_of_the_end() -> None:
     rig = Rig()
+    on, request, off = rig.start(param1=1.0), rig.start(REQUEST, param1=440.0), rig.start(406)
 
     def may_send(sent: Command | Message) -> bool:
-        return isinstance(sent, Command) and sent.params[:1] == (0.0,)
+        return isinstance(sent, Command) and sent.params[0] == 0.0
 
-    sent, waiting, request = (rig.start(405, params=(1.0,)), rig.start(405, params=(1.0,)),
-                              rig.start(mavlink.MAV_CMD_REQUEST_MESSAGE, OTHER, params=(440.0,)))
-    last = rig.start(406, OTHER, params=(0.0,))
+    assert rig.sender.refusal == ''
     rig.sender.close(rig.now, may_send)
-    assert [run.status for run in (sent, waiting)] == [STATUS.CLOSED] * 2
-    before = len(rig.frames)
-    refused = [rig.start(405, params=(1.0,)), rig.start(406, params=(40.0,))]
     rig.sender.send(heartbeat(mavlink.MAV_TYPE_GCS))
-    assert [run.status for run in refused] == [STATUS.CLOSED] * 2
-    assert (rig.sender.refusal, len(rig.frames)) == ('the bridge is ending', before)
-
-    began, off = rig.now, rig.start(405, params=(0.0,))
+    refused = rig.start(407, param1=1.0)
+    assert [run.outcome.status for run in (on, refused)] == [CommandStatus.CLOSED] * 2
+    assert (rig.sender.refusal, len(rig.frames)) == ('the bridge is ending', 3)
+    last = rig.start()
     rig.run(2.05)
     # It is repeated for as long as the process lasts.
-    assert [round(at - began, 3) for at, message in rig.frames[before:]
-            if message.command == 405] == [round(0.1 * number, 3) for number in range(21)]
-    assert [run.outcomes for run in (off, last, request)] == [[]] * 3
+    assert [at - 1000.0 for at, _ in last.frames] == pytest.approx(
+        [CLOSING_TIMEOUT * number for number in range(21)])
+    assert [run.outcomes for run in (request, off, last)] == [[]] * 3
 
 
 @pytest.mark.parametrize('by', ['acknowledgement', 'silence', 'lost link'])
-def test_callback_may_start_the_same_command_again(by: str) -> None:
+def test_callback_may_start_the_same_command_again_and_end_all_others(by: str) -> None:
     rig = Rig()
     outcomes: list[CommandResult] = []
 
     def again(outcome: CommandResult, now: float) -> None:
         outcomes.append(outcome)
+        rig.sender.end_all(now, CommandStatus.CANCELLED)
         if len(outcomes) < 3:
             rig.sender.start(Command(LIGHT, 405), now, again)
 
+    other = rig.start(target=OTHER)
     rig.sender.start(Command(LIGHT, 405), rig.now, again)
     for _ in range(3):
         if by == 'acknowledgement':
             rig.ack(ACCEPTED)
         elif by == 'silence':
-            rig.run(2.0)
+            rig.run(2.75)
         else:
-            rig.sender.end_all(rig.now, STATUS.LINK_LOST)
-    assert (len(outcomes), rig.idle) == (3, True)
-
-
-def test_overtaking_command_cancels_those_that_wait_or_are_unacknowledged_and_is_sent() -> None:
-    rig = Rig()
-    others = [rig.start() for _ in range(31)]
-    off = rig.start(overtake=True)
-    assert [run.status for run in others] == [STATUS.CANCELLED] * 31
-    assert (len(rig.frames), len(off.frames)) == (2, 1)
-    rig.ack(ACCEPTED)
-    assert off.outcome.accepted
-
-
-@pytest.mark.parametrize('rejections', [0, 1])
-def test_overtaking_command_is_sent_beside_one_in_progress(rejections: int) -> None:
-    rig = Rig()
-    on = rig.start()
-    rig.ack(IN_PROGRESS)
-    off, waiting = rig.start(overtake=True), rig.start()
-    for _ in range(rejections):
-        # A command in progress is not rejected: the rejection belongs to the other command.
-        rig.ack(REJECTED)
-        rig.run(0.15)
-    assert [len(run.frames) for run in (on, off, waiting)] == [1, 1 + rejections, 0]
-    for result in (ACCEPTED, DENIED, FAILED):
-        # An acknowledgement names only the command, so it ends the oldest one.
-        rig.ack(result)
-    assert (on.result, off.result, waiting.result) == (ACCEPTED, DENIED, FAILED)
-
-
-def test_command_that_is_not_resent_may_be_answered_and_one_that_waits_is_cancelled() -> None:
-    rig = Rig()
-    sent, waiting = rig.start(), rig.start()
-    rig.sender.stop_resending(rig.now, LIGHT, lambda command: True)
-    rig.run(0.3)
-    assert (sent.outcomes, waiting.status) == ([], STATUS.CANCELLED)
-    rig.ack(ACCEPTED)
-    rig.run(LONG)
-    assert (sent.result, len(sent.frames), len(waiting.frames)) == (ACCEPTED, 1, 0)
-
-
-@pytest.mark.parametrize('place', [0, 1])
-def test_cancelled_command_ends_and_the_other_is_sent(place: int) -> None:
-    rig = Rig()
-    runs = [rig.start(), rig.start()]
-    rig.sender.cancel(runs[place].command, rig.now)
-    rig.flush()
-    assert runs[place].status is STATUS.CANCELLED
-    assert (runs[1 - place].outcomes, len(runs[1 - place].frames)) == ([], 1)
-
-
-@pytest.mark.parametrize(('first', 'second', 'after', 'ambiguous'), [
-    (DENIED, DENIED, 4.9, True), (DENIED, DENIED, 5.1, False), (ACCEPTED, DENIED, 0.4, False),
-    (None, DENIED, 0.4, True), (None, ACCEPTED, 0.4, True)])
-def test_result_says_whether_it_may_be_that_of_the_command_before(
-        first: int | None, second: int, after: float, ambiguous: bool) -> None:
-    rig = Rig()
-    before = rig.start()
-    if first is None:
-        rig.sender.cancel(before.command, rig.now)
-    else:
-        rig.ack(first)
-    rig.now += after
-    run = rig.start()
-    rig.ack(second)
-    assert not before.outcome.may_answer_earlier(rig.now)
-    assert run.outcome.may_answer_earlier(rig.now) is ambiguous
-
-
-@pytest.mark.parametrize(('first', 'copies', 'ambiguous'), [
-    # The second command may have ended with the late answer to the first.
-    (None, 0, True),
-    # More copies may come where one came.
-    (DENIED, 1, True), (DENIED, 0, False)])
-def test_result_says_whether_it_may_be_that_of_a_command_before_the_last(
-        first: int | None, copies: int, ambiguous: bool) -> None:
-    rig = Rig()
-    if first is None:
-        rig.sender.cancel(rig.start().command, rig.now)
-    else:
-        rig.start()
-        for _ in range(1 + copies):
-            rig.ack(first)
-    rig.start()
-    rig.ack(ACCEPTED)
-    run = rig.start()
-    rig.ack(DENIED)
-    assert run.outcome.may_answer_earlier(rig.now) is ambiguous
+            rig.sender.end_all(rig.now, CommandStatus.LINK_LOST)
+    assert (len(outcomes), len(other.outcomes), len(rig.sender)) == (3, 1, 0)
 
 
 # Fields, arguments, texts and counters
@@ -485,187 +308,21 @@ def test_durations_are_in_ms_below_a_second() -> None:
         '0 ms', '999 ms', '1.00 s', '12.35 s']
 
 
-def test_sender_counts_tries_and_silence_and_names_the_silent_target_until_it_answers() -> None:
+def test_sender_counts_tries_and_keeps_the_last_round_trip_and_silence_of_some_targets() -> None:
     rig = Rig(retries=2)
-    rig.ended()
-    assert set(rig.sender.unanswering) == {LIGHT}
-    for target in (OTHER, LIGHT):
-        rig.start(target=target)
-        assert set(rig.sender.unanswering) == {LIGHT}
-        rig.ack(DENIED, source=target)
-    rig.ack(ACCEPTED)
-    counters = rig.sender.counters
-    assert (counters.sent, counters.resent, counters.unanswered) == (5, 2, 1)
-    assert not rig.sender.unanswering
-
-
-@pytest.mark.parametrize(('pause', 'remembered'), [
-    (ACK_LIFETIME - 2, True), (ACK_LIFETIME, False)])
-def test_an_ended_command_is_remembered_while_its_acknowledgement_may_come(
-        pause: float, remembered: bool) -> None:
-    rig = Rig(timeout=0.5, retries=0)
-    for target in (LIGHT, OTHER):
-        rig.start(target=target)
-        rig.run(1.0)
-        rig.run(pause)
-
-    run = rig.start()
-    rig.ack(ACCEPTED)
-    assert (run.outcome.earlier is not None) is remembered
-
-
-def test_targets_that_do_not_answer_are_bounded() -> None:
-    rig = Rig(retries=0)
     targets = [Address(system, 1) for system in range(1, MAX_TARGETS + 3)]
     for target in targets:
-        rig.ended(target=target)
-
+        rig.start(target=target)
+    rig.run()
+    counters = rig.sender.counters
+    count = len(targets)
+    assert (counters.sent, counters.resent, counters.unanswered) == (3 * count, 2 * count, count)
     assert list(rig.sender.unanswering) == targets[2:]
-
-
-def test_callback_may_end_all_other_commands() -> None:
-    rig = Rig(retries=0)
-    ends: list[CommandStatus] = []
-
-    def close(outcome: CommandResult, now: float) -> None:
-        ends.append(outcome.status)
-        rig.sender.end_all(now, STATUS.CANCELLED)
-
-    for target in (LIGHT, OTHER) * 3:
-        rig.sender.start(Command(target, 405), rig.now, close)
-    rig.run(LONG)
-    assert sorted(ends, key=str) == [STATUS.CANCELLED] * 5 + [STATUS.NO_ANSWER]
-    assert rig.idle
-
-
-# Round trips
-
-def of(*seconds: float) -> RttEstimator:
-    """Return an estimator with these samples."""
-    estimator = RttEstimator()
-    for sample in seconds:
-        estimator.add(sample, 0.0)
-    return estimator
-
-
-@pytest.mark.parametrize(('samples', 'longest', 'timeout'), [
-    *(([0.01] * known, 0.5, 0.5) for known in range(MIN_SAMPLES)),
-    # Four times the round trip, at least the floor and at most the given time-out, which may be
-    # below the floor.
-    ([0.001] * 4, 0.5, 0.2), ([0.06] * 4, 0.5, 0.24), ([0.125] * 4, 0.5, 0.5),
-    ([0.4] * 4, 0.5, 0.5), ([0.001] * 10, 0.05, 0.05),
-    # One slow answer among many does not count, four do; old samples are dropped.
-    ([0.06] * 30 + [0.45], 2.0, 0.24), ([0.06] * 30 + [0.45] * 4, 2.0, 1.8),
-    ([0.45] * MAX_SAMPLES + [0.06] * MAX_SAMPLES, 2.0, 0.24)])
-def test_timeout_is_four_times_the_95th_percentile_within_bounds(
-        samples: list[float], longest: float, timeout: float) -> None:
-    assert of(*samples).timeout(longest) == pytest.approx(timeout)
-
-
-@given(st.lists(st.floats(0, 10), min_size=1, max_size=100), st.floats(0.01, 5))
-def test_timeout_and_quantiles_stay_within_bounds_for_any_samples(
-        samples: list[float], longest: float) -> None:
-    estimator, last = of(*samples), sorted(samples[-MAX_SAMPLES:])
-    assert min(MIN_TIMEOUT, longest) <= estimator.timeout(longest) <= longest
-    for share in (0.0, 0.5, 0.95, 1.0):
-        assert estimator.quantile(share) == last[min(int(share * len(last)), len(last) - 1)]
-
-
-def test_quantile_of_no_sample_is_unknown() -> None:
-    assert of().quantile(0.5) is None
-
-
-def test_shortest_comes_from_unambiguous_samples_and_is_0_while_none_is_ambiguous() -> None:
-    estimator = of(*[0.4] * 6)
-    assert estimator.shortest(0.0) == 0.0
-    estimator.expect_ambiguous(0.0)
-    estimator.add(0.001, ACK_LIFETIME - 0.1)
-    assert (estimator.shortest(ACK_LIFETIME - 0.1), estimator.shortest(ACK_LIFETIME)) == (0.4, 0.0)
-
-
-def test_a_resend_before_the_first_sample_makes_that_ambiguous() -> None:
-    rig = Rig()
-    rig.start()
-    rig.run(0.6)
-    rig.ack(ACCEPTED)
-    rig.start()
-    rig.run(0.01)
-    rig.ack(ACCEPTED)
-    estimator = rig.sender.round_trip(LIGHT)
-    assert len(estimator) == 1
-    assert estimator.shortest(rig.now) == pytest.approx(0.01)
-
-
-def taught(seconds: float, timeout: float) -> Rig:
-    """Return a rig that has enough samples of this round-trip time, s."""
-    rig = Rig(timeout=timeout)
-    for _ in range(MIN_SAMPLES):
-        rig.start()
-        rig.now += seconds
-        rig.ack(ACCEPTED)
-    return rig
-
-
-def test_a_line_that_becomes_slower_than_the_wait_is_measured_again() -> None:
-    rig = taught(0.02, 0.5)
-    tries = []
-    for _ in range(5):
-        run = rig.start()
-        rig.run(0.4)
-        rig.ack(ACCEPTED)
-        if len(run.frames) > 1:
-            # Acknowledge the second try, which was not needed.
-            rig.run(0.2)
-            rig.ack(ACCEPTED)
-        tries.append(run.outcome.tries)
-    assert (tries[0], tries[-1]) == (2, 1)
-
-
-def test_a_copy_of_an_acknowledgement_is_not_taken_for_that_of_another_try() -> None:
-    rig = taught(0.02, 0.5)
-    for _ in range(5):
-        run = rig.start()
-        rig.run(0.4)
-        rig.ack(ACCEPTED)
-        rig.run(0.05)
-        rig.ack(ACCEPTED)
-        rig.run(1.0)
-        assert run.outcome.tries == 2
-
-
-@pytest.mark.parametrize(('seconds', 'timeout', 'times'), [
-    # Each wait is twice the one before it, up to the given time-out.
-    (0.06, 1.0, [0.0, 0.24, 0.72, 1.68, 2.68]), (0.4, 0.5, [0.0, 0.5, 1.0, 1.5, 2.0])])
-def test_resends_follow_the_round_trip_times_of_the_target(
-        seconds: float, timeout: float, times: list[float]) -> None:
-    rig = taught(seconds, timeout)
-    begun, run = rig.now, rig.ended()
-    assert [*(time - begun for time, _ in run.frames), run.ended_at - begun] == pytest.approx(
-        times)
-    assert rig.sender.round_trip(Address(1, 244)).timeout(0.5) == 0.5
-
-
-def test_wait_after_a_rejected_try_is_not_longer() -> None:
-    rig = taught(0.06, 1.0)
-    run = rig.start()
-    rig.ack(REJECTED)
-    rig.run(0.1)
-    assert rig.sender.next_deadline() == pytest.approx(run.frames[1][0] + 0.24)
-
-
-# An acknowledgement after a resend may belong to either try (Karn's algorithm).
-@pytest.mark.parametrize(('answers', 'samples'), [
-    ([(0.01, ACCEPTED)], [0.01]), ([(0.6, ACCEPTED)], []),
-    ([(0.01, IN_PROGRESS), (0.05, ACCEPTED)], [0.01]),
-    ([(0.01, REJECTED), (0.05, ACCEPTED)], [0.01]),
-    ([(0.01, INT_ONLY), (0.01, ACCEPTED)], [0.01])])
-def test_only_the_first_answer_to_the_only_try_is_measured(
-        answers: list[tuple[float, int]], samples: list[float]) -> None:
-    rig = Rig()
-    rig.start()
-    for after, result in answers:
-        rig.run(after)
-        rig.ack(result)
-    estimator = rig.sender.round_trip(LIGHT)
-    assert len(estimator) == len(samples)
-    assert samples == [] or estimator.quantile(1.0) == pytest.approx(samples[0])
+    for target in (*targets, targets[5]):
+        rig.start(target=target)
+        rig.now += DELAY
+        rig.ack(DENIED, source=target)
+    assert list(rig.sender.round_trips) == [
+        *(one for one in targets[2:] if one != targets[5]), targets[5]]
+    assert rig.sender.round_trips[targets[9]] == pytest.approx(DELAY)
+    assert not rig.sender.unanswering

@@ -24,8 +24,15 @@ from illuminator_ros.illuminator.client import IlluminatorClient
 from illuminator_ros.illuminator.light import Settings
 from illuminator_ros.mavlink.command_sender import CommandSender
 from illuminator_ros.mavlink.component import Component, Endpoint
-from illuminator_ros.mavlink.messages import Address, Heartbeat, Message
-from illuminator_ros.payload.attempt import Result
+from illuminator_ros.mavlink.dialect import mavlink
+from illuminator_ros.mavlink.messages import (
+    Address,
+    CommandAck,
+    CommandLong,
+    Heartbeat,
+    Message,
+)
+from illuminator_ros.payload.confirmed_command import Result
 from illuminator_ros.payload.simulated import SimulatedComponents
 from payloads.winch import WINCH, WinchClient, WinchReport
 import pytest
@@ -54,6 +61,7 @@ class Vehicle:
         self.reports: list[WinchReport] = []
         self.results: list[Result] = []
         self.sent: list[tuple[Address, Message]] = []
+        self.lost: tuple[type[Message], ...] = ()
         self.winches.events.subscribe(self.reports.append)
         self.component = Component(commands, [self.lights, self.winches])
         self.now = 0.0
@@ -75,7 +83,8 @@ class Vehicle:
                 while side.outgoing:
                     source, message = side.outgoing.popleft()
                     self.sent.append((source, message))
-                    other.receive(source, message, self.now)
+                    if not isinstance(message, self.lost):
+                        other.receive(source, message, self.now)
             self.now += step
 
 
@@ -114,6 +123,21 @@ def test_a_release_that_is_not_shown_by_a_status_is_no_success(
     vehicle.run(5.0)
     (result,) = vehicle.results
     assert (result.success, message in result.message) == (False, True), result.message
+
+
+def test_a_release_whose_acknowledgement_is_lost_is_sent_once_and_confirmed_by_the_status(
+        vehicle: Vehicle) -> None:
+    vehicle.lost = (CommandAck,)
+    vehicle.release(2.0)
+    vehicle.release(2.0)
+    vehicle.run(5.0)
+
+    assert [(one.success, one.message.partition(' (')[0]) for one in vehicle.results] == [
+        (False, 'a release is under way'),
+        (True, '2 m released, confirmed by WINCH_STATUS, without an acknowledgement')]
+    assert sum(isinstance(message, CommandLong) and message.command == mavlink.MAV_CMD_DO_WINCH
+               for _, message in vehicle.sent) == 1
+    assert vehicle.reports[-1] == WinchReport(DECK, 2.0)
 
 
 @pytest.mark.parametrize(('commanded', 'left'), [(False, set()), (True, {DECK})])

@@ -28,17 +28,16 @@ import math
 
 from illuminator_ros.mavlink import messages as mav
 from illuminator_ros.mavlink.command_sender import CommandSender
-from illuminator_ros.mavlink.command_sender import Done as CommandDone
 from illuminator_ros.mavlink.component import Payload
 from illuminator_ros.mavlink.dialect import mavlink
 from illuminator_ros.mavlink.messages import AnyCommand
 from illuminator_ros.payload import simulated
-from illuminator_ros.payload.attempt import Done, StatusReport, Target
+from illuminator_ros.payload.confirmed_command import Done, Result, Target
+from illuminator_ros.payload.device_property import answer, Caller, Desired, Property
 from illuminator_ros.payload.discovery import Discovery
 from illuminator_ros.payload.faults import Behaviour
 from illuminator_ros.payload.listeners import Listeners
 from illuminator_ros.payload.payload_type import PayloadType
-from illuminator_ros.payload.reconciler import Desired, Reconciler
 
 WINCH = PayloadType('winch', ros='payloads.winch_ros:WINCH',
                     simulated='payloads.winch:SIMULATED', checks='payloads.winch_checks:CHECKS',
@@ -70,6 +69,9 @@ class Release:
     note: str = ''
     position: None = None
     command: int = mavlink.MAV_CMD_DO_WINCH
+    # A winch that gets it twice releases twice the length.
+    is_idempotent: bool = False
+    is_repeated: bool = False
 
     @property
     def params(self) -> tuple[float, ...]:
@@ -97,16 +99,13 @@ class Release:
 class Winch:
     """One winch: a :class:`Device` of the discovery."""
 
-    def __init__(
-        self, address: mav.Address, commands: CommandSender, ended: CommandDone,
-    ) -> None:
+    def __init__(self, address: mav.Address, commands: CommandSender) -> None:
         self.address = address
         self.lost_at = math.inf
         self.was_commanded = False
         self._heard_at = self._line_length = 0.0
-        self._length: Reconciler[WinchStatus] = Reconciler(Target(
-            address, commands, ended, kind='winch', status_id=WinchStatus.id,
-            status_name='WINCH_STATUS'))
+        self._length: Property[WinchStatus] = Property(
+            Target(address, commands, 'winch', WinchStatus.id, WinchStatus.msgname))
 
     def heard(self, now: float) -> None:
         """Note that the winch is alive."""
@@ -116,23 +115,33 @@ class Winch:
         """Take a status."""
         self.heard(now)
         self._line_length = status.line_length
-        self._length.reported(StatusReport(status, sent_by=now, has_clock=False), now)
+        self._length.reported(status, now)
+        self._answer(now)
 
     def release(self, length: float, now: float, done: Done) -> None:
         """
         Release line, m, or wind it in if negative; ``done`` gets the confirmed result.
 
-        A newer release replaces an unconfirmed one.
+        A release that is under way is not replaced: it may have been executed.
         """
         self.was_commanded = True
+        if self._length.desired is not None:
+            done(Result(False, 'a release is under way'), now)
+            return
         self._length.want(
-            Desired(Release(length, self._line_length + length), since=now), now, done)
+            Desired(Release(length, self._line_length + length)), now, Caller(done, now))
+
+    def _answer(self, now: float) -> None:
+        while self._length.outcomes:
+            outcome = self._length.outcomes.popleft()
+            answer(outcome.callers, outcome.result, now)
 
     def poll(self, now: float) -> None:
         """See :class:`Device`."""
         if now >= self._heard_at + TIMEOUT:
             self.lost_at = min(self.lost_at, now)
         self._length.poll(now)
+        self._answer(now)
 
     def next_deadline(self) -> float:
         """See :class:`Device`."""
@@ -165,8 +174,7 @@ class WinchClient(Payload):
         return self._discovery.next_deadline()
 
     def _make(self, address: mav.Address) -> Winch:
-        return Winch(address, self._commands,
-                     lambda result, now: self._discovery.changed(address))
+        return Winch(address, self._commands)
 
     def receive(self, source: mav.Address, message: mav.Message, now: float) -> None:
         """See :meth:`Payload.receive`."""

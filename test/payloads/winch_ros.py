@@ -16,7 +16,7 @@
 
 from __future__ import annotations
 
-from illuminator_ros.payload.attempt import Result
+from illuminator_ros.payload.confirmed_command import Result
 from illuminator_ros.ros.node import CommandTopic, Endpoint, NodeInterface
 from illuminator_ros.ros.payload import Host, RosPayload, ServedPayload
 from payloads.winch import WinchClient, WinchReport

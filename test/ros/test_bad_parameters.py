@@ -70,7 +70,6 @@ NUMBER, INTEGER, STRING, BOOLEAN = (
     ({'source_timeout': 1.0}, 'source_timeout: is given, but sources is empty'),
     ({'on_release': 'off'}, 'on_release: is given, but sources is empty'),
     ({'on_release': 'dim'}, "on_release: 'dim' is not one of keep, off"),
-    ({'external_changes': 'fight'}, "external_changes: 'fight' is not one of follow, reassert"),
     ({'max_brightness': 60, 'brightness': 80}, 'brightness 80 % is above max_brightness 60 %'),
     *(({wrong: 1}, f"{wrong} is unknown; did you mean '{right}'\\?") for wrong, right in [
         ('max_brightnes', 'max_brightness'), ('min_strobe_peroid', 'min_strobe_period'),

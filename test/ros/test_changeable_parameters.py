@@ -96,7 +96,6 @@ def test_a_protection_is_never_weaker_than_at_the_start(
     ('max_brightness', math.nan, 'max_brightness: nan % is out of range: 0 to 100 %'),
     ('max_brightness', 'bright', "max_brightness: 'bright' is not a number"),
     ('max_brightness', None, 'max_brightness: None is not a number'),
-    ('external_changes', 'ignore', "external_changes: 'ignore' is not one of follow, reassert"),
     ('source_timeout', 5.0, 'source_timeout: is given, but sources is empty')])
 @pytest.mark.parametrize('atomically', [False, True])
 def test_a_wrong_value_is_refused_with_the_reason_and_changes_nothing(
@@ -132,20 +131,6 @@ def test_the_range_of_a_number_fits_a_slider_of_rqt_reconfigure(spec: ParameterS
         assert isinstance(spec.default, int | float)
         assert -2**31 <= one.from_value <= spec.default <= one.to_value < 2**31
         assert (one.from_value < one.to_value, one.step) == (True, 0)
-
-
-def test_changes_by_others_are_undone_from_the_moment_at_which_the_parameter_is_set(
-        own_ros: Ros) -> None:
-    parameters, port = Parameters(own_ros), free_port()
-    with running_bridge(own_ros.domain, port) as bridge, ServedLight(port) as light:
-        parameters.wait(mode='internal_control')
-        light.report(enable=1)
-        bridge.wait_for('light 1/243 was switched on by another sender')
-        light.report(enable=0)
-        assert parameters.set(external_changes='reassert')[0].successful
-        light.report(enable=1)
-
-        bridge.wait_for('is switched off by external_changes: another sender switched it on')
 
 
 def test_a_further_light_is_served_within_a_limit_that_was_set_later(own_ros: Ros) -> None:

@@ -104,7 +104,7 @@ def test_monitor_shows_a_light_with_link_and_identity_and_sends_its_requests(
         assert monitor.press('+').startswith('done')
         assert monitor.press('r').startswith('done')
 
-        shown = monitor.wait(lambda device: device.number('link', 'round_trip_p50_ms'))
+        shown = monitor.wait(lambda device: device.number('link', 'round_trip_ms'))
         assert shown.diagnosed('lamp', 'vendor') == 'maker'
         assert shown.values['temperature'] == 61.5
         assert (light.fake.fields['strobe_period'], light.fake.fields['brightness']) == (1.0, 40.0)

@@ -99,7 +99,7 @@ def test_other_services_and_topics_go_on_while_an_enable_waits(
 
     assert not waiting.answered
     off.acknowledge(ON_OFF, mavlink.MAV_RESULT_FAILED)
-    waiting.result()
+    pass_time_until(lambda: waiting.answered)
 
 
 def no_light_messages(ros: Ros) -> set[str]:

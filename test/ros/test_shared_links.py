@@ -28,7 +28,8 @@ from support.shared_address import SharedAddress
 from support.slow import CLOCK, SlowLink, SPEED
 
 CLASH = 'another sender uses our address 1/193'
-SHARED = 'several lights answer as 1/1: each needs an address of its own'
+SHARED = ('1/1 reports changing states: several lights with this address, or another '
+          'controller')
 
 
 def is_of(node: str) -> Callable[[DiagnosticArray], bool]:
@@ -75,7 +76,7 @@ def test_two_lights_at_one_address_are_a_warning_and_change_no_parameter(
         FakeLight(Address(1, 1), heartbeat_type=None, stream=0.1 * SPEED, brightness=40.0))
     with (running_bridge(own_ros.domain, port) as bridge,
           EndpointLink(f'udpout://127.0.0.1:{port}', lights, kind=SlowLink)):
-        bridge.wait_for('several lights answer as 1/1: parameters stay as they are')
+        bridge.wait_for(f'{SHARED}; parameters stay as they are meanwhile')
         arrays = own_ros.subscribe(DiagnosticArray, '/diagnostics', STREAM)
         events = Parameters(own_ros).events()
         own_ros.subscribe(Float32, '/illuminator/brightness', STREAM).wait(count=30)
@@ -83,4 +84,4 @@ def test_two_lights_at_one_address_are_a_warning_and_change_no_parameter(
         arrays.wait(lambda array: array.status[1].level == DiagnosticStatus.WARN
                     and SHARED in array.status[1].message)
         assert events.messages == []
-        assert bridge.count('was changed') <= 1
+        assert bridge.count('was changed') <= 4

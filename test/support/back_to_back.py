@@ -29,7 +29,7 @@ from illuminator_ros.mavlink.component import Endpoint
 from illuminator_ros.mavlink.dialect import decode
 from illuminator_ros.mavlink.frame import Decoder
 from illuminator_ros.mavlink.statistics import Traffic
-from illuminator_ros.payload.attempt import Result
+from illuminator_ros.payload.confirmed_command import Result
 from illuminator_ros.payload.simulated import SimulatedComponent, SimulatedComponents
 from support.client import Client
 from support.faulty_wire import Faults, FaultyWire
@@ -91,7 +91,7 @@ class Pair:
         self, lights: Sequence[IlluminatorProperties] | Endpoint = ONE_LIGHT, *,
         settings: Settings | None = None, there: Faults | None = None,
         back: Faults | None = None, seed: int | str = 0, uptime: float = 100.0,
-        command_timeout: float = 0.5, command_retries: int = 3,
+        command_timeout: float = 0.25, command_retries: int = 3,
         on_light: Callable[[Light], None] = lambda light: None,
     ) -> None:
         self.now = START

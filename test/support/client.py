@@ -31,7 +31,7 @@ class Client(Component):
     """
 
     def __init__(
-        self, address: Address, settings: Settings, *, command_timeout: float = 0.5,
+        self, address: Address, settings: Settings, *, command_timeout: float = 0.25,
         command_retries: int = 3, **options: Any,
     ) -> None:
         commands = CommandSender(address, command_timeout, command_retries)

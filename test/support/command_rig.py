@@ -12,23 +12,22 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""A command sender with a clock that jumps and a target that a test controls."""
+"""A command sender with a clock that jumps, and a target whose answers a test sets."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 import heapq
 import math
 from typing import Any
 
 from illuminator_ros.mavlink import command_sender
-from illuminator_ros.mavlink.dialect import mavlink
 from illuminator_ros.mavlink.messages import Address, CommandAck, CommandInt
 
 OURS = Address(1, 193)
 LIGHT = Address(1, 243)
-# s from a frame to its acknowledgement.
+# s from a frame to its first answer, and between its answers.
 DELAY = 0.02
 # s after which every command has ended.
 LONG = 60.0
@@ -42,14 +41,9 @@ class Run:
     The number of the run in param7 identifies its frames.
     """
 
-    command: command_sender.Command
+    sending: command_sender.Transmission = field(init=False)
     frames: list[tuple[float, Any]] = field(default_factory=list)
     outcomes: list[command_sender.CommandResult] = field(default_factory=list)
-    ended_at: float = math.nan
-
-    def __call__(self, outcome: command_sender.CommandResult, now: float) -> None:
-        self.outcomes.append(outcome)
-        self.ended_at = now
 
     @property
     def outcome(self) -> command_sender.CommandResult:
@@ -57,68 +51,53 @@ class Run:
         (outcome,) = self.outcomes
         return outcome
 
-    @property
-    def status(self) -> command_sender.CommandStatus:
-        """How it ended."""
-        return self.outcome.status
-
-    @property
-    def result(self) -> int | None:
-        """Return the MAV_RESULT that it ended with."""
-        return self.outcome.result
-
 
 class Rig:
     """
     A sender, and what it sends.
 
+    :param answers: the results that acknowledge each frame, one after the other.
     :ivar now: s.
     :ivar frames: everything sent, with the time.
-    :ivar answers: called with a message and how many went before it to the same target with the
-        same command; returns the results to acknowledge it with, one after the other.
     """
 
-    def __init__(self, *answers: Sequence[int], timeout: float = 0.5, retries: int = 3) -> None:
+    def __init__(self, *answers: Sequence[int], timeout: float = 0.25, retries: int = 3) -> None:
         self.now = 1000.0
         self.frames: list[tuple[float, Any]] = []
         self.sender = command_sender.CommandSender(OURS, timeout, retries)
-        self.answers: Callable[[Any, int], Sequence[int]] = (
-            lambda message, number: answers[number] if number < len(answers) else ())
         self.runs: list[Run] = []
-        self._acks: list[tuple[float, int, Address, Any]] = []
+        self._answers = iter(answers)
+        self._acks: list[tuple[float, int, int]] = []
 
-    # Actions of the sender's owner
-
-    def start(self, command: int = 405, target: Address = LIGHT, *,
-              params: tuple[float, ...] | None = None, limit: float = math.inf,
-              overtake: bool = False) -> Run:
-        """Start a command; the limit is s from now. With params its frames are not identified."""
-        number = len(self.runs) + 1.0
-        run = Run(command_sender.Command(
-            target, command, (0.0,) * 6 + (number,) if params is None else params))
+    def start(self, command: int = 405, target: Address = LIGHT, *, param1: float = 0.0,
+              limit: float = math.inf, **options: Any) -> Run:
+        """Start a command; the limit is s from now."""
+        run = Run()
         self.runs.append(run)
-        self.sender.start(
-            run.command, self.now, run, deadline=self.now + limit, overtake=overtake)
+        run.sending = self.sender.start(
+            command_sender.Command(target, command, (param1, *(0.0,) * 5, float(len(self.runs)))),
+            self.now, lambda result, now: run.outcomes.append(result),
+            deadline=self.now + limit, **options)
         self.flush()
         return run
 
-    def ended(self, command: int = 405, **arguments: Any) -> Run:
-        """Start a command and wait until it must have ended."""
-        run = self.start(command, **arguments)
-        self.run(LONG)
-        return run
+    def ack(self, result: int, command: int = 405, *, source: Address = LIGHT, progress: int = 0,
+            target: Address = OURS) -> None:
+        """Acknowledge a command at once."""
+        self.sender.acknowledge(
+            source, CommandAck(command, result, progress, 0, *target), self.now)
+        self.flush()
 
-    def run(self, seconds: float) -> None:
-        """Let time pass; acknowledge and poll when that is due."""
+    def run(self, seconds: float = LONG) -> None:
+        """Let time pass; answer and poll when that is due."""
         end = self.now + seconds
         while (due := min(self.sender.next_deadline(), self._next_ack())) <= end:
             self.now = max(self.now, due)
             if self._next_ack() <= self.now:
-                _, _, source, ack = heapq.heappop(self._acks)
-                self.sender.acknowledge(source, ack, self.now)
+                _, result, command = heapq.heappop(self._acks)
+                self.ack(result, command)
             else:
-                self.sender.poll(self.now)
-            self.flush()
+                self.poll()
         self.now = end
 
     def poll(self) -> None:
@@ -126,56 +105,22 @@ class Rig:
         self.sender.poll(self.now)
         self.flush()
 
-    # Actions of the target
-
-    def ack(self, result: int, command: int = 405, *, source: Address = LIGHT, progress: int = 0,
-            target: Address = OURS, result_param2: int = 0) -> None:
-        """Acknowledge a command at once."""
-        self.sender.acknowledge(
-            source, CommandAck(command, result, progress, 0, *target), self.now)
-        self.flush()
-
     def flush(self) -> None:
         """Take the sent messages."""
         while self.sender.outgoing:
-            self._send(self.sender.outgoing.popleft()[1])
-
-    def _send(self, message: Any) -> None:
-        key = Address(message.target_system, message.target_component), message.command
-        number = sum(1 for _, sent in self.frames if key == (
-            Address(sent.target_system, sent.target_component), sent.command))
-        self.frames.append((self.now, message))
-        number_of_run = int(message.z if isinstance(message, CommandInt) else message.param7)
-        if 0 < number_of_run <= len(self.runs):
-            self.runs[number_of_run - 1].frames.append((self.now, message))
-        for place, result in enumerate(self.answers(message, number)):
-            heapq.heappush(self._acks, (
-                self.now + DELAY * (place + 1), len(self.frames) * 256 + place, key[0],
-                CommandAck(message.command, result, 0, 0, *OURS)))
+            message: Any = self.sender.outgoing.popleft()[1]
+            for place, result in enumerate(next(self._answers, ())):
+                heapq.heappush(self._acks, (
+                    self.now + DELAY * (place + 1), result, message.command))
+            self.frames.append((self.now, message))
+            number = int(message.z if isinstance(message, CommandInt) else message.param7)
+            if 0 < number <= len(self.runs):
+                self.runs[number - 1].frames.append((self.now, message))
 
     def _next_ack(self) -> float:
         return self._acks[0][0] if self._acks else math.inf
-
-    # Results
 
     @property
     def times(self) -> list[float]:
         """When frames were sent, s since the first."""
         return [round(time - self.frames[0][0], 6) for time, _ in self.frames]
-
-    @property
-    def messages(self) -> list[Any]:
-        """Return the sent messages."""
-        return [message for _, message in self.frames]
-
-    @property
-    def idle(self) -> bool:
-        """Whether no command is in progress or waiting."""
-        return self.sender.next_deadline() == math.inf
-
-
-ACCEPTED = mavlink.MAV_RESULT_ACCEPTED
-REJECTED = mavlink.MAV_RESULT_TEMPORARILY_REJECTED
-DENIED = mavlink.MAV_RESULT_DENIED
-FAILED = mavlink.MAV_RESULT_FAILED
-IN_PROGRESS = mavlink.MAV_RESULT_IN_PROGRESS

@@ -30,7 +30,7 @@ from illuminator_ros.mavlink.command_sender import CommandSender
 from illuminator_ros.mavlink.component import Component, Endpoint
 from illuminator_ros.mavlink.dialect import entry_names, mavlink
 from illuminator_ros.mavlink.link import Link
-from illuminator_ros.payload.attempt import Result
+from illuminator_ros.payload.confirmed_command import Result
 from illuminator_ros.payload.messages import GeoPoint, GimbalDeviceAttitudeStatus
 from support.live_link import EndpointLink
 

@@ -31,7 +31,7 @@ from illuminator_ros.mavlink.link import Link
 from illuminator_ros.mavlink.link_state import LinkEvent, LinkSnapshot
 from illuminator_ros.mavlink.messages import Address, Message
 from illuminator_ros.mavlink.url import parse_url, Url
-from illuminator_ros.payload.attempt import Result
+from illuminator_ros.payload.confirmed_command import Result
 from illuminator_ros.payload.simulated import SimulatedComponents
 from support.client import Client
 from support.messages import HANDLED

@@ -50,9 +50,9 @@ OUTCOMES = {
     'not acknowledged': 'no acknowledgement',
     'contradicted': 'but ILLUMINATOR_STATUS shows',
     'no status': 'ILLUMINATOR_STATUS came within',
-    'doubtful': 'may belong to an earlier command',
+    'rare status': 'its next status is due within',
     'superseded': 'superseded by ',
-    'not sent': 'not sent: the command before it has not ended',
+    'fenced': 'an earlier command may still be under way',
     'refused': 'refused: MAV_RESULT_',
     'unfinished': 'not finished in time',
     'progress stopped': 'no final acknowledgement',
@@ -204,8 +204,8 @@ class Run:
             light = self.pair.controller.lights[address]
             if not witness.is_as(light, self.pair.now):
                 yield f'{address} is shown in another state than it is in'
-            if light.restarts or light.snapshot(self.pair.now).shared_address:
-                yield f'{address} is taken for a light that restarted, or for several'
+            if light.snapshot(self.pair.now).states_are_changing:
+                yield f'{address} is taken for several lights'
 
     def _untruth(self, request: Request) -> str:
         """Return the untruth in the answer to a request, '' if it is true."""
@@ -241,6 +241,8 @@ class Run:
             case 'superseded':
                 is_newer = any(other.answer.asked_at >= answer.asked_at
                                and other.values != request.values for other in others)
+                # An OFF ends a configuration where a brightness may switch the light on.
+                is_newer |= request.kind == CONFIGURE and request.message == 'superseded by off'
                 return '' if is_newer else 'not superseded'
             case '':
                 return 'an unknown outcome'

@@ -55,7 +55,7 @@ def device(view: View, name: str, **values: Any) -> FakeDevice:
     made.values = PRESENT.get(view.kind, {}) | values
     made.trend.extend([30.0, 35.0, None, 41.5] if view.trend else [])
     made.diagnoses['link'] = Diagnosis(0, 'open', {
-        'loss_percent': '12.3', 'round_trip_p50_ms': '3.2'})
+        'loss_percent': '12.3', 'round_trip_ms': '3.2'})
     return made
 
 

@@ -22,7 +22,7 @@ from typing import Any
 
 from illuminator_ros.illuminator import events as light_events
 from illuminator_ros.illuminator.model import Status
-from illuminator_ros.payload.attempt import Result
+from illuminator_ros.payload.confirmed_command import Result
 from illuminator_ros.payload.identity import Identity
 
 

@@ -17,10 +17,17 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+import selectors
 import threading
 
 from illuminator_ros.mavlink import link_thread
-from illuminator_ros.mavlink.link_thread import MAX_CALLS, TURN_TIME
+from illuminator_ros.mavlink.link_thread import (
+    FaultLog,
+    LinkThread,
+    MAX_CALLS,
+    STALL_TIME,
+    TURN_TIME,
+)
 from illuminator_ros.mavlink.messages import Address, Message
 import pytest
 from support.frames import heartbeat_frame
@@ -146,3 +153,29 @@ def test_other_thread_with_many_calls_waits_for_the_link(monkeypatch: pytest.Mon
     live.stop()
 
     assert max(waiting) <= MAX_CALLS + 1
+
+
+@pytest.mark.parametrize(('pause', 'expected'), [
+    (STALL_TIME, ['call']), (STALL_TIME + 5.0, [7.0, 'call'])], ids=['busy', 'stopped'])
+def test_a_stop_of_the_process_is_noted_before_the_calls_that_waited_meanwhile(
+    pause: float, expected: list[object],
+) -> None:
+    now, pauses, order = [1000.0], list[float](), list[object]()
+
+    class Selector(selectors.SelectSelector):
+        def select(self, timeout: float | None = None) -> list[tuple[selectors.SelectorKey, int]]:
+            now[0] += pauses.pop() if pauses else 0.0
+            return super().select(0)
+
+    def clock() -> float:
+        return now[0]
+
+    thread = LinkThread(
+        'link', lambda: now[0] + 1.0, lambda: None, FaultLog(clock), clock, Selector(),
+        stalled=lambda seconds: order.append(round(seconds, 6)), monotonic=clock)
+    thread.run_once()
+    thread.call(lambda at: order.append('call'))
+    pauses.append(pause)
+    thread.run_once()
+    assert order == expected
+    thread.stop(0.0)

@@ -52,7 +52,7 @@ def columns(view: View, name_width: int = 0) -> list[Column]:
         Column('STATE', 6, state),
         *view.columns, Column('SOURCE', 8, lambda device: device.values.get('source', '')),
         Column('LOSS', 6, functools.partial(link, key='loss_percent')),
-        Column('RTT', 7, functools.partial(link, key='round_trip_p50_ms'))]
+        Column('RTT', 7, functools.partial(link, key='round_trip_ms'))]
 
 
 def by_kind(devices: Iterable[D]) -> list[list[D]]:

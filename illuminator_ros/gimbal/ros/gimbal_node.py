@@ -33,8 +33,8 @@ from ..client import GimbalClient
 from ..commands import Control
 from ..gimbal import Gimbal
 from ...mavlink.dialect import flag_names, mavlink
-from ...payload.attempt import Done, Result
 from ...payload.command_sources import DEFAULT, describe
+from ...payload.confirmed_command import Done, Result
 from ...payload.messages import GeoPoint
 from ...payload.mount_attitude import YawFrame
 from ...ros import node as ros_node
@@ -250,12 +250,23 @@ class GimbalNode:
         self, service: Endpoint, message: Any, now: float, answer: ros_node.Answer,
     ) -> None:
         gimbal = self._gimbal()
-        refusal = self.absence(now) if gimbal is None else _refusal(gimbal, service.name, now)
-        if gimbal is None or refusal:
+        if gimbal is None:
+            answer(False, self.absence(now))
+            return
+        # All sources need control, so no source must claim the gimbal for it.
+        is_call = service.name not in ('take_control', 'release_control')
+        refusal = gimbal.begin_call(DEFAULT, now) if is_call else (
+            gimbal.refusal(DEFAULT) if service.name == 'release_control' else '')
+
+        def done(result: Result, now: float) -> None:
+            if is_call:
+                gimbal.end_call(DEFAULT, now, success=result.success)
+            answer(result.success, result.message)
+
+        if refusal:
             answer(False, refusal)
         else:
-            REQUESTS[service](gimbal, message, now, lambda result, now: answer(
-                result.success, result.message))
+            REQUESTS[service](gimbal, message, now, done)
 
     # Setpoints
 
@@ -304,12 +315,3 @@ class GimbalNode:
             limit_reached=self._client.limit_reached,
             interval=self._client.settings.attitude_interval, started=self._started)
 
-
-def _refusal(gimbal: Gimbal, name: str, now: float) -> str:
-    """Claim the gimbal if a request of the plain interface needs it; return any refusal, or ''."""
-    if name == 'take_control':
-        # Higher sources also need this control, and no other service takes it.
-        return ''
-    # A refused request leaves no claim behind.
-    refusal = gimbal.refusal_of_claim(DEFAULT)
-    return refusal if refusal or name == 'release_control' else gimbal.claim(DEFAULT, now)

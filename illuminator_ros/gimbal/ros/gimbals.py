@@ -27,7 +27,7 @@ from ..client import GimbalClient
 from ..events import GimbalConnected, GimbalEvent, GimbalForgotten, GimbalKey
 from ..gimbal import GimbalSettings
 from ..setpoint_mixer import STEP_LIMIT
-from ...payload.attempt import Result
+from ...payload.confirmed_command import Result
 from ...ros.command_sources import SOURCE_PARAMETERS, source_settings
 from ...ros.conversions import GEOID_SEPARATION
 from ...ros.device_nodes import DeviceNodes

@@ -39,8 +39,9 @@ LAMP_VALUES = {
     'connected': '`true` or `false`',
     'heard_s_ago': 'age of the last heartbeat or status, s',
     'restarts': 'restarts of the light, by its uptime',
-    'shared_address': 'whether [several lights](lights.md#several-lights-with-one-address) answer '
-                      'as one',
+    'states_are_changing': 'whether its state goes back and forth: [several '
+                           'lights](lights.md#several-lights-with-one-address), or another '
+                           'controller',
     **dict.fromkeys(('enabled', 'mode', 'brightness_percent', 'strobe_period_s',
                      'strobe_duty_cycle_percent', 'error_flags', 'uptime_s'), 'as on the topics'),
     'temperature_c': 'degC, if measured',
@@ -160,6 +161,12 @@ def reports(
     return made
 
 
+def changing_states(address: Address) -> str:
+    """Describe a state that goes back and forth without a command of ours."""
+    return (f'{address} reports changing states: several lights with this address, or another '
+            'controller')
+
+
 def lamp_findings(light: LightSnapshot, now: float) -> list[diagnostics.Finding]:
     """Return the findings on a light."""
     if not light.connected:
@@ -173,12 +180,13 @@ def lamp_findings(light: LightSnapshot, now: float) -> list[diagnostics.Finding]
             findings.append((diagnostics.WARN, f'no status for {format_seconds(silence)}'))
         if status.invalid:
             findings.append((diagnostics.WARN, f'implausible: {", ".join(status.invalid)}'))
-    if light.shared_address:
-        findings.append((diagnostics.WARN, f'several lights answer as {light.address}: each needs '
-                                           'an address of its own'))
+    if light.states_are_changing:
+        findings.append((diagnostics.WARN, changing_states(light.address)))
     if light.limit_exceeded.impossible:
         findings.append((diagnostics.ERROR, light.limit_exceeded.impossible))
     findings += [(diagnostics.WARN, text) for text in light.limit_exceeded.excess]
+    if light.limit_exceeded.is_again:
+        findings.append((diagnostics.WARN, 'does not keep the limit'))
     if light.discrepancy:
         findings.append((diagnostics.WARN, light.discrepancy))
     return findings
@@ -191,7 +199,7 @@ def _lamp_values(light: LightSnapshot, now: float) -> dict[str, diagnostics.Valu
         'connected': light.connected,
         'heard_s_ago': now - light.heard_at if math.isfinite(light.heard_at) else None,
         'restarts': light.restarts,
-        'shared_address': light.shared_address,
+        'states_are_changing': light.states_are_changing,
     }
     if status is not None:
         values |= {

@@ -24,7 +24,7 @@ from rclpy.node import Node
 from sensor_msgs.msg import Temperature
 from std_msgs.msg import Bool, Float32, Float64, String, UInt32
 
-from .diagnostics import FlagLog
+from .diagnostics import changing_states, FlagLog
 from .parameters import device_parameters
 from .. import events, model
 from ...mavlink.dialect import mavlink
@@ -57,7 +57,7 @@ PUBLICATIONS = (
 )
 # Events that may change a level.
 _DIAGNOSED = (events.LightConnected, events.LightLost, events.LightIdentified, events.LightHeld,
-              events.AddressShared, events.ConfigurationChanged, events.ConfigurationRestored,
+              events.StatesChanging, events.ConfigurationChanged, events.ConfigurationRestored,
               events.LimitExceeded)
 ON_OFF = mavlink.MAV_CMD_ILLUMINATOR_ON_OFF
 CONFIGURE = mavlink.MAV_CMD_DO_ILLUMINATOR_CONFIGURE
@@ -117,9 +117,9 @@ class EventPublisher:
             case events.LightLost(reason=reason):
                 log.warning(f'{light} lost: {reason}', 'connection')
                 self._interface.publish('connected', False)
-            case events.AddressShared(shared=True):
-                log.warning(f'several lights answer as {event.address}: parameters stay as '
-                            'they are', 'shared')
+            case events.StatesChanging(is_changing=True):
+                log.warning(f'{changing_states(event.address)}; parameters stay as they are '
+                            'meanwhile', 'changing')
             case events.LightRestarted(was_on=was_on, is_on=is_on):
                 log.info(f'{light} has restarted', 'restart')
                 if was_on and is_on is False:
@@ -143,19 +143,14 @@ class EventPublisher:
             case events.AutomaticSwitch(on=on, reason=reason, failure=''):
                 log.warning(f'{light} is switched {_state(on)} by {reason}', 'automatic')
             case events.AutomaticSwitch(on=on, failure=failure):
-                log.error(f'{light}: {_state(on).upper()} is not confirmed and will be repeated: '
-                          f'{failure}', 'automatic')
-            case events.ChangedByOther(change=new, undone=False):
-                log.error(f'{light}: another sender repeatedly changes it to {new}; the bridge no '
-                          'longer undoes this. Let only one program control the light',
-                          'repeated change')
-            case events.ChangedByOther(change=new):
-                log.warning(f'{light}: another sender has changed it to {new}; the bridge undoes '
-                            'this', 'changed')
+                log.warning(f'{light}: {_state(on).upper()} is not confirmed and will be '
+                            f'repeated: {failure}', 'automatic')
             case events.ConfigurationChanged():
                 self._configuration_changed(event)
             case events.ConfigurationRestored(success=True, message=message):
                 log.info(f'{light} configured: {message}', 'configured')
+            case events.ConfigurationRestored(message=message, is_final=False):
+                log.warning(f'{light} not configured: {message}', 'not configured')
             case events.ConfigurationRestored(message=message):
                 log.error(f'{light} not configured: {message}', 'not configured')
             case events.SetpointFailed(message=message):
@@ -167,7 +162,8 @@ class EventPublisher:
                 if impossible:
                     log.error(f'{light}: {impossible}', 'impossible limit')
                 if excess:
-                    log.warning(f'{light}: {", ".join(excess)}', 'limit exceeded')
+                    again = '; it does not keep the limit' if event.is_again else ''
+                    log.warning(f'{light}: {", ".join(excess)}{again}', 'limit exceeded')
         if isinstance(event, _DIAGNOSED):
             self._check_diagnostics()
 
@@ -207,6 +203,9 @@ class EventPublisher:
             by = self._by(event.address, CONFIGURE)
             self._log.info(f'light {event.address} was changed: {configuration.describe(names)}'
                            f'{by and " by"}{by}', 'changed')
+        elif event.cause is events.ChangeCause.LATE_EFFECT:
+            self._log.info(f'light {event.address}: {configuration.describe(names)}, '
+                           f'{events.LATE_EFFECT}', 'changed')
         self._parameters.show({name: _value(configuration, name) for name in names})
 
     def _fit(self) -> None:

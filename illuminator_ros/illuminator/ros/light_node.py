@@ -33,7 +33,7 @@ from ..events import LightEvent
 from ..light import Light
 from ..model import checked, InvalidValue, SafetyLimits
 from ...mavlink.messages import Address
-from ...payload.attempt import Result
+from ...payload.confirmed_command import Result
 from ...payload.rotation import Quaternion
 from ...ros import node as ros_node
 from ...ros.command_sources import prefixes, release_services, SOURCE

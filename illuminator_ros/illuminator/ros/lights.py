@@ -30,7 +30,7 @@ from ..client import enable_all, IlluminatorClient
 from ..light import Light
 from ...mavlink.command_sender import CommandSender
 from ...mavlink.messages import Address
-from ...payload.attempt import Done, Result
+from ...payload.confirmed_command import Done, Result
 from ...ros.device_nodes import DeviceNodes
 from ...ros.node import Answer, CommandTopic, Endpoint, RequestService, SWITCH_QOS
 from ...ros.parameters import ChangeableParameters, Values

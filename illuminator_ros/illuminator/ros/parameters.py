@@ -72,8 +72,6 @@ LIGHT_PARAMETERS = (
     ParameterSpec('off_after_silence', 0.0,
                   'silence of all sources that switches a light off; 0 = never', 's',
                   0.0, 3600.0, restricts=True, changeable=True),
-    ParameterSpec('external_changes', 'follow', 'answer to changes by other senders',
-                  choices=('follow', 'reassert'), restricts=True, changeable=True),
 )
 
 DEVICE_PARAMETERS = (
@@ -132,8 +130,7 @@ def settings(values: Values) -> Settings:
     return Settings(values['heartbeat_timeout'], values['status_interval'],
                     values['restore_configuration'],
                     SafetyLimits(values['max_brightness'], values['min_strobe_period']),
-                    values['off_after_silence'], values['external_changes'] == 'reassert',
-                    sources, off)
+                    values['off_after_silence'], sources, off)
 
 
 def check_not_loosened(values: Values, start: Values) -> None:

@@ -1,0 +1,270 @@
+# Copyright 2026 The illuminator_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""The switch of a light: whether it should be on, and what it shows."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+import math
+
+from . import events
+from .commands import SWITCHES
+from .model import Mode, Status
+from ..mavlink.command_sender import format_seconds
+from ..mavlink.dialect import mavlink
+from ..payload.confirmed_command import Done, Result, Target
+from ..payload.device_property import Caller, Desired, Outcome, Property
+
+ON, OFF = SWITCHES[True], SWITCHES[False]
+
+
+@dataclass
+class Silence:
+    """
+    The dead man's switch: how long nothing has been requested. Times are s.
+
+    :param limit: after which a light that is on is switched off; 0 for never.
+    :param requested_at: the last request that counts, or the ON of another sender.
+    :param called_at: when the newest call under way was made; -inf if there is none.
+    """
+
+    limit: float
+    requested_at: float = -math.inf
+    called_at: float = -math.inf
+
+    @property
+    def ends_at(self) -> float:
+        """Return when it is over, infinity for never."""
+        if not self.limit:
+            return math.inf
+        return self.limit + max(self.requested_at, self.called_at)
+
+
+class Switch:
+    """
+    Switches one light on and off. No I/O; times are s.
+
+    :param emit: takes the events.
+    :param off_after_silence: s without a request after which a light that is on is switched off;
+        0 for never.
+    :ivar enabled: as reported, None if unknown.
+    :ivar silence: of all who may request something.
+    :ivar outcomes: of the values that have ended, which :meth:`take_outcomes` returns.
+    """
+
+    def __init__(
+        self, target: Target, emit: Callable[[events.LightEvent], None], off_after_silence: float,
+    ) -> None:
+        self.enabled: bool | None = None
+        self._target = target
+        self._emit = emit
+        self.silence = Silence(off_after_silence)
+        self._property: Property[Status] = Property(target)
+        self.outcomes = self._property.outcomes
+        self._asked: Desired[Status] | None = None
+        # The OFF of a release, until the light shows it.
+        self._required: Desired[Status] | None = None
+        # Takes the results of the OFF at the end of the process.
+        self._report: Done | None = None
+        self._is_finally_off = False
+        self._silence_due = math.inf
+        # The state and the failure that were reported last.
+        self._told: bool | None = None
+        self._told_failure = ''
+        self._was_hot = False
+
+    # The desired value
+
+    def goal(self, now: float) -> Desired[Status] | None:
+        """Return the value that the switch should have, None if any is fine."""
+        if self._report is not None:
+            is_due = self.enabled or not self._is_finally_off
+            return Desired(OFF, 'the end', insists=True, is_last=True) if is_due else None
+        if now >= self.silence.ends_at and self.may_be_on(now):
+            return Desired(OFF, 'off_after_silence: no request for '
+                           f'{format_seconds(self.silence.limit)}', insists=True)
+        return self._asked or self._required
+
+    def is_off_due(self, now: float) -> bool:
+        """Return whether an OFF is desired that is not under way."""
+        desired = self.goal(now)
+        return desired is not None and desired.change == OFF and not self.is_off_pending
+
+    def update(self, now: float) -> None:
+        """Send what the goal asks for; the light must be connected."""
+        desired = self.goal(now)
+        under_way = self._property.desired
+        if desired is not None and (under_way is None or not under_way.equals(desired)):
+            self._want(desired, now)
+        command = self._property.command
+        if command is not None and command.terms.insists:
+            self._tell_failure(command.failure(), now)
+        waits = self.silence.limit and self.may_be_on(now) and not self.is_off_pending
+        self._silence_due = self.silence.ends_at if waits else math.inf
+
+    def _want(self, desired: Desired[Status], now: float, caller: Caller | None = None) -> None:
+        if desired.insists and self._report is None:
+            self._emit(events.AutomaticSwitch(self._target.address, False, desired.reason))
+        self._told_failure = ''
+        self._property.want(desired, now, caller)
+
+    def _tell_failure(self, failure: str, now: float) -> None:
+        """Report why an automatic OFF is not confirmed: once, or each reason at the end."""
+        if not failure or failure == self._told_failure:
+            return
+        if self._report is not None:
+            self._report(Result(False, failure), now)
+        elif not self._told_failure:
+            assert self._property.desired is not None
+            self._emit(events.AutomaticSwitch(
+                self._target.address, False, self._property.desired.reason, failure))
+        self._told_failure = failure
+
+    # Requests
+
+    def ask(self, on: bool, now: float, caller: Caller) -> None:
+        """Switch the light on or off; the light must be connected."""
+        self._asked = Desired(SWITCHES[on])
+        self._want(self._asked, now, caller)
+
+    def require_off(self, reason: str) -> None:
+        """Switch the light off until it shows that, or a request switches it on."""
+        self._required = Desired(OFF, reason, insists=True)
+
+    def fence_until(self, fence: float) -> None:
+        """Count nothing before a time: commands that may switch the light are under way."""
+        self._property.fence = max(self._property.fence, fence)
+
+    def cancel(self, message: str, now: float, *, superseded: bool = False) -> None:
+        """End the command under way; an automatic OFF is sent again by the next update."""
+        self._asked = None
+        self._property.cancel(message, now, superseded=superseded)
+
+    def close(self, message: str, now: float) -> None:
+        """End everything that is desired, since the process ends."""
+        self.silence.limit, self._required = 0.0, None
+        self.cancel(message, now, superseded=True)
+
+    def switch_off_finally(self, now: float, report: Done) -> None:
+        """Switch the light off whenever it may be on; see :meth:`.light.Light.close`."""
+        self._report, self._is_finally_off = report, False
+        report(Result(False, 'sent, not confirmed' if now < self._property.fence else ''), now)
+
+    # Known facts
+
+    @property
+    def is_pending(self) -> bool:
+        """Whether a command is under way."""
+        return self._property.command is not None
+
+    @property
+    def is_off_pending(self) -> bool:
+        """Whether an OFF is under way."""
+        return self._property.is_pending(OFF)
+
+    @property
+    def sent_at(self) -> float:
+        """When a switch was last sent, s."""
+        return self._property.sent_at
+
+    def expects(self, status: Status) -> bool:
+        """Return whether a status shows what the command under way changes."""
+        desired = self._property.desired
+        return desired is not None and desired.change.shown_by(status) is True
+
+    def may_be_on(self, now: float) -> bool:
+        """Return whether the light is on, or may go on by an ON of ours."""
+        return bool(
+            self.enabled or self._property.is_pending(ON)
+            or self._property.unconfirmed(now) == ON
+            and (self.enabled is None or now < self._property.fence))
+
+    # Reports
+
+    def reported(
+        self, status: Status, now: float, *, may_be_ours: bool, is_told: bool,
+    ) -> None:
+        """
+        Take a status that is not older than those before.
+
+        :param may_be_ours: whether a configuration of ours may have switched the light.
+        :param is_told: whether a change that no command under way has made is reported.
+        """
+        before, self.enabled = self.enabled, status.enabled
+        is_late = self._is_late(now)
+        if self.enabled and is_told and not self.is_pending and (
+                before is None or not (before or is_late or may_be_ours or self._was_hot)):
+            # Another sender has switched it on, or it was on when it was found.
+            self.silence.requested_at = now
+        if self.enabled is False and not self.is_pending:
+            self._required = None
+        self._property.reported(status, now)
+        self._was_hot = bool(
+            status.error_flags & mavlink.ILLUMINATOR_ERROR_FLAGS_OVER_TEMPERATURE_SHUTDOWN)
+        if not self.outcomes and not self.is_pending:
+            origin = (events.LATE_EFFECT if is_late else
+                      events.A_REQUEST if may_be_ours else events.OTHER_SENDER)
+            is_told = is_told and not (
+                self._told is None or status.is_dimmed or status.mode is Mode.EXTERNAL_SYNC)
+            self._tell(origin if is_told else '')
+
+    def _is_late(self, now: float) -> bool:
+        """Return whether the state is that of a command of ours that ended unconfirmed."""
+        return self.enabled is not None and (
+            self._property.unconfirmed(now) == SWITCHES[self.enabled])
+
+    def _tell(self, origin: str) -> None:
+        """Report a state that differs from the one that was reported last."""
+        if self.enabled is not None and self.enabled is not self._told:
+            self._told = self.enabled
+            if origin and not self._target.commands.refusal:
+                self._emit(events.LightSwitched(self._target.address, self.enabled, origin))
+
+    def restarted(self, status: Status, now: float) -> None:
+        """Take the first status after a restart, which confirms nothing."""
+        self.enabled = status.enabled
+        self._tell('')
+        self._property.restarted(status, now)
+
+    def take_outcomes(self, now: float) -> Iterator[Outcome[Status]]:
+        """Return what has ended."""
+        while self.outcomes:
+            outcome = self.outcomes.popleft()
+            desired, result, on = outcome.desired, outcome.result, outcome.desired.change == ON
+            under_way = self._property.desired
+            if self._asked and not (under_way and under_way.equals(self._asked)):
+                self._asked = None
+            if result.success:
+                self.enabled = on
+                self._required = None
+                self._is_finally_off = not on
+                detail = next((one.detail for one in outcome.callers if one.detail), '')
+                self._tell(detail or desired.reason or events.A_REQUEST)
+                if self._report is not None and not on:
+                    self._report(result, now)
+            elif self._is_late(now):
+                self._tell(events.LATE_EFFECT)
+            yield outcome
+
+    # Time
+
+    def poll(self, now: float) -> None:
+        """Do what is due."""
+        self._property.poll(now)
+
+    def next_deadline(self) -> float:
+        """Return when :meth:`poll` or :meth:`update` has something to do."""
+        return min(self._property.next_deadline(), self._silence_due)

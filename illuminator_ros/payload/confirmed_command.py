@@ -1,0 +1,428 @@
+# Copyright 2026 The illuminator_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+One command that changes a device: the status decides, the acknowledgement explains.
+
+MAV_RESULT_ACCEPTED says that the command is valid and is executed, not that it is completed
+(command protocol). So a change has succeeded when a status that was sent after the command shows
+it, and nothing else is a success. Each try carries a request for the status, so that both answers
+come in one round trip.
+
+A status counts if it came after an acknowledgement of the command, or after its last try, and
+after the fence: where the command before it ended unconfirmed, its frames and answers may still be
+under way. Within the fence only a status counts that nothing but this command can have caused.
+Nothing is concluded from the clock of the device.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+import math
+from typing import Generic, NamedTuple, Protocol, TypeVar
+
+from ..mavlink.command_sender import (
+    Command,
+    CommandResult,
+    CommandSender,
+    CommandStatus,
+    format_seconds,
+    Position,
+    request_message,
+    timing,
+)
+from ..mavlink.dialect import MAV_RESULT_COMMAND_UNSUPPORTED_MAV_FRAME, mavlink
+from ..mavlink.messages import Address, result_name
+
+# s from the acknowledgement, or the last try, or the end of the fence, to the status that shows
+# the change.
+CONFIRMATION_TIMEOUT = 1.0
+# s after the last frame of an unconfirmed command in which its frames and answers may come.
+FENCE = 1.5
+# s between requests for the status after one that does not show the change; the last one repeats.
+REQUEST_WAITS = (0.05, 0.1, 0.2, 0.25)
+# s between tries within the fence, and of a command that is sent until a status shows the change;
+# so often, and s between the tries after these.
+REPEAT_INTERVAL = 0.25
+QUICK_REPEATS = 10
+SLOW_REPEAT_INTERVAL = 2.0
+# Tries after which a status counts though none of them was acknowledged, where there is no last.
+ENOUGH_TRIES = 3
+# s; a command ends after this time even if the device still reports progress.
+PROGRESS_LIMIT = 30.0
+
+PERMANENT_RESULTS = frozenset((
+    mavlink.MAV_RESULT_DENIED, mavlink.MAV_RESULT_UNSUPPORTED,
+    MAV_RESULT_COMMAND_UNSUPPORTED_MAV_FRAME,
+    mavlink.MAV_RESULT_COMMAND_LONG_ONLY, mavlink.MAV_RESULT_COMMAND_INT_ONLY))
+
+# The ends of the protocol that end even a command that insists: nothing can be sent any more.
+ENDS_REPEATING = frozenset((CommandStatus.CLOSED, CommandStatus.LINK_LOST))
+
+S = TypeVar('S')
+S_contra = TypeVar('S_contra', contravariant=True)
+
+
+class Target(NamedTuple):
+    """
+    The device that commands go to.
+
+    :param kind: a noun for it, such as ``light``.
+    :param status_id: the message id of its status, None if no status shows what the commands
+        change: then the acknowledgement decides.
+    :param status_source: the component that sends the status, None for the device itself.
+    :param needs_status: whether only a status makes a change a success, even if none has ever
+        come.
+    """
+
+    address: Address
+    commands: CommandSender
+    kind: str
+    status_id: int | None = None
+    status_name: str = ''
+    status_source: Address | None = None
+    needs_status: bool = False
+
+    @property
+    def status_request(self) -> Command | None:
+        """Return the command that requests the status, None if there is no status."""
+        return (None if self.status_id is None
+                else request_message(self.status_source or self.address, self.status_id))
+
+
+class Change(Protocol[S_contra]):
+    """
+    A value of a property of a device, and the command that sets it.
+
+    Two changes are equal if they set the same values.
+    """
+
+    @property
+    def command(self) -> int:
+        """Return the MAV_CMD that makes it."""
+
+    @property
+    def params(self) -> tuple[float, ...]:
+        """Return the params of the command."""
+
+    @property
+    def position(self) -> Position | None:
+        """Return the position of the command, which makes it a COMMAND_INT; None for none."""
+
+    @property
+    def is_idempotent(self) -> bool:
+        """Return whether the command may be sent twice; one that may not is sent once."""
+
+    @property
+    def is_repeated(self) -> bool:
+        """
+        Return whether it is sent again if the device has accepted it and does not show it.
+
+        That undoes what another sender has changed meanwhile, so it is for a safe state only.
+        """
+
+    @property
+    def goal(self) -> str:
+        """Describe the state to be reached, for people."""
+
+    @property
+    def note(self) -> str:
+        """Describe a change that was not requested but comes with it, '' if there is none."""
+
+    def shown_by(self, status: S_contra) -> bool | None:
+        """Return whether a status shows the change; None if it cannot show it."""
+
+    def evidence(self, status: S_contra) -> str:
+        """Describe how far a status that does not contradict shows the change, for people."""
+
+    def actual(self, status: S_contra) -> str:
+        """Describe the state that a status shows instead, for people."""
+
+
+class Result(NamedTuple):
+    """
+    The outcome of a request.
+
+    :param success: whether the device accepted it and, if it sends a status, shows it.
+    :param message: the outcome for people.
+    :param refused: whether the device answered with another result than ACCEPTED.
+    :param permanent: whether the same request will fail again.
+    :param contradicted: whether the device accepted it and then showed something else.
+    :param superseded: whether a newer request replaced it.
+    :param note: a change that was not asked for but came with it, for people, '' if none.
+    """
+
+    success: bool
+    message: str
+    refused: bool = False
+    permanent: bool = False
+    contradicted: bool = False
+    superseded: bool = False
+    note: str = ''
+
+
+Done = Callable[[Result, float], None]
+
+
+class Terms(NamedTuple):
+    """
+    What a command is sent under. Times are s.
+
+    :param asked_at: when the change was requested.
+    :param limit_at: the time by which the command ends, infinity for none.
+    :param fence: the time before which frames of other commands may be under way.
+    :param is_sole_cause: whether none of these can have caused a status that shows the change.
+    :param insists: whether it goes on until a status shows the change: no refusal ends it.
+    :param is_last: whether the process ends: within the fence a status counts after
+        :data:`ENOUGH_TRIES`.
+    """
+
+    asked_at: float
+    limit_at: float = math.inf
+    fence: float = -math.inf
+    is_sole_cause: bool = False
+    insists: bool = False
+    is_last: bool = False
+
+
+class ConfirmedCommand(Generic[S]):
+    """
+    One command, its acknowledgement, and the statuses since. No I/O; times are s.
+
+    :meth:`reported` and :meth:`poll` return the result when the command has ended, else None.
+
+    :param gap: the time between the last two statuses, None if none has ever come.
+    """
+
+    def __init__(
+        self, target: Target, change: Change[S], now: float, terms: Terms, *,
+        gap: float | None = None,
+    ) -> None:
+        self.change = change
+        self.terms = terms
+        self._target = target
+        self._gap = gap
+        # The end of the command protocol, which explains the outcome.
+        self._answer: CommandResult | None = None
+        # The last status that counts and shows something else.
+        self._instead: S | None = None
+        self._ends_at = self._request_due = self._repeat_due = math.inf
+        self._requests = self._acknowledged = 0
+        self._has_restarted = False
+        self._send(now)
+
+    # The command
+
+    def _send(self, now: float, tried: int = 0) -> None:
+        """Send the command: once if another try is due anyway, else by the command protocol."""
+        change, target, terms = self.change, self._target, self.terms
+        is_single = not change.is_idempotent
+        self._repeat_due = math.inf
+        if change.is_idempotent and (terms.insists or now < terms.fence or self._is_accepted):
+            is_single = True
+            is_slow = terms.insists and tried >= QUICK_REPEATS
+            self._repeat_due = now + (SLOW_REPEAT_INTERVAL if is_slow else REPEAT_INTERVAL)
+            if now < terms.fence:
+                self._repeat_due = min(self._repeat_due, terms.fence)
+        elif now < terms.fence:
+            self._ends_at = terms.fence + CONFIRMATION_TIMEOUT
+            self._request_due = terms.fence
+        self._sending = target.commands.start(
+            Command(target.address, change.command, change.params, position=change.position),
+            now, self._answered, deadline=self._limit, retries=0 if is_single else None,
+            tried=tried, follow_up=target.status_request)
+
+    @property
+    def _limit(self) -> float:
+        """Return when it ends even if the device still reports progress."""
+        terms = self.terms
+        return min(terms.limit_at,
+                   math.inf if terms.insists else terms.asked_at + PROGRESS_LIMIT)
+
+    @property
+    def is_under_way(self) -> bool:
+        """Whether a try, or the answer to it, may be under way: not each was acknowledged."""
+        return self._sending.tries > self._acknowledged
+
+    @property
+    def last_sent(self) -> float:
+        """When it was sent last, s."""
+        return self._sending.last_sent
+
+    def restarted(self, now: float) -> None:
+        """Send it again: the device has restarted, and nothing from before counts."""
+        self._has_restarted = True
+        if self.change.is_idempotent:
+            self.terms = self.terms._replace(fence=now + FENCE, is_sole_cause=False)
+            self._answer = self._instead = None
+            self._ends_at = self._request_due = math.inf
+            self._send(now, self._sending.tries)
+
+    def withdraw(self, now: float) -> None:
+        """Send it no more."""
+        self._target.commands.cancel(self._sending, now)
+
+    # The acknowledgement
+
+    @property
+    def _is_accepted(self) -> bool:
+        return self._answer is not None and self._answer.accepted
+
+    def _answered(self, answer: CommandResult, now: float) -> None:
+        if answer.status is CommandStatus.ANSWERED:
+            self._acknowledged += 1
+            # Within the fence it may be the answer to an earlier command.
+            if now < self.terms.fence or self._answer is not None and not self.terms.insists:
+                return
+            if self._answer is None:
+                self._ends_at = now + CONFIRMATION_TIMEOUT
+                self._request_due = now + REQUEST_WAITS[0]
+            self._answer = answer
+            if self._target.status_id is None or answer.refused and self._gap is None:
+                self._ends_at = now
+        elif answer.status is CommandStatus.NO_ANSWER:
+            # A single try is followed by others.
+            if self._repeat_due == math.inf:
+                self._answer = answer
+                self._ends_at = self.last_sent + CONFIRMATION_TIMEOUT
+        elif answer.status is not CommandStatus.CANCELLED:
+            self._answer = answer
+            self._ends_at = now
+
+    # The status
+
+    def _counts(self, now: float) -> bool:
+        """Return whether a status that comes now was sent after the command, as far as known."""
+        sending = self._sending
+        if now < self.terms.fence:
+            return self.terms.is_last and sending.tries >= ENOUGH_TRIES
+        if sending.result is not None or self._answer is not None:
+            return True
+        return sending.tries >= ENOUGH_TRIES if self.terms.insists else sending.is_last_try
+
+    def reported(self, status: S, gap: float, now: float) -> Result | None:
+        """
+        Take a status that is not older than those before.
+
+        :param gap: since the one before.
+        """
+        self._gap = gap
+        change, terms = self.change, self.terms
+        shown = change.shown_by(status)
+        if not (self._counts(now) or shown and terms.is_sole_cause and now < terms.fence):
+            return None
+        if shown or shown is None and self._is_accepted:
+            answer = self._protocol()
+            return self._result(f'{change.goal}, {change.evidence(status)}' + (
+                ', without an acknowledgement' if answer.result is None
+                else f': {result_name(answer.result)}'), now, success=True)
+        if shown is False:
+            self._instead = status
+        if self.terms.insists:
+            return None
+        if self._answer is not None and self._answer.refused:
+            return self._expired(now)
+        if self._is_accepted and change.is_repeated and self._repeat_due == math.inf:
+            self._repeat_due = self.last_sent + REPEAT_INTERVAL
+        return None
+
+    # Time
+
+    def poll(self, now: float) -> Result | None:
+        """Send what is due, or end."""
+        if now >= self._end:
+            return self._expired(now)
+        if now >= self._repeat_due:
+            self._send(now, self._sending.tries)
+        if now >= self._request_due:
+            self._requests += 1
+            self._request_due = now + REQUEST_WAITS[min(self._requests, len(REQUEST_WAITS) - 1)]
+            if request := self._target.status_request:
+                self._target.commands.send_once(request)
+        return None
+
+    @property
+    def _end(self) -> float:
+        """Return when it ends without success, s."""
+        if not self.terms.insists:
+            return min(self._ends_at, self._limit)
+        is_over = self._answer is not None and self._answer.status in ENDS_REPEATING
+        return self._ends_at if is_over else math.inf
+
+    def next_deadline(self) -> float:
+        """Return when :meth:`poll` has something to do."""
+        return min(self._end, self._repeat_due, self._request_due)
+
+    # The result
+
+    def _protocol(self) -> CommandResult:
+        """Return the end of the command protocol, or how far it has come."""
+        sending = self._sending
+        unfinished = (CommandStatus.NO_ANSWER if sending.result is None
+                      else CommandStatus.OUT_OF_TIME)
+        return self._answer or CommandResult(
+            unfinished, sending.result, progress=sending.progress)
+
+    def failure(self) -> str:
+        """Return why it is not confirmed so far, for people; '' if nothing has come."""
+        answer = self._answer
+        if answer is None or answer.refused:
+            return '' if answer is None else answer.describe_failure()
+        shown = self._shown_instead()
+        return f'{self.change.goal} not confirmed: {answer.describe()}{shown and ", but " + shown}'
+
+    def _shown_instead(self) -> str:
+        if self._instead is None:
+            return ''
+        return f'{self._target.status_name} shows {self.change.actual(self._instead)}'
+
+    def _expired(self, now: float) -> Result:
+        change, target, answer = self.change, self._target, self._answer
+        shown = self._shown_instead()
+        if answer is None and now < self.terms.fence:
+            text = 'an earlier command may still be under way'
+            return self._result(f'{change.goal} not confirmed: {text}', now)
+        if answer is None or not (answer.accepted or answer.refused):
+            return self._result(
+                self._protocol().describe() + (f', and {shown}' if shown else ''), now,
+                superseded=answer is not None and answer.status is CommandStatus.CLOSED)
+        if answer.refused:
+            return self._result(answer.describe_failure(), now, refused=True,
+                                permanent=answer.result in PERMANENT_RESULTS)
+        if target.status_id is None:
+            return self._result(answer.describe(), now, success=True)
+        if self._gap is None and not target.needs_status:
+            return self._result(
+                f'{change.goal}, accepted, not confirmed (the {target.kind} sends no '
+                f'{target.status_name}): {answer.describe()}', now, success=True)
+        if shown:
+            reason = f', but {shown}'
+        elif self._gap is not None and self._gap > CONFIRMATION_TIMEOUT:
+            reason = f'; its next status is due within {math.ceil(self._gap)} s'
+        else:
+            reason = (f', but no {target.status_name} came within '
+                      f'{format_seconds(CONFIRMATION_TIMEOUT)}')
+        return self._result(f'{change.goal} not confirmed: {answer.describe()}{reason}', now,
+                            contradicted=bool(shown))
+
+    def _result(
+        self, text: str, now: float, *, success: bool = False, **flags: bool,
+    ) -> Result:
+        if self._answer is not None and self._answer.status is CommandStatus.CLOSED:
+            return Result(False, text, superseded=True)
+        if self._has_restarted:
+            text += f'; the {self._target.kind} restarted meanwhile'
+        took = timing(self._sending.tries, now - self.terms.asked_at)
+        return Result(success, f'{text} ({took})', note=self.change.note if success else '',
+                      **flags)

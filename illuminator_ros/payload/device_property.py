@@ -1,0 +1,258 @@
+# Copyright 2026 The illuminator_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+One property of a device: the value that it should have, and the command that moves it there.
+
+The owner decides which value is desired (one function, ``goal``), hands it to
+:meth:`Property.want`, and takes the :class:`Outcome` of each value from
+:attr:`Property.outcomes`: nothing is called back.
+"""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Iterable
+import contextlib
+from dataclasses import dataclass
+import math
+from typing import Generic, NamedTuple, TypeVar
+
+from .confirmed_command import Change, ConfirmedCommand, Done, FENCE, Result, Target, Terms
+from ..mavlink.command_sender import Position
+
+S = TypeVar('S')
+# What a command sets: MAV_CMD, params and position.
+Value = tuple[int, tuple[float, ...], Position | None]
+# Callers that may wait for one value.
+MAX_CALLERS = 32
+# s in which a command that ended unconfirmed may still take effect.
+LATE_TIME = 30.0
+# Values whose frames may be under way at once; with more, nothing counts before they have passed.
+MAX_VALUES = 16
+
+
+class Caller(NamedTuple):
+    """
+    One that waits for the outcome of a value.
+
+    :param asked_at: s.
+    :param source: of the request, '' where there are none.
+    :param is_stream: whether it is one of a stream: a newer one replaces it.
+    :param detail: how it was requested, for people.
+    """
+
+    done: Done
+    asked_at: float
+    source: str = ''
+    is_stream: bool = False
+    detail: str = ''
+
+
+@dataclass(frozen=True)
+class Desired(Generic[S]):
+    """
+    A value that a property should have.
+
+    :param reason: why, for people, '' for a request.
+    :param limit: s from the request within which a command ends.
+    :param insists: whether it is sent until a status shows it, whatever the device answers.
+    :param is_last: whether the process ends, which cannot await the end of the fence.
+    """
+
+    change: Change[S]
+    reason: str = ''
+    limit: float = math.inf
+    insists: bool = False
+    is_last: bool = False
+
+    def equals(self, other: Desired[S]) -> bool:
+        """Return whether both set the same value in the same way."""
+        return ((_value(self.change), self.insists, self.is_last)
+                == (_value(other.change), other.insists, other.is_last))
+
+
+def _value(change: Change[S]) -> Value:
+    return change.command, change.params, change.position
+
+
+@dataclass(frozen=True)
+class Outcome(Generic[S]):
+    """
+    The end of a desired value.
+
+    :param status: the status that shows it, None if none does.
+    :param callers: who waits for it.
+    """
+
+    desired: Desired[S]
+    result: Result
+    status: S | None = None
+    callers: tuple[Caller, ...] = ()
+
+
+def answer(callers: Iterable[Caller], result: Result, now: float) -> None:
+    """Answer callers, even if one of them raises an exception."""
+    with contextlib.ExitStack() as answers:
+        for caller in callers:
+            answers.callback(caller.done, result, now)
+
+
+class Property(Generic[S]):
+    """
+    Moves one property of a device to its desired value. No I/O; times are s.
+
+    At most one command is under way. A caller of another value replaces it, and its callers are
+    answered "superseded". A caller of the same value waits for the next command, since nothing
+    that was sent before it asked may confirm its request.
+
+    :ivar desired: the value that is wanted and not yet reached or given up; None if there is none.
+    :ivar command: the command that moves it there.
+    :ivar outcomes: of the values that have ended, for the owner to take.
+    :ivar newest: the newest status, None before the first.
+    :ivar newest_at: when it came, s.
+    :ivar sent_at: when a command was sent last, s.
+    :ivar fence: until then the frames of a command that ended unconfirmed may be under way, s.
+    """
+
+    def __init__(self, target: Target) -> None:
+        self.desired: Desired[S] | None = None
+        self.command: ConfirmedCommand[S] | None = None
+        self.outcomes: deque[Outcome[S]] = deque()
+        self.newest: S | None = None
+        self.newest_at = self.sent_at = self.fence = -math.inf
+        self._target = target
+        self._gap: float | None = None
+        self._callers: list[Caller] = []
+        self._next_callers: list[Caller] = []
+        self._unconfirmed: Change[S] | None = None
+        # The values whose frames may be under way before the fence.
+        self._under_way: set[Value] = set()
+
+    def want(self, desired: Desired[S], now: float, caller: Caller | None = None) -> None:
+        """Move the property to a value; callable again with the same one."""
+        before = self.desired
+        if before is not None and before.equals(desired):
+            if caller is not None:
+                self._join(caller, now)
+            return
+        if before is not None:
+            self.cancel(desired.reason or f'superseded by {desired.change.goal}', now,
+                        superseded=True)
+        self._start(desired, [caller] if caller else [], now)
+
+    def _join(self, caller: Caller, now: float) -> None:
+        """Keep a caller for the next command of the same value."""
+        assert self.desired is not None
+        if caller.is_stream:
+            older = tuple(one for one in self._next_callers if one.is_stream)
+            self._next_callers = [one for one in self._next_callers if not one.is_stream]
+            self.outcomes.append(Outcome(self.desired, Result(
+                False, f'superseded by {self.desired.change.goal}', superseded=True), None, older))
+        elif len(self._callers) + len(self._next_callers) >= MAX_CALLERS:
+            self.outcomes.append(Outcome(self.desired, Result(
+                False, f'{MAX_CALLERS} requests are waiting for {self._target.kind} '
+                f'{self._target.address} already'), None, (caller,)))
+            return
+        self._next_callers.append(caller)
+
+    def _start(self, desired: Desired[S], callers: list[Caller], now: float) -> None:
+        asked_at = callers[0].asked_at if callers else now
+        if now >= self.fence:
+            self._under_way.clear()
+        self.desired, self._callers, self.sent_at = desired, callers, now
+        terms = Terms(asked_at, asked_at + desired.limit, self.fence,
+                      self._is_sole_cause(desired), desired.insists, desired.is_last)
+        self.command = ConfirmedCommand(
+            self._target, desired.change, now, terms, gap=self._gap)
+
+    def _is_sole_cause(self, desired: Desired[S]) -> bool:
+        """
+        Return whether a status that shows a change proves it though other frames are under way.
+
+        It does if the newest status does not show it, and no other value has been sent between
+        an equal one and this one. Only a value that has no time to await the end of the fence
+        needs that: a program that sets it each second would be locked out by one failure.
+        """
+        if desired.limit > FENCE:
+            return False
+        change = desired.change
+        others = self._under_way - {_value(change)}
+        is_new = len(others) == len(self._under_way) < MAX_VALUES or not others
+        return is_new and self.newest is not None and change.shown_by(self.newest) is False
+
+    def cancel(self, message: str, now: float, *, superseded: bool = False) -> None:
+        """Give up the desired value, and send its command no more."""
+        if self.command is not None:
+            self.command.withdraw(now)
+            self._end(Result(False, message, superseded=superseded), None, now, goes_on=False)
+
+    def reported(self, status: S, now: float) -> None:
+        """Take a status that is not older than those before."""
+        self._gap = now - self.newest_at if self.newest is not None else 0.0
+        self.newest, self.newest_at = status, now
+        if (self._unconfirmed is not None and now >= self.fence
+                and self._unconfirmed.shown_by(status)):
+            self._unconfirmed = None
+        if self.command is not None:
+            result = self.command.reported(status, self._gap, now)
+            if result is not None:
+                self._end(result, status if result.success else None, now)
+
+    def restarted(self, status: S, now: float) -> None:
+        """Take the first status after a restart of the device, which confirms nothing."""
+        self.newest, self.newest_at = status, now
+        if self.command is not None:
+            self.command.restarted(now)
+
+    def poll(self, now: float) -> None:
+        """Do what is due."""
+        if self.command is not None and (result := self.command.poll(now)) is not None:
+            self._end(result, None, now)
+
+    def next_deadline(self) -> float:
+        """Return when :meth:`poll` has something to do."""
+        if self.outcomes:
+            return -math.inf
+        return self.command.next_deadline() if self.command is not None else math.inf
+
+    def _end(
+        self, result: Result, status: S | None, now: float, *, goes_on: bool = True,
+    ) -> None:
+        """End the command; go on for those who have asked for its value since it was sent."""
+        command, desired = self.command, self.desired
+        assert command is not None and desired is not None
+        callers, waiting = self._callers, self._next_callers
+        self.command, self.desired, self._callers, self._next_callers = None, None, [], []
+        is_settled = result.success or result.refused
+        self._unconfirmed = None if is_settled else desired.change
+        if not result.success or command.is_under_way:
+            self.fence = max(self.fence, command.last_sent + FENCE)
+        if now < self.fence and len(self._under_way) < MAX_VALUES:
+            self._under_way.add(_value(desired.change))
+        if waiting and goes_on:
+            self._start(desired, waiting, now)
+        else:
+            callers += waiting
+        self.outcomes.append(Outcome(desired, result, status, tuple(callers)))
+
+    # Known facts
+
+    def is_pending(self, change: Change[S]) -> bool:
+        """Return whether a change is under way."""
+        return self.desired is not None and self.desired.change == change
+
+    def unconfirmed(self, now: float) -> Change[S] | None:
+        """Return the change of the last command if it ended unconfirmed and may have an effect."""
+        return self._unconfirmed if now <= self.sent_at + LATE_TIME else None

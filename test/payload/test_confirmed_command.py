@@ -1,0 +1,253 @@
+# Copyright 2026 The illuminator_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""A command is a success if a status that was sent after it shows the change, else a failure."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+from illuminator_ros.mavlink.command_sender import CommandStatus, timing
+from illuminator_ros.payload.confirmed_command import ConfirmedCommand, FENCE, Result, Terms
+import pytest
+from support.level_device import (
+    ACCEPTED,
+    Bench,
+    DENIED,
+    FAILED,
+    IN_PROGRESS,
+    Level,
+    REJECTED,
+)
+
+LEVEL_5 = Level(5)
+
+
+class CommandBench(Bench):
+    """One command for level 5 at the time 0."""
+
+    def begin(self, change: Level = LEVEL_5, *, gap: float | None = 0.5,
+              target: dict[str, Any] | None = None, **arguments: Any) -> CommandBench:
+        """Send the command; return this bench."""
+        self.result: Result | None = None
+        self.ended_at = math.nan
+        self.command: ConfirmedCommand[int | None] = ConfirmedCommand(
+            self.target(**target or {}), change, self.now, Terms(self.now, **arguments), gap=gap)
+        self.gap = gap
+        return self
+
+    def _take(self, result: Result | None) -> None:
+        if result is not None and self.result is None:
+            self.result, self.ended_at = result, round(self.now, 3)
+            self.command.withdraw(self.now)
+
+    def reported(self, level: int | None) -> None:
+        if self.result is None:
+            self._take(self.command.reported(level, self.gap or 0.0, self.now))
+
+    def poll(self) -> None:
+        if self.now >= self.next_deadline():
+            self._take(self.command.poll(self.now))
+
+    def next_deadline(self) -> float:
+        return math.inf if self.result else self.command.next_deadline()
+
+    @property
+    def ended(self) -> Result:
+        """Return the result of a command that has ended."""
+        assert self.result is not None
+        return self.result
+
+
+ONCE, SILENT, FENCED = [0.0], [0.0, 0.25, 0.75, 1.75], [0.0, 0.25, 0.5, 0.6]
+REFUSED, PERMANENT, CONTRADICTED = ('refused',), ('refused', 'permanent'), ('contradicted',)
+SHOWN, LEVEL_0 = 'level 5, confirmed by STATUS: MAV_RESULT_ACCEPTED', 'STATUS shows level 0'
+NOT_ACKNOWLEDGED = 'level 5, confirmed by STATUS, without an acknowledgement'
+INSTEAD = f'level 5 not confirmed: MAV_RESULT_ACCEPTED, but {LEVEL_0}'
+NO_STATUS = 'level 5 not confirmed: MAV_RESULT_ACCEPTED, but no STATUS came within 1.00 s'
+SENDS_NONE = ('level 5, accepted, not confirmed (the device sends no STATUS): '
+              'MAV_RESULT_ACCEPTED')
+ACCEPTS = 'level 5, accepted: MAV_RESULT_ACCEPTED'
+NO_ANSWER, DENIES = 'no acknowledgement', 'refused: MAV_RESULT_DENIED'
+IN_PROGRESS_STOPPED = ('no final acknowledgement, last answer MAV_RESULT_IN_PROGRESS at 0 %, and '
+                       'STATUS shows level 0')
+HIDES: dict[str, Any] = {'level': None, 'executes': []}
+OBEYS: dict[str, Any] = {'results': [None], 'executes': [None]}
+MUTE: dict[str, Any] = {'sends_status': False}
+SINGLE, REPEATED = ({'change': Level(5, is_idempotent=False)},
+                    {'change': Level(5, is_repeated=True)})
+
+
+# The device and the command -> success, message, when it was sent and ended, flags of the result.
+@pytest.mark.parametrize(('device', 'command', 'success', 'text', 'tries', 'ended_at', 'flags'), [
+    # A status shows the change.
+    ({}, {}, True, SHOWN, ONCE, 0.02, ()),
+    ({'level': 5, 'results': [DENIED]}, {}, True,
+     'level 5, confirmed by STATUS: MAV_RESULT_DENIED', ONCE, 0.02, ()),
+    ({'results': [None, ACCEPTED]}, {}, True, SHOWN, SILENT[:2], 0.27, ()),
+    ({'results': [REJECTED, ACCEPTED]}, {}, True, SHOWN, [0.0, 0.12], 0.14, ()),
+    ({'results': [IN_PROGRESS], 'executes': [IN_PROGRESS]}, {}, True,
+     'level 5, confirmed by STATUS: MAV_RESULT_IN_PROGRESS', ONCE, 0.02, ()),
+    # Without an acknowledgement a status counts after the last try.
+    (OBEYS, {}, True, NOT_ACKNOWLEDGED, SILENT, 1.77, ()),
+    (OBEYS, {'limit_at': 0.9}, True, NOT_ACKNOWLEDGED, SILENT[:3], 0.77, ()),
+    # It shows something else.
+    ({'executes': []}, {}, False, INSTEAD, ONCE, 1.02, CONTRADICTED),
+    ({'executes': []}, {'limit_at': 0.9}, False, INSTEAD, ONCE, 0.9, CONTRADICTED),
+    ({'executes': []}, REPEATED, False, INSTEAD, [0.0, 0.25, 0.5, 0.75, 1.0], 1.02, CONTRADICTED),
+    ({'results': [None]}, REPEATED, False, f'{NO_ANSWER}, and {LEVEL_0}', SILENT, 2.75, ()),
+    ({'results': [IN_PROGRESS]}, REPEATED, False, IN_PROGRESS_STOPPED, ONCE, 3.02, ()),
+    ({'results': [DENIED]}, {}, False, DENIES, ONCE, 0.02, PERMANENT),
+    ({'results': [FAILED]}, {}, False, 'refused: MAV_RESULT_FAILED', ONCE, 0.02, REFUSED),
+    ({'results': [None]}, {}, False, f'{NO_ANSWER}, and {LEVEL_0}', SILENT, 2.75, ()),
+    ({'results': [IN_PROGRESS]}, {}, False, IN_PROGRESS_STOPPED, ONCE, 3.02, ()),
+    # It cannot show the change.
+    (HIDES, {}, True, ACCEPTS, ONCE, 0.02, ()),
+    ({**HIDES, 'results': [DENIED]}, {}, False, DENIES, ONCE, 0.02, PERMANENT),
+    ({**HIDES, 'results': [None]}, {}, False, NO_ANSWER, SILENT, 2.75, ()),
+    # No status comes.
+    (MUTE, {}, False, NO_STATUS, ONCE, 1.02, ()),
+    (MUTE, {'gap': 9.3}, False, 'level 5 not confirmed: MAV_RESULT_ACCEPTED; its next status is '
+     'due within 10 s', ONCE, 1.02, ()),
+    ({**MUTE, 'results': [FAILED]}, {}, False, 'refused: MAV_RESULT_FAILED', ONCE, 1.02, REFUSED),
+    ({**MUTE, 'results': [None]}, {}, False, NO_ANSWER, SILENT, 2.75, ()),
+    # None has ever come.
+    (MUTE, {'gap': None}, True, SENDS_NONE, ONCE, 1.02, ()),
+    (MUTE, {'gap': None, 'target': {'needs_status': True}}, False, NO_STATUS, ONCE, 1.02, ()),
+    ({**MUTE, 'results': [DENIED]}, {'gap': None}, False, DENIES, ONCE, 0.02, PERMANENT),
+    # The device has none.
+    ({}, {'target': {'status_id': None}}, True, 'MAV_RESULT_ACCEPTED', ONCE, 0.02, ()),
+    ({'results': [DENIED]}, {'target': {'status_id': None}}, False, DENIES, ONCE, 0.02, PERMANENT),
+    # A command that is not idempotent is sent once.
+    ({'results': [None]}, SINGLE, False, f'{NO_ANSWER}, and {LEVEL_0}', ONCE, 1.0, ()),
+    (OBEYS, SINGLE, True, NOT_ACKNOWLEDGED, ONCE, 0.02, ()),
+    ({}, {'fence': FENCE, **SINGLE}, True, SHOWN, ONCE, 1.52, ()),
+    ({'executes': []}, {'fence': FENCE, **SINGLE}, False, 'not finished in time, last answer '
+     f'MAV_RESULT_ACCEPTED, and {LEVEL_0}', ONCE, 2.5, ()),
+    # Within the fence nothing counts; the command is repeated, and once more after it.
+    ({}, {'fence': FENCE}, True, SHOWN, [0.25 * number for number in range(7)], 1.52, ()),
+    ({'results': [*[DENIED] * 3, ACCEPTED]}, {'fence': 0.6}, True, SHOWN, FENCED, 0.62, ()),
+    ({'results': [*[ACCEPTED] * 3, DENIED], 'executes': []}, {'fence': 0.6}, False, DENIES,
+     FENCED, 0.62, PERMANENT),
+    ({'results': [None]}, {'fence': 0.6}, False, f'{NO_ANSWER}, and {LEVEL_0}',
+     [*FENCED, 0.85, 1.35, 2.35], 3.35, ()),
+    (MUTE, {'fence': 0.6, 'gap': None}, True, SENDS_NONE, FENCED, 1.62, ()),
+    ({}, {'fence': FENCE, 'limit_at': 0.9}, False,
+     'level 5 not confirmed: an earlier command may still be under way', [0.0, 0.25, 0.5, 0.75],
+     0.9, ()),
+    # But a status that only this command can have caused counts.
+    ({}, {'fence': FENCE, 'is_sole_cause': True}, True, SHOWN, ONCE, 0.02, ()),
+    ({'results': [DENIED]}, {'fence': 0.6, 'is_sole_cause': True}, False, DENIES, FENCED, 0.62,
+     PERMANENT),
+    (HIDES, {'fence': 0.6, 'is_sole_cause': True}, True, ACCEPTS, FENCED, 0.62, ()),
+    (OBEYS, {'is_sole_cause': True}, True, NOT_ACKNOWLEDGED, SILENT, 1.77, ()),
+    # At the end of the process a status counts after three tries, also within the fence.
+    ({}, {'fence': FENCE, 'is_last': True, 'insists': True}, True, SHOWN, [0.0, 0.25, 0.5], 0.52,
+     ()),
+    ({}, {'is_last': True, 'insists': True}, True, SHOWN, ONCE, 0.02, ()),
+    # A command that insists does without an acknowledgement after three tries, and is also sent
+    # again while the device reports progress.
+    ({'results': [IN_PROGRESS, ACCEPTED]}, {'insists': True}, True, SHOWN, [0.0, 0.25], 0.27, ()),
+    (OBEYS, {'insists': True}, True, NOT_ACKNOWLEDGED, [0.0, 0.25, 0.5], 0.52, ()),
+    ({**HIDES, 'results': [DENIED, DENIED, ACCEPTED]}, {'insists': True}, True, ACCEPTS,
+     [0.0, 0.25, 0.5], 0.52, ())])
+def test_the_result_says_what_the_statuses_show_and_the_acknowledgement_explains_it(
+    device: dict[str, Any], command: dict[str, Any], success: bool, text: str,
+    tries: list[float], ended_at: float, flags: tuple[str, ...],
+) -> None:
+    bench = CommandBench(**device).begin(**command)
+    bench.run()
+    assert (bench.ended.success, bench.tries, bench.ended_at) == (success, tries, ended_at)
+    assert bench.ended.message == f'{text} ({timing(len(tries), ended_at)})'
+    assert tuple(flag for flag in ('refused', 'permanent', 'contradicted')
+                 if getattr(bench.ended, flag)) == flags
+
+
+@pytest.mark.parametrize('fence', [-math.inf, FENCE])
+def test_a_status_before_an_acknowledgement_the_last_try_or_the_fence_does_not_confirm(
+    fence: float,
+) -> None:
+    bench = CommandBench(0, None, sends_status=False).begin(fence=fence)
+    for at in (0.005, 0.3, 1.2):
+        bench.later(at, lambda: bench.reported(5))
+    bench.run()
+    assert not bench.ended.success
+
+
+def test_each_try_carries_a_request_for_the_status_which_is_repeated_until_it_shows_the_change(
+) -> None:
+    bench = CommandBench(0, None, ACCEPTED, executes=[]).begin(Level(5, note='the fan runs too'))
+    bench.later(1.0, lambda: setattr(bench, 'level', 5))
+    bench.run()
+    assert bench.requests == [0.0, 0.25, 0.32, 0.42, 0.62, 0.87, 1.12]
+    assert [message.confirmation for message in bench.sent] == [0, 1]
+    assert (bench.ended.success, bench.ended_at) == (True, 1.14)
+    assert bench.ended.note == 'the fan runs too'
+
+
+# Insistence
+
+@pytest.mark.parametrize(('result', 'failure', 'ended_at'), [
+    (DENIED, DENIES, 20.14), (ACCEPTED, INSTEAD, 20.14), (None, '', 20.52)])
+def test_a_command_that_insists_is_sent_until_a_status_shows_the_change(
+    result: int | None, failure: str, ended_at: float,
+) -> None:
+    bench = CommandBench(0, result, executes=[]).begin(insists=True)
+    bench.run(20.0)
+    assert bench.result is None
+    assert bench.tries == [*(0.25 * number for number in range(11)),
+                           *(2.5 + 2.0 * number for number in range(1, 9))]
+    assert bench.command.failure() == failure
+    bench.level = 5
+    bench.run()
+    # Each acknowledgement is followed by requests for the status.
+    assert (bench.ended.success, bench.ended_at) == (True, ended_at)
+
+
+@pytest.mark.parametrize('insists', [False, True])
+@pytest.mark.parametrize(('status', 'text'), [
+    (CommandStatus.LINK_LOST, 'the link was lost (1 try, 100 ms)'),
+    (CommandStatus.CLOSED, 'the bridge is ending')])
+def test_a_lost_link_and_the_end_of_the_process_end_every_command(
+    insists: bool, status: CommandStatus, text: str,
+) -> None:
+    bench = CommandBench(0, None).begin(insists=insists)
+    bench.run(0.1)
+    bench.commands.end_all(bench.now, status)
+    bench.run()
+    assert (bench.ended.success, bench.ended.message) == (False, text)
+    assert bench.ended.superseded is (status is CommandStatus.CLOSED)
+
+
+# Restarts
+
+@pytest.mark.parametrize(('device', 'change', 'text', 'tries', 'ended_at'), [
+    ({}, Level(5), SHOWN, 8, 1.62),
+    ({'results': [ACCEPTED, None], 'executes': []}, Level(5), f'{NO_ANSWER}, and {LEVEL_0}', 11,
+     4.35),
+    ({'executes': []}, SINGLE['change'], INSTEAD, 1, 1.02)])
+def test_a_restart_confirms_nothing_and_a_command_that_may_be_repeated_is_sent_again(
+    device: dict[str, Any], change: Level, text: str, tries: int, ended_at: float,
+) -> None:
+    bench = CommandBench(**device, sends_status=False).begin(change, is_sole_cause=True)
+    bench.run(0.1)
+    bench.level, bench.sends_status = 0, True
+    bench.command.restarted(bench.now)
+    if change.is_idempotent:
+        bench.later(0.0, lambda: bench.reported(5))
+    bench.run()
+    assert bench.ended.message == (
+        f'{text}; the device restarted meanwhile ({timing(tries, ended_at)})')
+    assert bench.tries[1:3] == [0.1, 0.35][:tries - 1]
