@@ -230,6 +230,10 @@ def test_hostile_graph_neither_stops_nor_fills_the_monitor(
       for missing in SIGNATURE),
     (dict.fromkeys(SIGNATURE, 'std_msgs/msg/String'), {*SIGNATURE}, []),
     (SIGNATURE, {*SIGNATURE} - {'/bow/enabled'}, []),
+    # Names that leave no room for those of all topics and services, or that ROS does not have.
+    *(({topic.replace('/bow', name): type_ for topic, type_ in SIGNATURE.items()},
+       {topic.replace('/bow', name) for topic in SIGNATURE}, [])
+      for name in ('/' + 'x' * 234, '/' + 'x' * 190, '/a-b', '')),
 ])
 def test_light_is_a_node_that_publishes_all_its_signature_topics_with_their_types(
     topics: dict[str, str], publishers: set[str], found: list[str],

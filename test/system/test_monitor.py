@@ -132,6 +132,16 @@ def test_screen_follows_the_size_of_the_terminal(own_ros: Ros) -> None:
         screen.wait_for('ROS graph y( |$)')
 
 
+def test_bytes_that_are_not_utf_8_do_not_end_the_monitor(own_ros: Ros) -> None:
+    with monitor(own_ros) as screen:
+        screen.wait_for('no devices in this ROS graph yet')
+
+        screen.type(b'\xff\xe4 ')
+
+        # Keys that come with such a byte are lost.
+        eventually(lambda: screen.type('h') or 'this help' in screen.raw)
+
+
 def test_without_a_terminal_monitor_prints_a_table(own_ros: Ros) -> None:
     port = free_port()
     with (running_bridge(own_ros.domain, port, diagnostics_period=0.1) as bridge,

@@ -18,8 +18,11 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 import contextlib
+import os
 from pathlib import Path
 import re
+import socket
+import subprocess
 import sys
 import urllib.error
 import urllib.request
@@ -30,9 +33,17 @@ pytest.importorskip('textual_serve')
 
 from support.browser import Browser, IS_INSTALLED, running_browser  # noqa: E402
 from support.ports import free_port  # noqa: E402
-from support.processes import ended, is_running, Program, python, run  # noqa: E402
+from support.processes import (  # noqa: E402
+    ended,
+    environment,
+    is_running,
+    Program,
+    python,
+    ROOT,
+    run,
+)
 from support.ros import own_domain  # noqa: E402
-from support.waiting import eventually  # noqa: E402
+from support.waiting import eventually, PATIENCE  # noqa: E402
 
 MONITOR = 'illuminator_ros.monitor'
 TABS = 10
@@ -63,7 +74,7 @@ def status(url: str, **headers: str) -> int:
     """Return the status of the answer to a browser that has no cookies yet."""
     opener = urllib.request.build_opener(urllib.request.HTTPCookieProcessor())
     try:
-        with opener.open(urllib.request.Request(url, headers=headers)) as answer:
+        with opener.open(urllib.request.Request(url, headers=headers), timeout=PATIENCE) as answer:
             return int(answer.status)
     except urllib.error.HTTPError as error:
         return error.code
@@ -110,6 +121,36 @@ def assert_switches(browser: Browser, labels: list[str], state: str) -> None:
     for label in labels:
         browser.click(label)
     browser.wait_for(state)
+
+
+def test_pages_are_served_while_nothing_reads_the_output_of_the_server() -> None:
+    port = free_port()
+    reading, writing = os.pipe()
+    os.set_blocking(writing, False)
+    with contextlib.suppress(BlockingIOError):
+        while os.write(writing, b' ' * 4096):
+            pass
+    os.set_blocking(writing, True)
+    with subprocess.Popen([sys.executable, '-m', MONITOR, '--web', f'127.0.0.1:{port}'],
+                          stdout=writing, stderr=writing, env=environment(), cwd=ROOT) as server:
+        try:
+            eventually(lambda: answers(port))
+            url = f'http://127.0.0.1:{port}/'
+            assert status(url, Host='a[') == 400
+            assert status(url) == 200
+            server.terminate()
+            assert server.wait(PATIENCE) == 0
+        finally:
+            server.kill()
+            os.close(reading)
+            os.close(writing)
+
+
+def answers(port: int) -> bool:
+    with contextlib.suppress(OSError):
+        socket.create_connection(('127.0.0.1', port)).close()
+        return True
+    return False
 
 
 def test_other_sites_and_names_are_refused() -> None:

@@ -34,6 +34,7 @@ from rclpy.node import Node
 from rclpy.qos import QoSProfile, ReliabilityPolicy
 from rclpy.serialization import deserialize_message
 from rclpy.subscription import Subscription
+from rclpy.validate_full_topic_name import validate_full_topic_name
 
 from ...ros import monitor_view as shared
 from ...ros.graph import type_name
@@ -45,6 +46,8 @@ MAX_DEVICES, MAX_DIAGNOSES = 256, 10
 # Messages of /diagnostics that one poll takes, values of a diagnosis, bytes of any message.
 MAX_DIAGNOSTICS, MAX_VALUES, MAX_BYTES = 256, 200, 65536
 MAX_TEXT = 1000
+# Characters that a device's name must leave for those of its topics and services.
+MAX_ENDPOINT = 64
 # One poll of this number queries the graph, and one of this number adds to the trends.
 QUERY_POLLS, TREND_POLLS = 2, 8
 # s for the discovery of a service or subscriber, and for an answer: longer than a bridge takes,
@@ -74,10 +77,18 @@ def devices_among(
     for view in views:
         last = f'/{view.signature[0]}'
         for name in (topic.removesuffix(last) for topic in types if topic.endswith(last)):
-            if name and all(type_name(view.topics[topic].type) in types.get(f'{name}/{topic}', ())
-                            and publishers(f'{name}/{topic}') for topic in view.signature):
+            if is_usable(name) and all(
+                    type_name(view.topics[topic].type) in types.get(f'{name}/{topic}', ())
+                    and publishers(f'{name}/{topic}') for topic in view.signature):
                 found.setdefault(name, view)
     return found
+
+
+def is_usable(name: str) -> bool:
+    """Return whether topics and services below a name are valid: not all of a graph are ROS's."""
+    with contextlib.suppress(NameValidationException):
+        return bool(name) and validate_full_topic_name(f'{name}/{"x" * MAX_ENDPOINT}')
+    return False
 
 
 def sane(value: Any) -> Any:
@@ -272,9 +283,7 @@ class Graph:
         for device in self.devices:
             device.is_gone = found.pop(device.name, None) is not device.view
         for name in sorted(found)[:MAX_DEVICES - len(self.devices)]:
-            # The graph also has names that other middleware has made.
-            with contextlib.suppress(NameValidationException):
-                self.devices.append(GraphDevice(self._node, name, found[name], now, self._source))
+            self.devices.append(GraphDevice(self._node, name, found[name], now, self._source))
         self.devices.sort(key=lambda device: (self._views.index(device.view), device.name))
 
 
