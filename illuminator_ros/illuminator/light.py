@@ -231,7 +231,7 @@ class Light:
             configuration.agreed.confirmed, configuration.discrepancy,
             configuration.guard.exceeded, queries.identity, queries.identity_is_settled(now),
             self._tracker.conflict.detected, self.unreachable(now), self._sources.shown_holder,
-            self._sources.since)
+            self._sources.since, self._switch.off_at)
 
     def change_settings(self, settings: Settings, now: float) -> None:
         """

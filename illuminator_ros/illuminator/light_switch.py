@@ -172,6 +172,12 @@ class LightSwitch:
         if undone is not None and self._reconciler.desired is undone:
             self._reconciler.cancel('superseded by external_changes', now, superseded=True)
 
+    @property
+    def off_at(self) -> float:
+        """Return when ``off_after_silence`` switches the light off, infinity for never."""
+        desired = silence(self.state, -math.inf)
+        return math.inf if desired is None else desired.since
+
     # Desired values
 
     def ask(

@@ -25,7 +25,7 @@ from illuminator_ros.cli.monitor.app import (
     QUESTION_LIFETIME,
 )
 from illuminator_ros.cli.monitor.ros_graph import Graph, TREND_POLLS
-from illuminator_ros.ros.monitor_view import DONE, FAILED, TREND_SIZE
+from illuminator_ros.ros.monitor_view import Diagnosis, DONE, FAILED, NEWS_LIFETIME, TREND_SIZE
 import pytest
 from support.monitor import camera, FakeGraph, gimbal, light, NOW, Screen, show
 from textual.color import Color
@@ -56,10 +56,11 @@ def test_screen_fits_every_terminal_and_shows_the_selected_device(
 
 def test_screen_shows_each_kind_with_its_states_values_and_findings() -> None:
     async def test(screen: Screen) -> None:
-        for text in ('2 lights: 1 ON, 1 off', '/bow off 40 % 41.5 C steady internal', '12 %',
-                     '1 camera: 1 ok', '/camera ok 7 12 ms fix 47.300000 8.500000 480.0 m',
-                     '1 gimbal: 1 ours', '/gimbal ours 28.6 down 14.3 right primary 1/194',
-                     'WARN: dimmed because it is hot', 'held by safety for 61 s'):
+        for text in ('2 lights: 1 ON, 1 off; 1 camera: 1 ok; 1 gimbal: 1 ours',
+                     '/bow off WARN dimmed because it is hot; 40 % 41.5 C steady internal',
+                     '/camera ok WARN nothing received on ~/imu; 7 12 ms fix 47.300000 8.500000',
+                     '/gimbal ours OK 28.6 down 14.3 right primary 1/194',
+                     'lamp WARN: dimmed because it is hot', 'held by safety for 61 s'):
             assert text in screen.text
 
     show(test, light(), light('/stern', enabled=True), camera(), gimbal(), size=(200, 40))
@@ -217,6 +218,62 @@ def test_all_off_acts_at_once_whatever_is_shown(before: list[str]) -> None:
         ('/bow', 'off'), ('/stern', 'off')]
 
 
+@pytest.mark.parametrize('size', [(200, 50), (80, 24), (54, 12), (20, 6)])
+@pytest.mark.parametrize('before', [[], ['?'], ['space'], ['end', 'p', '4', '7'], ['end', 'm']])
+def test_all_off_is_one_touch_away_whatever_is_shown(
+    before: list[str], size: tuple[int, int],
+) -> None:
+    async def test(screen: Screen) -> None:
+        await screen.press(*before)
+        await screen.click('ALL OFF')
+
+    assert show(test, light(), gimbal(), size=size).asked == [('/bow', 'off')]
+
+
+def test_all_off_says_of_each_light_whether_it_has_confirmed() -> None:
+    async def test(screen: Screen) -> None:
+        await screen.press('a')
+        for one, off in zip(screen.graph.devices, [
+                (DONE, 'off'), (FAILED, 'no answer, trying again')], strict=True):
+            one.off = off
+        await screen.wait()
+        assert 'ALL OFF: 1 of 2 confirmed; /stern FAILED: no answer, trying again' in screen.text
+        screen.graph.devices[1].off = DONE, 'off'
+        await screen.wait()
+        assert 'ALL OFF: 2 of 2 confirmed' in screen.text
+        await screen.wait(NEWS_LIFETIME + 1)
+        assert 'confirmed' not in screen.text
+
+    show(test, light(), light('/stern'))
+
+
+def test_dangerous_device_is_first_then_what_is_broken_and_the_selection_stays() -> None:
+    async def test(screen: Screen) -> None:
+        await screen.press('end')
+        screen.graph.devices[1].values['enabled'] = True
+        screen.graph.devices[0].diagnoses['lamp'] = Diagnosis(0, 'off', {})
+        await screen.wait()
+        names = [line.split()[0] for line in screen.lines if line.startswith('/')]
+        assert names[:3] == ['/b', '/c', '/a']
+        await screen.press('r')
+
+    assert show(test, *map(light, ('/a', '/b', '/c'))).asked == [('/c', 'refresh')]
+
+
+def test_80_columns_show_level_and_fault_of_a_device_that_is_not_selected() -> None:
+    long_name = '/uav1/payload/searchlight_of_the_bow'
+    ill = light(long_name, enabled=True)
+    ill.diagnoses['lamp'] = Diagnosis(2, 'switched off because it is too hot', {})
+
+    async def test(screen: Screen) -> None:
+        await screen.press('end')
+        [row] = [line for line in screen.lines if line.startswith('/uav1')]
+        assert ' ON     ERROR! switched off because it is too hot' in row
+        assert len(row) <= 80
+
+    show(test, light(), ill, light('/z'), size=(80, 24))
+
+
 def test_arrows_move_a_gimbal_only_after_steering_has_begun() -> None:
     async def test(screen: Screen) -> None:
         await screen.press('end', 'up', 'end')
@@ -225,7 +282,7 @@ def test_arrows_move_a_gimbal_only_after_steering_has_begun() -> None:
         assert '←' in screen.text
         await screen.press('escape', 'up', 'end', 'm', 'j')
         assert screen.graph.asked == [
-            ('/gimbal', 'pitch to 23.6 degrees'), ('/gimbal', 'yaw to -9.3 degrees')]
+            ('/gimbal', 'pitch to 23.6 down'), ('/gimbal', 'yaw to 9.3 right')]
         await screen.press('up', 'm', 'up')
 
     assert len(show(test, light(), gimbal()).asked) == 2

@@ -19,6 +19,7 @@ from typing import Any
 
 from illuminator_ros.gimbal.ros import monitor_view as gimbal_view
 from illuminator_ros.illuminator.ros import monitor_view as light_view
+from illuminator_ros.mavlink.dialect import mavlink
 from illuminator_ros.ros import monitor_view as shared
 import pytest
 from support.monitor import camera, gimbal, light, NOW
@@ -180,6 +181,42 @@ def test_gimbal_asks_before_it_turns_to_neutral_and_releases_at_once() -> None:
     assert not request(gimbal(), 'l').question
 
 
+@pytest.mark.parametrize(('values', 'key', 'name'), [
+    ({'enabled': True}, 'o', 'set_parameters_atomically'),
+    ({'enabled': True, 'source': ''}, 'o', 'autonomy/cmd/brightness'), ({}, 'o', '')])
+def test_light_is_kept_on_by_a_request_that_cannot_switch_it_on(
+    values: dict[str, Any], key: str, name: str,
+) -> None:
+    one = light(**values, brightness=37.53)
+    one.source = 'autonomy'
+
+    made = ask(one, key)
+
+    if name:
+        assert isinstance(made, shared.Request)
+        assert (made.name, made.values, made.text) == (name, {'brightness': 37.53}, 'keep on')
+    else:
+        assert made == 'it is not on'
+
+
+def test_temperature_of_a_failed_sensor_is_not_shown_nor_kept() -> None:
+    one = light(error_flags=mavlink.ILLUMINATOR_ERROR_FLAGS_THERMISTOR_FAILURE)
+
+    assert one.view.trend is not None
+    assert one.view.trend(one) is None
+    assert '41.5 C' not in [column.cell(one) for column in one.view.columns]
+    assert 'temp' not in [label for label, _ in one.view.details(one)]
+
+
+@pytest.mark.parametrize(('angles', 'key', 'text'), [
+    ((0.0, 0.5, -0.25), 'up', 'pitch to 23.6 down'), ((0.0, 0.0, 0.0), 'up', 'pitch to 5.0 up'),
+    ((0.0, 0.0, 0.0), 'right', 'yaw to 5.0 right'), ((0.0, 0.0, 0.0), 'left', 'yaw to 5.0 left')])
+def test_requested_angle_has_a_direction_as_shown_angles_have(
+    angles: tuple[float, ...], key: str, text: str,
+) -> None:
+    assert request(gimbal(angles=('map', *angles)), key).text == text
+
+
 def test_keys_of_the_camera_are_its_services() -> None:
     assert [request(camera(), key).name for key in ('space', 'b', 'p')] == [
         'capture', 'capture_panel', 'ping']
@@ -191,7 +228,7 @@ def test_keys_of_the_camera_are_its_services() -> None:
     (light(strobe_period=0.5, strobe_duty_cycle=20.0), ['0.5 s 20 %']),
     (gimbal(), ['28.6 down', '14.3 right', 'ours: primary 1/194']),
     (camera(), ['7, at 47.300000 8.500000 480.0 m', 'fix ok 0 s', 'imu stale 9 s',
-                'mount missing']),
+                'imu stale', 'mount unused']),
     (camera(fix=(-1, 0.0, 0.0, 0.0)), ['7, at -'])])
 def test_details_have_what_is_known(one: shared.Device, texts: list[str]) -> None:
     shown = '\n'.join(''.join(part if isinstance(part, str) else part[0] for part in parts)

@@ -18,6 +18,7 @@ from __future__ import annotations
 
 import asyncio
 from collections.abc import Awaitable, Callable
+import math
 from typing import Any, cast
 
 from illuminator_ros.cli.monitor.app import MonitorApp
@@ -47,6 +48,9 @@ class FakeDevice(Device):
     def submit(self, request: Request) -> None:
         """Record a request."""
         self.sent.append((self.name, request))
+
+    # An OFF that is repeated is one request.
+    require_off = submit
 
 
 def device(view: View, name: str, **values: Any) -> FakeDevice:
@@ -91,6 +95,7 @@ class FakeGraph:
         self.requests: list[tuple[str, Request]] = []
         self.cleared = 0
         self.answers_polled = 0
+        self._off_at = -math.inf
 
     def clock(self) -> float:
         """Return the time, s."""
@@ -98,6 +103,7 @@ class FakeGraph:
 
     # Those of the monitor itself.
     all_off = Graph.all_off
+    off_answers = Graph.off_answers
 
     def clear_gone(self) -> None:
         """Count the calls."""

@@ -138,8 +138,12 @@ def test_bytes_that_are_not_utf_8_do_not_end_the_monitor(own_ros: Ros) -> None:
 
         screen.type(b'\xff\xe4 ')
 
-        # Keys that come with such a byte are lost.
-        eventually(lambda: screen.type('h') or 'this help' in screen.raw)
+        def helped() -> bool:
+            # Keys that come with such a byte are lost.
+            screen.type('h')
+            return 'this help' in screen.raw
+
+        eventually(helped)
 
 
 def test_without_a_terminal_monitor_prints_a_table(own_ros: Ros) -> None:

@@ -19,6 +19,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Sequence
 import functools
 import os
+import textwrap
 from typing import ClassVar, NamedTuple
 
 from textual import events
@@ -29,8 +30,8 @@ from textual.style import Style
 from textual.widgets import Static
 
 from .ros_graph import Graph, GraphDevice
-from .table import by_kind, columns, counts, findings, last
-from ...ros.monitor_view import age, Cell, Device, FAILED, Key, LEVELS, Line, Request, STALE_STATES
+from .table import by_kind, counts, last, level, off_report, report, state
+from ...ros.monitor_view import age, Cell, Device, FAILED, Key, LEVELS, Line, Request
 
 # s between updates of the screen, and between looks for answers to requests.
 INTERVAL, ANSWER_INTERVAL = 0.25, 0.05
@@ -45,7 +46,7 @@ COMMON_KEYS: tuple[tuple[tuple[str, ...], str, str, str], ...] = (
     (tuple(MOVES), 'select a device, as a click on it does', '', 'move'),
     (('m',), 'move a gimbal with the arrow keys; any other key ends that', '', 'steer'),
     (('enter',), 'yes, where a request asks first; escape is no', '', ''),
-    (('a',), 'ALL lights off', 'ALL OFF', 'all off'),
+    (('a',), 'ALL lights off, and again where one does not confirm', '', 'all off'),
     (('c',), 'clear devices that are gone', '', 'clear'),
     (('?', 'h'), 'this help', 'help', 'help'),
     (('q', 'ctrl+c', 'ctrl+d', 'ctrl+backslash'), 'quit', 'quit', 'quit'),
@@ -91,6 +92,7 @@ class MonitorApp(App[None], inherit_bindings=False):
         self._graph = graph
         self._ascii_only = ascii_only
         self._selected: GraphDevice | None = None
+        self._at = 0
         self._mode: str | Question = NORMAL
         self._lines: list[GraphDevice | Cell] = []
         # Held here, since a poll may come before they are on the screen.
@@ -172,7 +174,7 @@ class MonitorApp(App[None], inherit_bindings=False):
         elif action == 'clear':
             self._graph.clear_gone()
         elif action == 'move':
-            devices = self._graph.devices
+            devices = self._devices
             at = min(max(devices.index(device) + MOVES[key], 0), len(devices) - 1)
             self._select(devices[at])
 
@@ -197,14 +199,18 @@ class MonitorApp(App[None], inherit_bindings=False):
             # A question belongs to the other device.
             self._selected, self._mode = device, HELP if self._mode == HELP else NORMAL
 
+    @property
+    def _devices(self) -> list[GraphDevice]:
+        """Return the devices in the order of attention."""
+        return sorted(self._graph.devices, key=lambda device: device.attention)
+
     def draw(self) -> None:
         """Draw what has changed."""
-        devices, device = self._graph.devices, self._selected
+        devices, device = self._devices, self._selected
         if device not in devices:
-            before = [one for one in devices if device is not None and one.name < device.name]
-            self._select(next(iter(before[-1:] or devices), None))
-        for name in ('details', 'bar'):
-            self._parts[name].display = self.size.height >= 12
+            self._select(devices[min(self._at, len(devices) - 1)] if devices else None)
+        self._at = 0 if self._selected is None else devices.index(self._selected)
+        self._parts['details'].display = self.size.height >= 12
         self._show('devices', self._help() if self._mode == HELP else self._list())
         self._show('details', Content('\n').join(
             Content.assemble((f'{label:8}', 'bold'), *cells) for label, cells in (
@@ -222,31 +228,35 @@ class MonitorApp(App[None], inherit_bindings=False):
 
     def _list(self) -> Content:
         width, height = self._parts['devices'].size
+        devices = self._devices
         lines: list[GraphDevice | Cell] = []
-        name_width = max((len(one.name) for one in self._graph.devices), default=0)
-        name_width = max(min(name_width, width // 3), 14)
-        for some in by_kind(self._graph.devices):
-            titles = [f'{one.title:{one.width}}' for one in columns(some[0].view, name_width)]
-            lines += [''] * bool(lines)
-            lines += [(counts(some), 'bold'), (' '.join(titles), 'bold dim'), *some]
-        at = lines.index(self._selected) if self._selected is not None else 0
-        first = max(0, min(at - height // 2, len(lines) - height))
-        self._lines = lines[first:first + height] or [NO_DEVICES]
+        if answers := self._graph.off_answers:
+            text = Content.assemble(*off_report(answers)).plain
+            lines += [(one, 'bold') for one in textwrap.wrap(text, max(width, 20))[:4]]
+        if devices:
+            name_width = max(min(max(len(one.name) for one in devices), width // 4), 8)
+            lines += [('; '.join(map(counts, by_kind(self._graph.devices))), 'bold'),
+                      (f'{"DEVICE":{name_width}} STATE  LEVEL  REPORT', 'bold dim')]
+        first = len(lines)
+        shown = max(height - first, 1)
+        top = max(0, min(self._at - shown // 2, len(devices) - shown))
+        lines += devices[top:top + shown]
+        self._lines = lines[max(len(lines) - height, 0):] or [NO_DEVICES]
         return Content('\n').join(
             self._row(one, name_width) if isinstance(one, Device) else Content.assemble(one)
             for one in self._lines)
 
     def _row(self, device: GraphDevice, name_width: int) -> Content:
         row = Content(' ').join([
-            *(Content.assemble(one.cell(device)).truncate(one.width, ellipsis=True, pad=True)
-              for one in columns(device.view, name_width)),
-            Content.assemble(*(last(device) or [findings(device)]))])
-        styles = ['dim'] * (device.state in STALE_STATES) + ['reverse'] * (
-            device is self._selected)
+            *(Content.assemble(cell).truncate(width, ellipsis=True, pad=True) for cell, width in (
+                (device.name, name_width), (state(device), 6), (level(device), 6))),
+            Content.assemble(*report(device))])
+        styles = ['dim'] * device.is_stale + ['reverse'] * (device is self._selected)
         return row.stylize(' '.join(styles))
 
     def _labels(self) -> Iterable[Content]:
         view, mode = None if self._selected is None else self._selected.view, self._mode
+        yield _label('a', 'ALL OFF')
         if isinstance(mode, Question):
             yield Content.styled(mode.text, 'bold yellow')
             yield Content.styled('' if mode.typed is None else f'{mode.typed}_', 'reverse')
@@ -276,8 +286,10 @@ def _details(device: GraphDevice) -> Iterable[Line]:
         yield 'last', [*last(device), (f' ({age(device.now - device.action[3])} ago)', 'dim')]
     for kind, one in device.diagnoses.items():
         held = device.number(kind, 'held_s')
-        yield kind, [LEVELS[one.level], f': {one.message}', '' if held is None else (
+        yield kind, [LEVELS[device.level_of(one)], f': {one.message}', '' if held is None else (
             f'; held by {device.diagnosed(kind, "holder")} for {age(held)}')]
+    if notice := device.view.notice(device):
+        yield 'soon', [notice]
     yield from device.view.details(device)
     if device.now - device.heard_at > 2:
         yield 'silent', [f'nothing heard for {age(device.now - device.heard_at)}']

@@ -43,9 +43,13 @@ def angle(device: Device, axis: str) -> float | None:
 
 def described(device: Device, axis: str) -> str:
     """Return the angle of an axis with its direction."""
-    if (known := angle(device, axis)) is None:
-        return UNKNOWN
-    degrees = round(math.degrees(known), 1)
+    known = angle(device, axis)
+    return UNKNOWN if known is None else direction(axis, known)
+
+
+def direction(axis: str, radians: float) -> str:
+    """Return an angle in degrees, with a word for its sign."""
+    degrees = round(math.degrees(radians), 1)
     return f'{abs(degrees):.1f} {AXES[axis][1 + (degrees < 0)] if degrees else ""}'.rstrip()
 
 
@@ -66,7 +70,7 @@ def nudge(device: Device, typed: str, axis: str, step: float) -> Request | str:
     # NaN leaves an axis as it is. The newest setpoint replaces others, so it has their targets.
     targets = {one: aim if one == axis else device.wants(one, math.nan) for one in AXES}
     return Request(
-        f'{axis} to {math.degrees(aim):.1f} degrees', f'{device.prefix}cmd/angles', Vector3Stamped,
+        f'{axis} to {direction(axis, aim)}', f'{device.prefix}cmd/angles', Vector3Stamped,
         Vector3Stamped(header=Header(frame_id=device.values['angles'][0]),
                        vector=Vector3(**dict(zip('xyz', targets.values(), strict=True)))),
         {one: target for one, target in targets.items() if math.isfinite(target)})
