@@ -273,30 +273,6 @@ def finite(number: float) -> float | None:
     return number if abs(number) < 1e9 else None
 
 
-def bar(value: float, width: int) -> str:
-    """Return a bar for a share, %."""
-    filled = max(round(min(max(value / 100, 0.0), 1.0) * width), int(value > 0))
-    return '█' * filled + '░' * (width - filled)
-
-
-def sparkline(values: Iterable[float | None], smallest_span: float) -> str:
-    """Return a character for each value, a space for None."""
-    known = [value for value in values if value is not None] or [0.0]
-    low, span = min(known), max(known) - min(known)
-    low, span = low - max(smallest_span - span, 0) / 2, max(span, smallest_span)
-    return ''.join(' ' if value is None else '▁▂▃▄▅▆▇█'[min(int((value - low) / span * 8), 7)]
-                   for value in values)
-
-
-def dial(value: float | None, low: float, high: float, width: int) -> str:
-    """Return a scale from ``low`` to ``high`` with a mark at a value, and one at 0."""
-    marks = ['─'] * width
-    for at, mark in ((0.0, '┼'), (value, '█')):
-        if low != high and at is not None:
-            marks[round(min(max((at - low) / (high - low), 0.0), 1.0) * (width - 1))] = mark
-    return ''.join(marks)
-
-
 def measured(value: float | None, unit: str, form: str = '.3g') -> str:
     """Return a number with its unit."""
     return UNKNOWN if value is None else f'{value:{form}} {unit}'

@@ -30,7 +30,7 @@ import pytest
 from support.monitor import camera, FakeGraph, gimbal, light, NOW, Screen, show
 from textual.color import Color
 from textual.events import Paste
-from textual.widgets import Static
+from textual.widgets import Button, DataTable
 
 SIZES = [(500, 500), (200, 50), (80, 24), (40, 44), (20, 6), (12, 3), (5, 2), (1, 1)]
 
@@ -84,8 +84,9 @@ def test_poll_before_the_screen_exists_is_shown_on_it() -> None:
     app.poll()
 
     async def run() -> None:
-        async with app.run_test(size=(132, 40)):
-            assert '/bow' in app.query_one('#details', Static).render_line(0).text
+        async with app.run_test(size=(132, 40)) as pilot:
+            await pilot.pause()
+            assert '/bow' in Screen(app, pilot, FakeGraph()).text
 
     asyncio.run(run())
 
@@ -253,7 +254,7 @@ def test_dangerous_device_is_first_then_what_is_broken_and_the_selection_stays()
         screen.graph.devices[1].values['enabled'] = True
         screen.graph.devices[0].diagnoses['lamp'] = Diagnosis(0, 'off', {})
         await screen.wait()
-        names = [line.split()[0] for line in screen.lines if line.startswith('/')]
+        names = [line.split()[0] for line in screen.lines if line.startswith(' /')]
         assert names[:3] == ['/b', '/c', '/a']
         await screen.press('r')
 
@@ -267,8 +268,8 @@ def test_80_columns_show_level_and_fault_of_a_device_that_is_not_selected() -> N
 
     async def test(screen: Screen) -> None:
         await screen.press('end')
-        [row] = [line for line in screen.lines if line.startswith('/uav1')]
-        assert ' ON     ERROR! switched off because it is too hot' in row
+        [row] = [line for line in screen.lines if line.startswith(' /uav1')]
+        assert ' ON ERROR! switched off because it is too hot' in ' '.join(row.split())
         assert len(row) <= 80
 
     show(test, light(), ill, light('/z'), size=(80, 24))
@@ -331,15 +332,58 @@ def test_labels_of_keys_are_not_keys_of_others() -> None:
         assert own & ACTIONS.keys() == set()
 
 
-def test_row_of_the_selected_device_alone_is_reversed() -> None:
+def test_row_of_the_selected_device_alone_is_highlighted() -> None:
     async def test(screen: Screen) -> None:
         await screen.press('down')
-        reversed_ = [y for y in range(6) if any(
-            one.style is not None and one.style.reverse
-            for one in screen.app.query_one('#devices').render_line(y))]
-        assert [screen.lines[y].split()[0] for y in reversed_] == ['/b']
+        table = screen.app.query_one(DataTable)
+        backgrounds = {row: next(segment.style.bgcolor for segment in table.render_line(row)
+                                 if segment.style is not None) for row in (1, 2, 3)}
+        assert backgrounds[1] == backgrounds[3] != backgrounds[2]
 
     show(test, *map(light, ('/a', '/b', '/c')))
+
+
+@pytest.mark.parametrize('touch', [False, True])
+def test_night_is_red_on_black_whatever_is_shown(touch: bool) -> None:
+    async def test(screen: Screen) -> None:
+        await screen.press('v', 'v')
+        for keys in ([], ['end'], ['space'], ['escape', '?'], ['escape', 'a']):
+            await screen.press(*keys)
+            colours = {(part, colour.get_truecolor().green, colour.get_truecolor().blue)
+                       for part in screen.app.screen.query('*') for y in range(part.size.height)
+                       for segment in part.render_line(y) if segment.style is not None
+                       for colour in (segment.style.color, segment.style.bgcolor) if colour}
+            assert {(str(part), green, blue) for part, green, blue in colours
+                    if green or blue} == set()
+
+    ill = light('/ill', enabled=True)
+    show(test, light(), ill, camera(), gimbal('/lost', connected=False), size=(80, 30),
+         touch=touch)
+
+
+def test_colours_for_sunlight_contrast_with_their_background() -> None:
+    async def test(screen: Screen) -> None:
+        await screen.press('v')
+        table = screen.app.query_one(DataTable)
+        for y in range(2, 5):
+            for segment in table.render_line(y):
+                assert segment.style is not None
+                assert segment.style.color is not None and segment.style.bgcolor is not None
+                front, back = (Color.from_rich_color(one).brightness for one in (
+                    segment.style.color, segment.style.bgcolor))
+                assert abs(front - back) > 0.5
+
+    show(test, light(), light('/on', enabled=True), camera(), gimbal('/lost', connected=False))
+
+
+def test_buttons_for_fingers_have_three_rows_and_whole_labels_on_a_phone() -> None:
+    async def test(screen: Screen) -> None:
+        buttons = [one for one in screen.app.query(Button) if one.display]
+        assert {one.outer_size.height for one in buttons} == {3}
+        shown = '\n'.join(screen.lines)
+        assert [str(one.label) for one in buttons if str(one.label) not in shown] == []
+
+    show(test, light(), size=(54, 56), touch=True)
 
 
 def test_answers_are_taken_between_the_keys() -> None:

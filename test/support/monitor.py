@@ -28,7 +28,7 @@ from illuminator_ros.illuminator.ros.monitor_view import VIEW as LIGHT
 from illuminator_ros.rededge.ros.monitor_view import VIEW as CAMERA
 from illuminator_ros.ros.monitor_view import Device, Diagnosis, Request, View
 from textual.pilot import Pilot
-from textual.widgets import Static
+from textual.widgets import Button
 
 NOW = 1000.0
 PRESENT: dict[str, dict[str, Any]] = {
@@ -136,8 +136,17 @@ class Screen:
     @property
     def lines(self) -> list[str]:
         """Return the lines that are shown."""
-        shown = [one for one in self.app.query(Static) if one.display]
-        return [one.render_line(y).text for one in shown for y in range(one.size.height)]
+        width, height = self.app.size
+        lines = [' ' * width] * height
+        for one in self.app.screen.query('*'):
+            left, top, *_ = one.content_region
+            for y in range(top, min(top + one.size.height, height) if not one.children else 0):
+                # Another part may be above it.
+                if left < width and self.app.screen.get_widget_at(left, y)[0] is one:
+                    text = one.render_line(y - top).text
+                    line = f'{lines[y][:left]}{text}{lines[y][left + len(text):]}'
+                    lines[y] = line[:width]
+        return [line.rstrip() for line in lines]
 
     @property
     def text(self) -> str:
@@ -150,8 +159,8 @@ class Screen:
         await self.settle()
 
     async def settle(self) -> None:
-        """Wait until the events so far have gone from the application to its screen and back."""
-        for one in (self.app, self.app.screen, self.app):
+        """Wait until the events so far have gone from the application to its parts and back."""
+        for one in (self.app, self.app.screen, *self.app.screen.query(Button), self.app):
             handled = asyncio.Event()
             if one.call_later(handled.set):
                 await handled.wait()

@@ -129,7 +129,7 @@ def test_screen_follows_the_size_of_the_terminal(own_ros: Ros) -> None:
         screen.forget()
         screen.resize(5, 30)
 
-        screen.wait_for('ROS graph y( |$)')
+        screen.wait_for('ROS graph v colours')
 
 
 def test_bytes_that_are_not_utf_8_do_not_end_the_monitor(own_ros: Ros) -> None:

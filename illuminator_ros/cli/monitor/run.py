@@ -127,7 +127,8 @@ def _watch(graph: Graph, ascii_only: bool, termination: Termination, is_tab: boo
     from .app import MonitorApp
     # Python itself takes UTF-8 for the locale POSIX.
     ascii_only = ascii_only or locale.nl_langinfo(locale.CODESET) != 'UTF-8'
-    app = (MonitorApp if is_tab else terminal.TerminalApp)(graph, ascii_only=ascii_only)
+    app = (MonitorApp if is_tab else terminal.TerminalApp)(
+        graph, ascii_only=ascii_only, touch=is_tab)
     termination.calls(functools.partial(app.call_later, app.exit), last=app.restore)
     with terminal.quiet_errors():
         app.run()

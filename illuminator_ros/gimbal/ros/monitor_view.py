@@ -29,7 +29,6 @@ from ...ros.monitor_view import Column, Device, Key, Request, Topic, UNKNOWN
 
 # Degrees for one press of an arrow key.
 STEP = 5.0
-DIAL_WIDTH = 31
 # The limit of ~/cmd/angles, and the directions of positive and negative angles in ROS.
 AXES = {'roll': (math.pi, 'right', 'left'), 'pitch': (math.pi / 2, 'down', 'up'),
         'yaw': (math.pi, 'left', 'right')}
@@ -103,14 +102,10 @@ def neutral(device: Device, typed: str) -> Request:
 
 
 def _details(device: Device) -> Iterable[shared.Line]:
-    for axis, (limit, *_) in AXES.items():
-        # The range that the gimbal reports, and left and up at the left of the dial.
-        low, high = (device.number('device', f'{axis}_{end}_rad') for end in ('min', 'max'))
-        low, high = -limit if low is None else low, limit if high is None else high
-        if axis == 'yaw':
-            low, high = high, low
-        yield axis, [(shared.dial(angle(device, axis), low, high, DIAL_WIDTH), 'cyan'),
-                     f' {described(device, axis)}']
+    for axis in AXES:
+        ends = [device.number('device', f'{axis}_{end}_rad') for end in ('min', 'max')]
+        range_ = ' to '.join(direction(axis, end) for end in ends if end is not None)
+        yield axis, [described(device, axis), f' (range: {range_})' * bool(range_)]
     # The diagnostics also know it from before this monitor, but up to a second later.
     known = device.number('device', 'controller_s')
     since = device.since('controller') or (known is not None and shared.age(known))

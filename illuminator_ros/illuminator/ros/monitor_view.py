@@ -32,9 +32,6 @@ from ...ros.monitor_view import Column, Device, Key, measured, Request, Topic, U
 # Brightness steps, %; strobe for a light that has none, s and %.
 STEP, FINE_STEP = 10.0, 1.0
 STROBE_PERIOD, STROBE_DUTY_CYCLE = 1.0, 50.0
-# K; a smaller difference is drawn as a flat line.
-SMALLEST_SPAN = 4.0
-BAR_WIDTH = 10
 # ILLUMINATOR_ERROR_FLAGS_THERMISTOR_FAILURE; the monitor does not import MAVLink.
 THERMISTOR_FAILURE = 4
 
@@ -130,13 +127,10 @@ def _details(device: Device) -> Iterable[shared.Line]:
         measured(shines, '%') + ('' if limit == shines else f' (agreed: {limit:g} %)'),
         _strobe(device), values.get('mode'), f'{lamp("vendor")} {lamp("model")}'.strip(),
         serial and f'no. {serial}', uptime and f'up {shared.age(uptime)}')
-    yield 'light', [(shared.bar(shines or 0.0, BAR_WIDTH), 'yellow'),
-                    f' {", ".join(filter(None, facts))}']
+    yield 'light', [', '.join(filter(None, facts))]
     now = temperature(device)
     if now is not None and (known := [value for value in device.trend if value is not None]):
-        yield 'temp', [measured(now, 'C ', '.1f'),
-                       (shared.sparkline(device.trend, SMALLEST_SPAN).lstrip(), 'cyan'),
-                       f' {min(known):.1f} to {max(known):.1f} in 2 min']
+        yield 'temp', [f'{now:.1f} C, {min(known):.1f} to {max(known):.1f} in 2 min']
 
 
 VIEW = shared.View(
