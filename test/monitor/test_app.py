@@ -386,6 +386,15 @@ def test_buttons_for_fingers_have_three_rows_and_whole_labels_on_a_phone() -> No
     show(test, light(), size=(54, 56), touch=True)
 
 
+def test_view_that_may_only_look_has_no_buttons_to_operate_a_device() -> None:
+    async def test(screen: Screen) -> None:
+        assert 'ALL OFF' not in screen.text
+        assert 'on/off' not in screen.text
+        await screen.press('a')
+
+    assert show(test, light(), may_request=False).requests == []
+
+
 def test_answers_are_taken_between_the_keys() -> None:
     async def test(screen: Screen) -> None:
         while not screen.graph.answers_polled:

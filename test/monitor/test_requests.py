@@ -79,10 +79,11 @@ class Topic(Endpoint):
 class Bench:
     """A device, by default a light that is off and steady, at 40 %."""
 
-    def __init__(self, of: Device | None = None) -> None:
+    def __init__(self, of: Device | None = None, may_request: bool = True) -> None:
         self.endpoints: dict[str, Any] = {}
         of = of or light()
-        self.device = GraphDevice(cast(Node, self), of.name, of.view, 0.0)
+        self.device = GraphDevice(
+            cast(Node, self), of.name, of.view, 0.0, may_request=may_request)
         self.device.values = of.values
 
     def create_subscription(self, *arguments: Any) -> None:
@@ -346,3 +347,12 @@ def test_message_that_the_node_refuses_is_shown_as_failed_with_the_reason() -> N
     bench.device.log('~/cmd/roi: ignored: held by safety')
 
     assert bench.outcome() == ('point at 47.3 8.5 480', 'FAILED', 'ignored: held by safety')
+
+
+def test_monitor_that_may_only_look_sends_nothing() -> None:
+    bench = Bench(may_request=False)
+
+    bench.press('space', '0', '-', 'r')
+
+    assert bench.endpoints == {}
+    assert bench.outcome() == ('refresh', 'FAILED', 'this monitor may only look')

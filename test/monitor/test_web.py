@@ -65,8 +65,9 @@ def serve(test: Callable[[Served], Awaitable[None]]) -> Served:
 
     async def run() -> None:
         gate = web.Gate(True, True, served.queries.append)
-        gate.renew()
-        async with web.listening('127.0.0.1', served.port, gate, served.lines.append, 'false'):
+        gate.open()
+        async with web.listening('127.0.0.1', served.port, gate, served.lines.append,
+                                 dict.fromkeys(web.RIGHTS, 'false')):
             try:
                 await test(served)
             finally:
@@ -89,6 +90,19 @@ def test_request_that_cannot_be_read_is_refused_in_one_line(headers: list[str]) 
 
     [line] = serve(test).lines
     assert '\n' not in line
+
+
+def test_token_is_valid_once_and_gives_its_right_only() -> None:
+    async def test(served: Served) -> None:
+        operate, look = served.queries
+        assert (operate[:7], look[:6]) == ('?token=', '?look=')
+        assert await served.answer(path=f'/?look={operate[7:]}') == 403
+        assert await served.answer(path=f'/{look}') == 302
+        assert await served.answer(path=f'/{look}') == 403
+        assert await served.answer(path=f'/{operate}') == 302
+        assert [one.partition('=')[0] for one in served.queries[2:]] == ['?look', '?token']
+
+    serve(test)
 
 
 def test_unreadable_bytes_of_many_clients_are_one_line() -> None:

@@ -89,12 +89,13 @@ def camera(name: str = '/camera', fix: Any = (0, 47.3, 8.5, 480.0)) -> FakeDevic
 class FakeGraph:
     """A graph with given devices, whose time the test sets."""
 
-    def __init__(self, *devices: FakeDevice) -> None:
+    def __init__(self, *devices: FakeDevice, may_request: bool = True) -> None:
         self.now = NOW
         self.devices = list(devices)
         self.requests: list[tuple[str, Request]] = []
         self.cleared = 0
         self.answers_polled = 0
+        self.may_request = may_request
         self._off_at = -math.inf
 
     def clock(self) -> float:
@@ -181,10 +182,10 @@ class Screen:
 
 def show(
     test: Callable[[Screen], Awaitable[None]], *devices: FakeDevice,
-    size: tuple[int, int] = (132, 40), **how: Any,
+    size: tuple[int, int] = (132, 40), may_request: bool = True, **how: Any,
 ) -> FakeGraph:
     """Show devices while a test runs; return the graph."""
-    graph = FakeGraph(*devices)
+    graph = FakeGraph(*devices, may_request=may_request)
     app = MonitorApp(cast(Graph, graph), **how)
 
     async def run() -> None:

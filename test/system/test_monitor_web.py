@@ -31,7 +31,7 @@ import pytest
 
 pytest.importorskip('textual_serve')
 
-from support.browser import Browser, IS_INSTALLED, running_browser  # noqa: E402
+from support.browser import ENTER, IS_INSTALLED, running_browser  # noqa: E402
 from support.ports import free_port  # noqa: E402
 from support.processes import (  # noqa: E402
     ended,
@@ -87,40 +87,66 @@ def test_page_operates_a_light_in_ten_tabs_and_on_a_phone_for_the_bearer_of_the_
         assert status(f'{site}?token=wrong') == 403
         browser.open(url)
         assert browser.run('return location.href') == site
-        assert_switches(browser, ['on/off', 'enter yes'], '1 light: 1 ON')
+        browser.wait_for('/illuminator')
+        # Keys work without a click first.
+        browser.press(' ')
+        browser.wait_for('It can dazzle')
+        browser.press(ENTER)
+        browser.wait_for('1 light: 1 ON')
         assert browser.run(
             'return performance.getEntriesByType("resource").map(one => new URL(one.name).origin)'
             '.filter(origin => origin != location.origin)') == []
 
         # The token was used; the next one is for another browser.
         assert status(url) == 403
-        _, following = urls(server, 2)
+        _, look, following = urls(server, 3)
         assert status(following) == 200
 
+        tabs = [browser.tab]
         for _ in range(TABS - 1):
-            browser.new_tab()
+            tabs.append(browser.new_tab())
             browser.open(site)
-        browser.wait_for('1 light: 1 ON')
+            browser.wait_for('1 light: 1 ON')
+        browser.click('0 off')
+        for tab in tabs:
+            browser.use(tab)
+            browser.wait_for('1 light: 1 off')
+        browser.use(tabs.pop())
+        before = children(server)
+        assert len(before) == TABS
+        browser.close_tab()
+        eventually(lambda: len(children(server)) == TABS - 1)
+        browser.use(tabs[-1])
+
         browser.cdp('Emulation.setDeviceMetricsOverride', width=390, height=844,
                     deviceScaleFactor=1, mobile=True)
         browser.open(site)
-        assert_switches(browser, ['0 off'], '1 light: 1 off')
+        browser.wait_for('/illuminator')
+        browser.click('on/off')
+        browser.click('enter yes')
+        browser.wait_for('1 light: 1 ON')
+        browser.click('ALL OFF')
+        browser.wait_for('ALL OFF: 1 of 1 confirmed')
+        browser.wait_for('1 light: 1 off')
         assert browser.run('return document.documentElement.scrollWidth') <= 390
         columns = browser.run('return window.size.width')
         assert max(map(len, browser.lines)) <= columns
 
+        browser.open(look)
+        browser.wait_for('/illuminator')
+        assert 'ALL OFF' not in browser.text
+        browser.press('0')
+        browser.wait_for('off: FAILED: this monitor may only look')
+
         # Each tab is a process, which ends with the server, even if that is killed.
-        tabs = Path(f'/proc/{server.pid}/task/{server.pid}/children').read_text().split()
-        assert len(tabs) == TABS
+        left = children(server)
         server.kill()
-        eventually(lambda: not any(map(is_running, tabs)))
+        eventually(lambda: not any(map(is_running, left)))
 
 
-def assert_switches(browser: Browser, labels: list[str], state: str) -> None:
-    browser.wait_for('/illuminator')
-    for label in labels:
-        browser.click(label)
-    browser.wait_for(state)
+def children(server: Program) -> list[str]:
+    """Return the process ids of the tabs."""
+    return Path(f'/proc/{server.pid}/task/{server.pid}/children').read_text().split()
 
 
 def test_pages_are_served_while_nothing_reads_the_output_of_the_server() -> None:

@@ -35,7 +35,7 @@ from .table import by_kind, counts, last, level, off_report, report, state
 from ...ros.monitor_view import age, Cell, FAILED, Key, LEVELS, Line, Request
 
 # s between updates of the screen, and between looks for answers to requests.
-INTERVAL, ANSWER_INTERVAL = 0.25, 0.05
+INTERVAL, ANSWER_INTERVAL = 0.1, 0.05
 # s without a key after which a question is dropped; characters that the operator may type.
 QUESTION_LIFETIME, MAX_TYPED = 15.0, 100
 NORMAL, HELP, STEERING = 'normal', 'help', 'steering'
@@ -128,6 +128,7 @@ class MonitorApp(App[None], inherit_bindings=False):
         self._off = Button('a ALL OFF', id='off', action='app.press("a")', compact=not touch)
         self._buttons = [Button(compact=not touch) for _ in range(BUTTONS)]
         self._trend = Sparkline(id='trend')
+        self._off.visible = graph.may_request
         for one in (self._table, self._trend, *self._buttons):
             # Until the first values come.
             one.display = False
@@ -348,7 +349,7 @@ class MonitorApp(App[None], inherit_bindings=False):
         elif mode == HELP:
             yield 'escape', 'back'
         else:
-            if view is not None:
+            if view is not None and self._graph.may_request:
                 keys = view.steering if mode == STEERING else view.keys
                 yield from ((one.keys[0], one.label) for one in keys if one.label)
                 if view.steering:

@@ -50,7 +50,7 @@ MAX_TEXT = 1000
 # Characters that a device's name must leave for those of its topics and services.
 MAX_ENDPOINT = 64
 # One poll of this number queries the graph, and one of this number adds to the trends.
-QUERY_POLLS, TREND_POLLS = 2, 8
+QUERY_POLLS, TREND_POLLS = 5, 20
 # s for the discovery of a service or subscriber, and for an answer: longer than a bridge takes,
 # whatever its device does.
 DISCOVERY_LIMIT, ANSWER_LIMIT = 2.0, 8.0
@@ -119,9 +119,13 @@ class GraphDevice(Device):
     the bridge may have been restarted.
     """
 
-    def __init__(self, node: Node, name: str, view: View, now: float, source: str = '') -> None:
+    def __init__(
+        self, node: Node, name: str, view: View, now: float, source: str = '', *,
+        may_request: bool = True,
+    ) -> None:
         super().__init__(name, view, now, source, heard_at=now)
         self._node = node
+        self._may_request = may_request
         self._subscriptions = {topic: node.create_subscription(
             one.type, f'{name}/{topic}', _taken_by_poll,
             STATE_QOS if one.is_state else SAMPLE_QOS) for topic, one in view.topics.items()}
@@ -146,7 +150,7 @@ class GraphDevice(Device):
                 self.values[topic] = value = sane(spec.read(message))
                 if not spec.is_state or known is not None and known != value:
                     self.changed_at[topic] = now
-        if self.view.off is not None:
+        if self.view.off is not None and self._may_request:
             # The discovery of its service takes a while.
             self._endpoint(self.view.off(self))
 
@@ -174,6 +178,9 @@ class GraphDevice(Device):
 
     def submit(self, request: Request) -> None:
         """Send a request, or let it wait for the one before."""
+        if not self._may_request:
+            self.note(request.text, shared.FAILED, 'this monitor may only look')
+            return
         lane = request.name, *request.values
         if self._required is not None and 'enabled' in request.values and not request.is_off:
             self._required = None
@@ -263,18 +270,20 @@ class Graph:
     The devices that a node discovers.
 
     :param source: of commands, see :class:`Device`.
+    :param may_request: whether requests are sent, or refused here.
     :ivar clock: returns the time, s.
     :ivar devices: in the order of the views, then by name.
     """
 
     def __init__(
         self, node: Node, views: Sequence[View], source: str = '',
-        clock: Callable[[], float] = time.monotonic,
+        clock: Callable[[], float] = time.monotonic, *, may_request: bool = True,
     ) -> None:
         self._node = node
         self._views = views
         self._source = source
         self.clock = clock
+        self.may_request = may_request
         self.devices: list[GraphDevice] = []
         self._diagnostics = node.create_subscription(
             DiagnosticArray, '/diagnostics', _taken_by_poll, DIAGNOSTICS_QOS)
@@ -285,7 +294,7 @@ class Graph:
     def all_off(self) -> None:
         """Switch off every device that can be switched off."""
         self._off_at = self.clock()
-        for device in self.devices:
+        for device in self.devices if self.may_request else ():
             device.off = None
             if device.view.off is not None and device.is_gone:
                 device.off = shared.FAILED, 'it is gone'
@@ -343,7 +352,8 @@ class Graph:
         for device in self.devices:
             device.is_gone = found.pop(device.name, None) is not device.view
         for name in sorted(found)[:MAX_DEVICES - len(self.devices)]:
-            self.devices.append(GraphDevice(self._node, name, found[name], now, self._source))
+            self.devices.append(GraphDevice(
+                self._node, name, found[name], now, self._source, may_request=self.may_request))
         self.devices.sort(key=lambda device: (self._views.index(device.view), device.name))
 
 

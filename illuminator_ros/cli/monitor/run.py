@@ -77,8 +77,9 @@ def parser() -> argparse.ArgumentParser:
     made.add_argument('--web', type=option(address), nargs='?', const=address(DEFAULT_WEB),
                       metavar='HOST:PORT', help=f'serve a browser (default: {DEFAULT_WEB})')
     made.add_argument('--token', action='store_true',
-                      help='admit a browser only by a one-time token, which the printed URL has; '
-                           'every address except loopback needs it')
+                      help='admit a browser only by a one-time token: of the printed URLs, one is '
+                           'to look only; every address except loopback needs it')
+    made.add_argument('--look', action='store_true', help='show devices, and request nothing')
     made.add_argument('--once', action='store_true', help='print one table and end')
     made.add_argument('--json', action='store_true', help='print all values as JSON and end')
     made.add_argument('--wait', type=float, default=6.0, metavar='S',
@@ -109,7 +110,7 @@ def run(
         node = Node(f'illuminator_monitor_{uuid.uuid4().hex[:8]}', enable_rosout=False,
                     start_parameter_services=False)
     views = [one.load('view') for one in payloads.values() if one.view]
-    graph = Graph(node, views, options.source)
+    graph = Graph(node, views, options.source, may_request=not options.look)
     is_terminal = os.environ.get('TERM', 'dumb') not in ('dumb', 'unknown') and all(
         stream is not None and stream.isatty() for stream in (sys.stdin, sys.stdout))
     try:
