@@ -16,6 +16,7 @@
 
 from __future__ import annotations
 
+import asyncio
 from collections.abc import Iterator
 import contextlib
 import os
@@ -24,6 +25,8 @@ import re
 import socket
 import subprocess
 import sys
+import time
+from typing import Any
 import urllib.error
 import urllib.request
 
@@ -31,6 +34,7 @@ import pytest
 
 pytest.importorskip('textual_serve')
 
+import aiohttp  # noqa: E402
 from support.browser import ENTER, IS_INSTALLED, running_browser  # noqa: E402
 from support.ports import free_port  # noqa: E402
 from support.processes import (  # noqa: E402
@@ -142,6 +146,35 @@ def test_page_operates_a_light_in_ten_tabs_and_on_a_phone_for_the_bearer_of_the_
         left = children(server)
         server.kill()
         eventually(lambda: not any(map(is_running, left)))
+
+
+def test_ten_browsers_show_within_a_fifth_of_a_second_what_one_of_them_switches() -> None:
+    async def measure(url: str) -> float:
+        async with aiohttp.ClientSession() as session:
+            sockets = [await session.ws_connect(f'{url}ws', headers={'Origin': url.rstrip('/')})
+                       for _ in range(TABS)]
+
+            async def shown(socket: Any, text: str) -> float:
+                while text not in (await socket.receive(PATIENCE)).data.decode():
+                    pass
+                return time.monotonic()
+
+            for socket in sockets:
+                await shown(socket, '1 light: 1 off')
+            delays = []
+            # A busy machine delays some.
+            for _ in range(5):
+                await sockets[0].send_json(['stdin', ' '])
+                await shown(sockets[0], 'It can dazzle')
+                for key, text in (('\r', ': 1 ON'), ('0', ': 1 off')):
+                    begun = time.monotonic()
+                    await sockets[0].send_json(['stdin', key])
+                    ends = await asyncio.gather(*(shown(socket, text) for socket in sockets))
+                    delays.append(max(ends) - begun)
+            return min(delays)
+
+    with served() as (_, url):
+        assert asyncio.run(measure(url)) < 0.2
 
 
 def children(server: Program) -> list[str]:
