@@ -118,7 +118,7 @@ def test_report_begins_with_what_is_new_and_ends_with_the_values() -> None:
     one.diagnoses['lamp'] = Diagnosis(1, 'dimmed because it is hot', {'off_in_s': '12.3'})
 
     assert text_of(one).startswith(
-        'on: done: confirmed; is switched off by off_after_silence: no request for 30 s; dimmed '
+        'on: done; is switched off by off_after_silence: no request for 30 s; dimmed '
         'because it is hot; off in 12 s without a request: o keeps it on; 40 %  41.5 C')
     one.now = one.heard_at = NOW + NEWS_LIFETIME
     assert text_of(one).startswith('dimmed because it is hot; off in 12 s')
@@ -135,3 +135,6 @@ def test_all_off_counts_the_confirmed_and_names_the_others() -> None:
 
     assert ''.join(cell if isinstance(cell, str) else cell[0] for cell in cells) == (
         'ALL OFF: 1 of 2 confirmed; /stern FAILED: no answer, trying again')
+    cells = off_report([('/bow', DONE, 'off'), ('/stern', DONE, 'off, confirmed')])
+    assert ''.join(cell if isinstance(cell, str) else cell[0] for cell in cells) == (
+        'ALL OFF: 2 of 2 confirmed: /bow, /stern')

@@ -32,7 +32,7 @@ from textual.widgets import Button, DataTable, Sparkline, Static
 
 from .ros_graph import Graph, GraphDevice
 from .table import by_kind, counts, last, level, off_report, report, state
-from ...ros.monitor_view import age, Cell, FAILED, Key, LEVELS, Line, Request
+from ...ros.monitor_view import age, BY_SEVERITY, Cell, FAILED, Key, LEVELS, Line, Request
 
 # s between updates of the screen, and between looks for answers to requests.
 INTERVAL, ANSWER_INTERVAL = 0.1, 0.05
@@ -254,8 +254,9 @@ class MonitorApp(App[None], inherit_bindings=False):
         """Draw what has changed."""
         if not (self._table.is_mounted and self._table.is_attached):
             return
-        # The order of attention.
-        devices = sorted(self._graph.devices, key=lambda device: device.attention)
+        # The order of attention, the worst first.
+        devices = sorted(self._graph.devices, key=lambda device: (
+            device.attention, -BY_SEVERITY.index(device.level or 0)))
         if self._selected not in devices:
             self._select(devices[min(self._at, len(devices) - 1)] if devices else None)
         self._at = 0 if self._selected is None else devices.index(self._selected)

@@ -73,7 +73,8 @@ def report(device: Device) -> list[Cell]:
     parts: list[list[Cell]] = []
     if device.action is not None and (
             device.action[1] == PENDING or device.now < device.action[3] + NEWS_LIFETIME):
-        parts.append(last(device))
+        # The details have the answer; a row has what is wrong behind it.
+        parts.append(last(device)[:2] if device.action[1] == DONE else last(device))
     news, at = device.news
     if device.now < at + NEWS_LIFETIME:
         # The row has the name.
@@ -91,7 +92,9 @@ def off_report(answers: Sequence[tuple[str, Cell, str]]) -> list[Cell]:
     others = [(name, outcome, answer) for name, outcome, answer in answers if outcome != DONE]
     cells: list[Cell] = [(f'ALL OFF: {len(answers) - len(others)} of {len(answers)} confirmed',
                           'bold')]
-    for name, outcome, answer in others or answers:
+    if not others:
+        cells.append(': ' + ', '.join(name for name, _, _ in answers))
+    for name, outcome, answer in others:
         cells += ['; ', f'{name} ', outcome, f': {answer}' if answer else '']
     return cells
 
