@@ -62,10 +62,13 @@ from visualization_msgs.msg import Marker  # noqa: E402
 TIMEOUT = 30.0
 # Columns and lines of the monitor.
 SIZE = (112, 28)
+# Of a screen of 390 by 844 pixels.
+PHONE_SIZE = (55, 60)
 # For each kind of device how to select it, and the keys that operate it; an answer follows each.
-KEYS = {'light': (['home'], ['space enter', '-', '-']),
+# The camera is first, since it lacks an input.
+KEYS = {'light': (['home', 'down'], ['space enter', '-', '-']),
         'gimbal': (['end'], ['t', *['m down'] * 6, *['m left'] * 4]),
-        'camera': (['end', 'up'], ['p', 'space'])}
+        'camera': (['home'], ['p', 'space'])}
 FLIGHT_SECONDS, FLIGHT_SPEED = 36.0, 10.0
 # Degrees that these keys turn the gimbal down.
 DOWN = 30.0
@@ -106,8 +109,8 @@ async def draw_monitor(graph: Graph, folder: Path) -> None:
     """Operate a device of each kind, and draw the monitor after that."""
     app = MonitorApp(graph)
     async with app.run_test(size=SIZE) as pilot:
-        await until(lambda: [device.state for device in graph.devices] == [
-            'off', 'off', 'ok', 'ok'])
+        await until(lambda: [(device.state, device.level) for device in graph.devices] == [
+            ('off', 0), ('off', 0), ('ok', 1), ('ok', 0)])
         for kind, (selecting, presses) in KEYS.items():
             await pilot.press(*selecting)
             [device] = [one for one in graph.devices if one.view.kind == kind][:1]
@@ -117,12 +120,20 @@ async def draw_monitor(graph: Graph, folder: Path) -> None:
                 await until(functools.partial(_is_answered, device))
                 # The next key begins with the new state.
                 await asyncio.sleep(0.4)
-            # Diagnostics are published once a second.
-            await asyncio.sleep(1.2)
-            picture = app.export_screenshot(title='ros2 run illuminator_ros monitor')
-            # Its fonts would be loaded from another host.
-            (folder / f'monitor-{kind}.svg').write_text(re.sub(
-                r'@font-face \{.*?\}', '', picture, flags=re.DOTALL))
+            await save_screen(app, folder / f'monitor-{kind}.svg')
+    app = MonitorApp(graph, touch=True)
+    async with app.run_test(size=PHONE_SIZE) as pilot:
+        await pilot.press('home', 'down', 'v', 'v')
+        await save_screen(app, folder / 'monitor-phone.svg')
+
+
+async def save_screen(app: MonitorApp, path: Path) -> None:
+    """Draw the screen, with the newest diagnostics."""
+    # They are published once a second.
+    await asyncio.sleep(1.2)
+    picture = app.export_screenshot(title='ros2 run illuminator_ros monitor')
+    # Its fonts would be loaded from another host.
+    path.write_text(re.sub(r'@font-face \{.*?\}', '', picture, flags=re.DOTALL))
 
 
 def _is_answered(device: Device) -> bool:

@@ -40,7 +40,8 @@ KEYS = {'fastcrc': 'python3-pymavlink-pip', 'hypothesis': 'python3-hypothesis',
 
 pytestmark = pytest.mark.timeout(300)
 # Modules of the extra "monitor", without a rosdep key.
-OPTIONAL = {'textual', 'textual_serve', 'aiohttp'}
+# rich comes with textual, aiohttp with textual-serve.
+OPTIONAL = {'textual', 'rich', 'textual_serve', 'aiohttp'}
 # Further ones without a key. Tests skip if one is absent.
 PEERS = {'cyclonedds', 'mavsdk', *OPTIONAL}
 # They make tf2_msgs where there is no ROS; a ROS installation has both.

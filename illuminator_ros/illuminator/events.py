@@ -18,6 +18,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from enum import Enum
+import math
 from typing import NamedTuple
 
 from .model import Configuration, FIELDS, Status
@@ -233,6 +234,7 @@ class LightSnapshot(NamedTuple):
     :param holder: the source of commands that holds it, '' if none does; None without sources.
     :param held_since: when the holder changed last.
     :param unreachable: why requests cannot reach the light, '' if they can.
+    :param off_at: when ``off_after_silence`` switches it off, infinity for never.
     """
 
     address: Address
@@ -252,6 +254,7 @@ class LightSnapshot(NamedTuple):
     unreachable: str
     holder: str | None = None
     held_since: float = 0.0
+    off_at: float = math.inf
 
     def events(self) -> list[LightEvent]:
         """Return the events that lead to this state, for a listener that subscribes late."""

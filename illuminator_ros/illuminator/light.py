@@ -227,7 +227,8 @@ class Light:
             self._settings.status_interval, self.restarts, self._temperature,
             configuration.agreed, configuration.discrepancy, configuration.exceeded,
             queries.identity, queries.identity_is_settled(now), self._changing.are_changing,
-            self.unreachable(now), self._sources.shown_holder, self._sources.since)
+            self.unreachable(now), self._sources.shown_holder, self._sources.since,
+            self._switch.off_at)
 
     def change_settings(self, settings: Settings, now: float) -> None:
         """

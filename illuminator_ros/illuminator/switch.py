@@ -192,6 +192,11 @@ class Switch:
             or self._property.unconfirmed(now) == ON
             and (self.enabled is None or now < self._property.fence))
 
+    @property
+    def off_at(self) -> float:
+        """Return when ``off_after_silence`` switches the light off, infinity for never."""
+        return self._silence_due
+
     # Reports
 
     def reported(

@@ -39,8 +39,14 @@ LEVELS = (('OK', 'green'), ('WARN', 'yellow'), ('ERROR', 'bold red'), ('STALE', 
 LOST, SILENT, GONE, NOT_KNOWN = STATES = ('LOST', 'silent', 'gone', '?')
 STATE_STYLES = dict(zip(STATES, ('bold red', 'yellow', 'red', 'dim'), strict=True))
 STALE_STATES = (LOST, SILENT, GONE)
-# The outcomes of a request with their styles.
-PENDING, DONE, FAILED = ('...', 'dim'), ('done', 'green'), ('FAILED', 'bold red')
+# The outcomes of a request with their styles; a message on a topic is SENT, and has no answer.
+PENDING, DONE, SENT, FAILED = (
+    ('...', 'dim'), ('done', 'green'), ('sent', 'green'), ('FAILED', 'bold red'))
+# s for which a row shows an outcome, and a line of the node's log.
+NEWS_LIFETIME = 10.0
+# The order of attention; the levels from the best to the worst.
+DANGEROUS, BROKEN, FINE = range(3)
+BY_SEVERITY = (0, 3, 1, 2)
 
 # A text, or a text with its style.
 Cell = str | tuple[str, str]
@@ -105,6 +111,8 @@ class Device:
     :ivar changed_at: when each topic changed, s, absent before its first change.
     :ivar wanted: values that were requested, and until when they count as such, s.
     :ivar action: the last request, its outcome, the answer, and when that was noted, s.
+    :ivar off: outcome and answer of the last OFF, None before the first.
+    :ivar news: the last line of its node's log, and when it came, s.
     """
 
     name: str
@@ -119,6 +127,28 @@ class Device:
     trend: deque[float | None] = field(default_factory=lambda: deque(maxlen=TREND_SIZE))
     diagnoses: dict[str, Diagnosis] = field(default_factory=dict)
     action: tuple[str, tuple[str, str], str, float] | None = None
+    off: tuple[tuple[str, str], str] | None = None
+    news: tuple[str, float] = '', -math.inf
+
+    @property
+    def level(self) -> int | None:
+        """Return its worst level, an index of :data:`LEVELS`, None if it has not sent one."""
+        levels = map(self.level_of, self.diagnoses.values())
+        return max(levels, key=BY_SEVERITY.index, default=3 if self.is_stale else None)
+
+    def level_of(self, one: Diagnosis) -> int:
+        """Return a level, STALE for an OK that may be out of date."""
+        return one.level or 3 * self.is_stale
+
+    @property
+    def is_stale(self) -> bool:
+        """Return whether its values may be out of date."""
+        return self.state in STALE_STATES
+
+    @property
+    def attention(self) -> int:
+        """Return its place in the order of attention."""
+        return DANGEROUS if self.view.is_dangerous(self) else BROKEN if self.level else FINE
 
     @property
     def state(self) -> str:
@@ -197,7 +227,9 @@ class View:
     :param steering: keys that act only after the operator has begun to steer.
     :param states: the words of :meth:`state` with their styles, in the order of the counts.
     :param state: returns the state of a connected device.
-    :param trend: the topic whose last values are kept.
+    :param trend: returns a value to keep for the trend, None if there is none.
+    :param is_dangerous: whether a device can hurt people and does not do as it should.
+    :param notice: returns what is going to happen by itself, for people, '' for nothing.
     :param off: the request for "all off".
     """
 
@@ -210,7 +242,9 @@ class View:
     steering: Sequence[Key] = ()
     states: Mapping[str, str] = field(default_factory=lambda: {'ok': 'green'})
     state: Callable[[Device], str] = lambda device: 'ok' if device.values else NOT_KNOWN
-    trend: str = ''
+    trend: Callable[[Device], float | None] | None = None
+    is_dangerous: Callable[[Device], bool] = lambda device: False
+    notice: Callable[[Device], str] = lambda device: ''
     off: Callable[[Device], Request] | None = None
 
 
@@ -237,30 +271,6 @@ RELEASE_SOURCE = Key(('u',), 'give it back to other sources of commands', 'give 
 def finite(number: float) -> float | None:
     """Return a number, None for one that no quantity of a device can be."""
     return number if abs(number) < 1e9 else None
-
-
-def bar(value: float, width: int) -> str:
-    """Return a bar for a share, %."""
-    filled = max(round(min(max(value / 100, 0.0), 1.0) * width), int(value > 0))
-    return '█' * filled + '░' * (width - filled)
-
-
-def sparkline(values: Iterable[float | None], smallest_span: float) -> str:
-    """Return a character for each value, a space for None."""
-    known = [value for value in values if value is not None] or [0.0]
-    low, span = min(known), max(known) - min(known)
-    low, span = low - max(smallest_span - span, 0) / 2, max(span, smallest_span)
-    return ''.join(' ' if value is None else '▁▂▃▄▅▆▇█'[min(int((value - low) / span * 8), 7)]
-                   for value in values)
-
-
-def dial(value: float | None, low: float, high: float, width: int) -> str:
-    """Return a scale from ``low`` to ``high`` with a mark at a value, and one at 0."""
-    marks = ['─'] * width
-    for at, mark in ((0.0, '┼'), (value, '█')):
-        if low != high and at is not None:
-            marks[round(min(max((at - low) / (high - low), 0.0), 1.0) * (width - 1))] = mark
-    return ''.join(marks)
 
 
 def measured(value: float | None, unit: str, form: str = '.3g') -> str:

@@ -25,12 +25,12 @@ from illuminator_ros.cli.monitor.app import (
     QUESTION_LIFETIME,
 )
 from illuminator_ros.cli.monitor.ros_graph import Graph, TREND_POLLS
-from illuminator_ros.ros.monitor_view import DONE, FAILED, TREND_SIZE
+from illuminator_ros.ros.monitor_view import Diagnosis, DONE, FAILED, NEWS_LIFETIME, TREND_SIZE
 import pytest
 from support.monitor import camera, FakeGraph, gimbal, light, NOW, Screen, show
 from textual.color import Color
 from textual.events import Paste
-from textual.widgets import Static
+from textual.widgets import Button, DataTable
 
 SIZES = [(500, 500), (200, 50), (80, 24), (40, 44), (20, 6), (12, 3), (5, 2), (1, 1)]
 
@@ -56,10 +56,11 @@ def test_screen_fits_every_terminal_and_shows_the_selected_device(
 
 def test_screen_shows_each_kind_with_its_states_values_and_findings() -> None:
     async def test(screen: Screen) -> None:
-        for text in ('2 lights: 1 ON, 1 off', '/bow off 40 % 41.5 C steady internal', '12 %',
-                     '1 camera: 1 ok', '/camera ok 7 12 ms fix 47.300000 8.500000 480.0 m',
-                     '1 gimbal: 1 ours', '/gimbal ours 28.6 down 14.3 right primary 1/193',
-                     'WARN: dimmed because it is hot', 'held by safety for 61 s'):
+        for text in ('2 lights: 1 ON, 1 off; 1 camera: 1 ok; 1 gimbal: 1 ours',
+                     '/bow off WARN dimmed because it is hot; 40 % 41.5 C steady internal',
+                     '/camera ok WARN nothing received on ~/imu; 7 12 ms fix 47.300000 8.500000',
+                     '/gimbal ours OK 28.6 down 14.3 right primary 1/193',
+                     'lamp WARN: dimmed because it is hot', 'held by safety for 61 s'):
             assert text in screen.text
 
     show(test, light(), light('/stern', enabled=True), camera(), gimbal(), size=(200, 40))
@@ -83,8 +84,9 @@ def test_poll_before_the_screen_exists_is_shown_on_it() -> None:
     app.poll()
 
     async def run() -> None:
-        async with app.run_test(size=(132, 40)):
-            assert '/bow' in app.query_one('#details', Static).render_line(0).text
+        async with app.run_test(size=(132, 40)) as pilot:
+            await pilot.pause()
+            assert '/bow' in Screen(app, pilot, FakeGraph()).text
 
     asyncio.run(run())
 
@@ -217,6 +219,62 @@ def test_all_off_acts_at_once_whatever_is_shown(before: list[str]) -> None:
         ('/bow', 'off'), ('/stern', 'off')]
 
 
+@pytest.mark.parametrize('size', [(200, 50), (80, 24), (54, 12), (20, 6)])
+@pytest.mark.parametrize('before', [[], ['?'], ['space'], ['end', 'p', '4', '7'], ['end', 'm']])
+def test_all_off_is_one_touch_away_whatever_is_shown(
+    before: list[str], size: tuple[int, int],
+) -> None:
+    async def test(screen: Screen) -> None:
+        await screen.press(*before)
+        await screen.click('ALL OFF')
+
+    assert show(test, light(), gimbal(), size=size).asked == [('/bow', 'off')]
+
+
+def test_all_off_says_of_each_light_whether_it_has_confirmed() -> None:
+    async def test(screen: Screen) -> None:
+        await screen.press('a')
+        for one, off in zip(screen.graph.devices, [
+                (DONE, 'off'), (FAILED, 'no answer, trying again')], strict=True):
+            one.off = off
+        await screen.wait()
+        assert 'ALL OFF: 1 of 2 confirmed; /stern FAILED: no answer, trying again' in screen.text
+        screen.graph.devices[1].off = DONE, 'off'
+        await screen.wait()
+        assert 'ALL OFF: 2 of 2 confirmed' in screen.text
+        await screen.wait(NEWS_LIFETIME + 1)
+        assert 'confirmed' not in screen.text
+
+    show(test, light(), light('/stern'))
+
+
+def test_dangerous_device_is_first_then_what_is_broken_and_the_selection_stays() -> None:
+    async def test(screen: Screen) -> None:
+        await screen.press('end')
+        screen.graph.devices[1].values['enabled'] = True
+        screen.graph.devices[0].diagnoses['lamp'] = Diagnosis(0, 'off', {})
+        await screen.wait()
+        names = [line.split()[0] for line in screen.lines if line.startswith(' /')]
+        assert names[:3] == ['/b', '/c', '/a']
+        await screen.press('r')
+
+    assert show(test, *map(light, ('/a', '/b', '/c'))).asked == [('/c', 'refresh')]
+
+
+def test_80_columns_show_level_and_fault_of_a_device_that_is_not_selected() -> None:
+    long_name = '/uav1/payload/searchlight_of_the_bow'
+    ill = light(long_name, enabled=True)
+    ill.diagnoses['lamp'] = Diagnosis(2, 'switched off because it is too hot', {})
+
+    async def test(screen: Screen) -> None:
+        await screen.press('end')
+        [row] = [line for line in screen.lines if line.startswith(' /uav1')]
+        assert ' ON ERROR! switched off because it is too hot' in ' '.join(row.split())
+        assert len(row) <= 80
+
+    show(test, light(), ill, light('/z'), size=(80, 24))
+
+
 def test_arrows_move_a_gimbal_only_after_steering_has_begun() -> None:
     async def test(screen: Screen) -> None:
         await screen.press('end', 'up', 'end')
@@ -225,7 +283,7 @@ def test_arrows_move_a_gimbal_only_after_steering_has_begun() -> None:
         assert '←' in screen.text
         await screen.press('escape', 'up', 'end', 'm', 'j')
         assert screen.graph.asked == [
-            ('/gimbal', 'pitch to 23.6 degrees'), ('/gimbal', 'yaw to -9.3 degrees')]
+            ('/gimbal', 'pitch to 23.6 down'), ('/gimbal', 'yaw to 9.3 right')]
         await screen.press('up', 'm', 'up')
 
     assert len(show(test, light(), gimbal()).asked) == 2
@@ -274,15 +332,67 @@ def test_labels_of_keys_are_not_keys_of_others() -> None:
         assert own & ACTIONS.keys() == set()
 
 
-def test_row_of_the_selected_device_alone_is_reversed() -> None:
+def test_row_of_the_selected_device_alone_is_highlighted() -> None:
     async def test(screen: Screen) -> None:
         await screen.press('down')
-        reversed_ = [y for y in range(6) if any(
-            one.style is not None and one.style.reverse
-            for one in screen.app.query_one('#devices').render_line(y))]
-        assert [screen.lines[y].split()[0] for y in reversed_] == ['/b']
+        table = screen.app.query_one(DataTable)
+        backgrounds = {row: next(segment.style.bgcolor for segment in table.render_line(row)
+                                 if segment.style is not None) for row in (1, 2, 3)}
+        assert backgrounds[1] == backgrounds[3] != backgrounds[2]
 
     show(test, *map(light, ('/a', '/b', '/c')))
+
+
+@pytest.mark.parametrize('touch', [False, True])
+def test_night_is_red_on_black_whatever_is_shown(touch: bool) -> None:
+    async def test(screen: Screen) -> None:
+        await screen.press('v', 'v')
+        for keys in ([], ['end'], ['space'], ['escape', '?'], ['escape', 'a']):
+            await screen.press(*keys)
+            colours = {(part, colour.get_truecolor().green, colour.get_truecolor().blue)
+                       for part in screen.app.screen.query('*') for y in range(part.size.height)
+                       for segment in part.render_line(y) if segment.style is not None
+                       for colour in (segment.style.color, segment.style.bgcolor) if colour}
+            assert {(str(part), green, blue) for part, green, blue in colours
+                    if green or blue} == set()
+
+    ill = light('/ill', enabled=True)
+    show(test, light(), ill, camera(), gimbal('/lost', connected=False), size=(80, 30),
+         touch=touch)
+
+
+def test_colours_for_sunlight_contrast_with_their_background() -> None:
+    async def test(screen: Screen) -> None:
+        await screen.press('v')
+        table = screen.app.query_one(DataTable)
+        for y in range(2, 5):
+            for segment in table.render_line(y):
+                assert segment.style is not None
+                assert segment.style.color is not None and segment.style.bgcolor is not None
+                front, back = (Color.from_rich_color(one).brightness for one in (
+                    segment.style.color, segment.style.bgcolor))
+                assert abs(front - back) > 0.5
+
+    show(test, light(), light('/on', enabled=True), camera(), gimbal('/lost', connected=False))
+
+
+def test_buttons_for_fingers_have_three_rows_and_whole_labels_on_a_phone() -> None:
+    async def test(screen: Screen) -> None:
+        buttons = [one for one in screen.app.query(Button) if one.display]
+        assert {one.outer_size.height for one in buttons} == {3}
+        shown = '\n'.join(screen.lines)
+        assert [str(one.label) for one in buttons if str(one.label) not in shown] == []
+
+    show(test, light(), size=(54, 56), touch=True)
+
+
+def test_view_that_may_only_look_has_no_buttons_to_operate_a_device() -> None:
+    async def test(screen: Screen) -> None:
+        assert 'ALL OFF' not in screen.text
+        assert 'on/off' not in screen.text
+        await screen.press('a')
+
+    assert show(test, light(), may_request=False).requests == []
 
 
 def test_answers_are_taken_between_the_keys() -> None:

@@ -22,9 +22,11 @@ from illuminator_ros.cli.monitor.ros_graph import (
     DISCOVERY_LIMIT,
     GraphDevice,
     OFF_INTERVAL,
+    OFF_LIMIT,
+    OFF_RETRY,
     WANTED_LIFETIME,
 )
-from illuminator_ros.ros.monitor_view import Device, Request
+from illuminator_ros.ros.monitor_view import Device, DONE, FAILED, Request
 import pytest
 from rclpy.node import Node
 from rclpy.task import Future
@@ -77,10 +79,11 @@ class Topic(Endpoint):
 class Bench:
     """A device, by default a light that is off and steady, at 40 %."""
 
-    def __init__(self, of: Device | None = None) -> None:
+    def __init__(self, of: Device | None = None, may_request: bool = True) -> None:
         self.endpoints: dict[str, Any] = {}
         of = of or light()
-        self.device = GraphDevice(cast(Node, self), of.name, of.view, 0.0)
+        self.device = GraphDevice(
+            cast(Node, self), of.name, of.view, 0.0, may_request=may_request)
         self.device.values = of.values
 
     def create_subscription(self, *arguments: Any) -> None:
@@ -267,7 +270,7 @@ def test_message_on_a_topic_waits_for_a_subscriber_and_has_no_answer() -> None:
     bench.press('up')
 
     assert [round(message.vector.y, 3) for message in topic.sent] == [0.413, 0.325]
-    assert bench.outcome()[1:] == ('done', 'sent, which has no answer')
+    assert bench.outcome()[1:] == ('sent', '')
 
 
 def test_steps_of_several_axes_before_the_subscriber_is_known_reach_it_together() -> None:
@@ -287,3 +290,69 @@ def test_steps_of_several_axes_before_the_subscriber_is_known_reach_it_together(
     assert len(place.sent) == 1
     bench.poll(WANTED_LIFETIME)
     assert bench.device.wants('pitch', 0.5) == 0.5
+
+
+def require_off(bench: Bench) -> None:
+    """Switch off as ALL OFF does."""
+    assert bench.device.view.off is not None
+    bench.device.require_off(bench.device.view.off(bench.device))
+
+
+def test_off_of_all_off_is_sent_again_until_an_answer_confirms_it(bench: Bench) -> None:
+    require_off(bench)
+
+    bench.answer('enable', 1, success=False, text='not confirmed')
+    assert bench.device.off == (FAILED, 'not confirmed, trying again')
+    bench.poll(OFF_RETRY - 0.1)
+    assert bench.switches() == [False]
+    bench.poll(OFF_RETRY)
+    assert bench.switches() == [False, False]
+
+    bench.answer('enable', 2, text='off, confirmed')
+    assert bench.device.off == (DONE, 'off, confirmed')
+    bench.poll(2 * OFF_LIMIT)
+    assert len(bench.switches()) == 2
+
+
+def test_off_that_is_never_confirmed_is_given_up_and_says_so(bench: Bench) -> None:
+    require_off(bench)
+
+    for number in range(100):
+        bench.poll(number * OFF_RETRY)
+        if len(bench.switches()) > number:
+            bench.answer('enable', number + 1, success=False, text='no light connected')
+
+    assert len(bench.switches()) == round(OFF_LIMIT / OFF_RETRY) + 1
+    assert bench.device.off == (FAILED, 'no light connected')
+
+
+def test_on_of_the_operator_ends_the_repetition_of_an_off(bench: Bench) -> None:
+    require_off(bench)
+    bench.answer('enable', 1, success=False)
+
+    bench.press('space')
+    bench.answer('enable', 2)
+    bench.poll(OFF_LIMIT / 2)
+
+    assert bench.switches() == [False, True]
+
+
+def test_message_that_the_node_refuses_is_shown_as_failed_with_the_reason() -> None:
+    bench = Bench(gimbal())
+    bench.press('p', typed='47.3 8.5 480')
+    assert bench.outcome() == ('point at 47.3 8.5 480', 'sent', '')
+
+    bench.device.log('gimbal 1/154 connected')
+    assert bench.outcome()[1] == 'sent'
+    bench.device.log('~/cmd/roi: ignored: held by safety')
+
+    assert bench.outcome() == ('point at 47.3 8.5 480', 'FAILED', 'ignored: held by safety')
+
+
+def test_monitor_that_may_only_look_sends_nothing() -> None:
+    bench = Bench(may_request=False)
+
+    bench.press('space', '0', '-', 'r')
+
+    assert bench.endpoints == {}
+    assert bench.outcome() == ('refresh', 'FAILED', 'this monitor may only look')

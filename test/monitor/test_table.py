@@ -12,13 +12,24 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""The output of the monitor for scripts."""
+"""The texts of the monitor for people, and its output for scripts."""
 
 import json
 import re
 
-from illuminator_ros.cli.monitor.table import as_json, plain
-from support.monitor import camera, gimbal, light
+from illuminator_ros.cli.monitor.table import as_json, level, off_report, plain, report
+from illuminator_ros.ros.monitor_view import (
+    BROKEN,
+    DANGEROUS,
+    Device,
+    Diagnosis,
+    DONE,
+    FAILED,
+    FINE,
+    NEWS_LIFETIME,
+)
+import pytest
+from support.monitor import camera, gimbal, light, NOW
 
 
 def test_table_has_a_heading_and_a_row_for_each_device_of_a_kind() -> None:
@@ -51,3 +62,79 @@ def test_json_has_all_values_and_null_for_what_is_unknown() -> None:
     assert first['diagnostics']['lamp']['level'] == 'WARN'
     assert first['diagnostics']['link']['values']['loss_percent'] == '12.3'
     assert second['values']['angles'] == ['base_link_stabilized', 0.0, 0.5, -0.25]
+
+
+def diagnosed(one: Device, **levels: int) -> Device:
+    """Return a device with these diagnoses only."""
+    one.diagnoses = {kind: Diagnosis(level, f'{kind} {level}', {})
+                     for kind, level in levels.items()}
+    return one
+
+
+def gone(one: Device) -> Device:
+    """Return a device that is gone."""
+    one.is_gone = True
+    return one
+
+
+def disobeying(one: Device) -> Device:
+    """Return a device that has not confirmed an OFF."""
+    one.off = FAILED, 'no answer'
+    return one
+
+
+@pytest.mark.parametrize(('one', 'attention', 'text'), [
+    (diagnosed(light(enabled=True), lamp=0, link=0), FINE, 'OK'),
+    (diagnosed(light(enabled=True), lamp=1, link=0), DANGEROUS, 'WARN!'),
+    (diagnosed(light(enabled=True), lamp=2, link=0), DANGEROUS, 'ERROR!'),
+    (diagnosed(light(enabled=True), lamp=0, link=1), BROKEN, 'WARN'),
+    (diagnosed(light(enabled=True, connected=False), lamp=2, link=2), DANGEROUS, 'ERROR!'),
+    (disobeying(diagnosed(light(enabled=True), lamp=0)), DANGEROUS, 'OK!'),
+    (disobeying(diagnosed(light(), lamp=0)), FINE, 'OK'),
+    (diagnosed(light(), lamp=2), BROKEN, 'ERROR'),
+    (diagnosed(light(), lamp=1, link=3), BROKEN, 'WARN'),
+    # OK is out of date where nothing is heard.
+    (gone(diagnosed(light(), lamp=0, link=0)), BROKEN, 'STALE'),
+    (gone(diagnosed(gimbal(), device=0)), BROKEN, 'STALE'),
+    (diagnosed(camera(), camera=1), BROKEN, 'WARN'),
+    (diagnosed(gimbal()), FINE, '-')])
+def test_level_says_what_needs_attention_and_what_is_dangerous(
+    one: Device, attention: int, text: str,
+) -> None:
+    shown = level(one)
+
+    assert (one.attention, shown if isinstance(shown, str) else shown[0]) == (attention, text)
+
+
+def text_of(one: Device) -> str:
+    """Return the report of a device without styles."""
+    return ''.join(cell if isinstance(cell, str) else cell[0] for cell in report(one))
+
+
+def test_report_begins_with_what_is_new_and_ends_with_the_values() -> None:
+    one = light(enabled=True)
+    one.action = 'on', DONE, 'confirmed', NOW
+    one.news = 'light 1/243 is switched off by off_after_silence: no request for 30 s', NOW
+    one.diagnoses['lamp'] = Diagnosis(1, 'dimmed because it is hot', {'off_in_s': '12.3'})
+
+    assert text_of(one).startswith(
+        'on: done; is switched off by off_after_silence: no request for 30 s; dimmed '
+        'because it is hot; off in 12 s without a request: o keeps it on; 40 %  41.5 C')
+    one.now = one.heard_at = NOW + NEWS_LIFETIME
+    assert text_of(one).startswith('dimmed because it is hot; off in 12 s')
+
+
+def test_gone_device_shows_nothing_as_ok() -> None:
+    one = gone(diagnosed(light(), lamp=0, link=0))
+
+    assert ' OK' not in ' '.join(plain([one]))
+
+
+def test_all_off_counts_the_confirmed_and_names_the_others() -> None:
+    cells = off_report([('/bow', DONE, 'off'), ('/stern', FAILED, 'no answer, trying again')])
+
+    assert ''.join(cell if isinstance(cell, str) else cell[0] for cell in cells) == (
+        'ALL OFF: 1 of 2 confirmed; /stern FAILED: no answer, trying again')
+    cells = off_report([('/bow', DONE, 'off'), ('/stern', DONE, 'off, confirmed')])
+    assert ''.join(cell if isinstance(cell, str) else cell[0] for cell in cells) == (
+        'ALL OFF: 2 of 2 confirmed: /bow, /stern')

@@ -19,6 +19,7 @@ from typing import Any
 
 from illuminator_ros.gimbal.ros import monitor_view as gimbal_view
 from illuminator_ros.illuminator.ros import monitor_view as light_view
+from illuminator_ros.mavlink.dialect import mavlink
 from illuminator_ros.ros import monitor_view as shared
 import pytest
 from support.monitor import camera, gimbal, light, NOW
@@ -180,6 +181,42 @@ def test_gimbal_asks_before_it_turns_to_neutral_and_releases_at_once() -> None:
     assert not request(gimbal(), 'l').question
 
 
+@pytest.mark.parametrize(('values', 'key', 'name'), [
+    ({'enabled': True}, 'o', 'set_parameters_atomically'),
+    ({'enabled': True, 'source': ''}, 'o', 'autonomy/cmd/brightness'), ({}, 'o', '')])
+def test_light_is_kept_on_by_a_request_that_cannot_switch_it_on(
+    values: dict[str, Any], key: str, name: str,
+) -> None:
+    one = light(**values, brightness=37.53)
+    one.source = 'autonomy'
+
+    made = ask(one, key)
+
+    if name:
+        assert isinstance(made, shared.Request)
+        assert (made.name, made.values, made.text) == (name, {'brightness': 37.53}, 'keep on')
+    else:
+        assert made == 'it is not on'
+
+
+def test_temperature_of_a_failed_sensor_is_not_shown_nor_kept() -> None:
+    one = light(error_flags=mavlink.ILLUMINATOR_ERROR_FLAGS_THERMISTOR_FAILURE)
+
+    assert one.view.trend is not None
+    assert one.view.trend(one) is None
+    assert '41.5 C' not in [column.cell(one) for column in one.view.columns]
+    assert 'temp' not in [label for label, _ in one.view.details(one)]
+
+
+@pytest.mark.parametrize(('angles', 'key', 'text'), [
+    ((0.0, 0.5, -0.25), 'up', 'pitch to 23.6 down'), ((0.0, 0.0, 0.0), 'up', 'pitch to 5.0 up'),
+    ((0.0, 0.0, 0.0), 'right', 'yaw to 5.0 right'), ((0.0, 0.0, 0.0), 'left', 'yaw to 5.0 left')])
+def test_requested_angle_has_a_direction_as_shown_angles_have(
+    angles: tuple[float, ...], key: str, text: str,
+) -> None:
+    assert request(gimbal(angles=('map', *angles)), key).text == text
+
+
 def test_keys_of_the_camera_are_its_services() -> None:
     assert [request(camera(), key).name for key in ('space', 'b', 'p')] == [
         'capture', 'capture_panel', 'ping']
@@ -191,7 +228,7 @@ def test_keys_of_the_camera_are_its_services() -> None:
     (light(strobe_period=0.5, strobe_duty_cycle=20.0), ['0.5 s 20 %']),
     (gimbal(), ['28.6 down', '14.3 right', 'ours: primary 1/193']),
     (camera(), ['7, at 47.300000 8.500000 480.0 m', 'fix ok 0 s', 'imu stale 9 s',
-                'mount missing']),
+                'imu stale', 'mount unused']),
     (camera(fix=(-1, 0.0, 0.0, 0.0)), ['7, at -'])])
 def test_details_have_what_is_known(one: shared.Device, texts: list[str]) -> None:
     shown = '\n'.join(''.join(part if isinstance(part, str) else part[0] for part in parts)
@@ -235,18 +272,10 @@ def test_numbers_that_cannot_be_are_shown(value: float | None) -> None:
     assert all(ask(one, key) for key in '0+-s')
 
 
-@pytest.mark.parametrize(('drawn', 'text'), [
-    (shared.bar(0.0, 4), '░░░░'), (shared.bar(0.1, 4), '█░░░'), (shared.bar(50.0, 4), '██░░'),
-    (shared.bar(900.0, 4), '████'),
-    (shared.sparkline([20.0, 25.0, 30.0, None, 40.0], 4.0), '▁▃▅ █'),
-    # A tenth of a degree is not a peak.
-    (shared.sparkline([25.0, 25.1, 25.0], 4.0), '▄▅▄'),
-    (shared.sparkline([None, None], 4.0), '  '),
-    (shared.dial(1.0, -2.0, 2.0, 5), '──┼█─'), (shared.dial(1.0, 2.0, -2.0, 5), '─█┼──'),
-    (shared.dial(9.0, -2.0, 2.0, 5), '──┼─█'), (shared.dial(None, -2.0, 2.0, 5), '──┼──'),
-    (shared.age(59.6), '60 s'), (shared.age(150.0), '2.5 min'), (shared.age(1e6), '11.6 d')])
-def test_drawing_of_a_value(drawn: str, text: str) -> None:
-    assert drawn == text
+@pytest.mark.parametrize(('seconds', 'text'), [
+    (59.6, '60 s'), (150.0, '2.5 min'), (1e6, '11.6 d')])
+def test_length_of_time_has_one_unit(seconds: float, text: str) -> None:
+    assert shared.age(seconds) == text
 
 
 def test_target_of_the_last_request_counts_as_long_as_it_lasts() -> None:

@@ -78,13 +78,13 @@ def test_statuses_have_the_keys_of_the_protocol_page_and_a_change_of_level_comes
     own_ros: Ros, port: int,
 ) -> None:
     # The period is so long that only changes of level are published soon.
-    with running_bridge(own_ros.domain, port, diagnostics_period=60.0,
+    with running_bridge(own_ros.domain, port, diagnostics_period=60.0, off_after_silence=60.0,
                         sources="['safety']"), ServedLight(port) as light:
         recorder = own_ros.subscribe(DiagnosticArray, '/diagnostics', STREAM)
         parameters = Parameters(own_ros)
         parameters.wait(mode='internal_control')
         # Then the source `default` holds the light.
-        own_ros.enable(False)
+        own_ros.enable(True)
         light.report(error_status=2)
         array = recorder.wait(
             lambda array: complete(array) and array.status[1].level == DiagnosticStatus.ERROR)

@@ -139,6 +139,29 @@ def test_topics_of_the_views_are_those_of_the_nodes() -> None:
             published.items())
 
 
+def test_off_by_silence_is_announced_can_be_delayed_and_is_reported(
+    own_ros: Ros, port: int, monitor: Watching,
+) -> None:
+    def left(device: Device) -> float:
+        return device.number('lamp', 'off_in_s') or 0.0
+
+    with (running_bridge(own_ros.domain, port, diagnostics_period=0.1, off_after_silence=1.5),
+          ServedLight(port)):
+        monitor.wait(lambda device: device.state == 'off')
+        monitor.press('space')
+        monitor.wait(left)
+        CLOCK.forward(0.8)
+        shown = monitor.wait(lambda device: 0 < left(device) < 0.7)
+        assert 'o keeps it on' in shown.view.notice(shown)
+
+        assert monitor.press('o').startswith('done')
+        monitor.wait(lambda device: left(device) > 0.7)
+
+        CLOCK.forward(1.5)
+        monitor.wait(lambda device: 'by off_after_silence' in device.news[0])
+        monitor.wait(lambda device: device.state == 'off' and not device.view.notice(device))
+
+
 class FakeBridge:
     """The topics of a light that is on at 10 %, without services."""
 
@@ -230,6 +253,10 @@ def test_hostile_graph_neither_stops_nor_fills_the_monitor(
       for missing in SIGNATURE),
     (dict.fromkeys(SIGNATURE, 'std_msgs/msg/String'), {*SIGNATURE}, []),
     (SIGNATURE, {*SIGNATURE} - {'/bow/enabled'}, []),
+    # Names that leave no room for those of all topics and services, or that ROS does not have.
+    *(({topic.replace('/bow', name): type_ for topic, type_ in SIGNATURE.items()},
+       {topic.replace('/bow', name) for topic in SIGNATURE}, [])
+      for name in ('/' + 'x' * 234, '/' + 'x' * 190, '/a-b', '')),
 ])
 def test_light_is_a_node_that_publishes_all_its_signature_topics_with_their_types(
     topics: dict[str, str], publishers: set[str], found: list[str],

@@ -34,6 +34,8 @@ ARGUMENTS = ('--headless', '--no-sandbox', '--disable-gpu', '--disable-quic', '-
              '--disable-background-networking', '--disable-component-update', '--disable-sync',
              '--disable-dev-shm-usage')
 # Records what the page receives over its WebSocket, since a canvas has no text.
+# The key, as WebDriver names it.
+ENTER = '\ue007'
 RECORDER = """
 window.received = ''; let last = Promise.resolve();
 window.WebSocket = class extends WebSocket {
@@ -109,10 +111,30 @@ class Browser:
         self.cdp('Page.addScriptToEvaluateOnNewDocument', source=RECORDER)
         self._call('POST', '/url', {'url': url})
 
-    def new_tab(self) -> None:
-        """Open a tab, and use it."""
-        tab = self._call('POST', '/window/new', {'type': 'tab'})['handle']
+    @property
+    def tab(self) -> str:
+        """Return the tab in use."""
+        return str(self._call('GET', '/window'))
+
+    def use(self, tab: str) -> None:
+        """Use another tab."""
         self._call('POST', '/window', {'handle': tab})
+
+    def new_tab(self) -> str:
+        """Open a tab, use it, and return it."""
+        tab: str = self._call('POST', '/window/new', {'type': 'tab'})['handle']
+        self.use(tab)
+        return tab
+
+    def close_tab(self) -> None:
+        """Close the tab in use; another one must be used next."""
+        self._call('DELETE', '/window')
+
+    def press(self, *keys: str) -> None:
+        """Press keys, which go to the part of the page that has the focus."""
+        self._call('POST', '/actions', {'actions': [{
+            'type': 'key', 'id': 'keyboard', 'actions': [
+                {'type': kind, 'value': key} for key in keys for kind in ('keyDown', 'keyUp')]}]})
 
     @property
     def text(self) -> str:
@@ -126,17 +148,28 @@ class Browser:
 
     def wait_for(self, text: str) -> None:
         """Wait until the terminal shows a text."""
-        eventually(lambda: text in self.text, f'{text!r} on the page')
+        try:
+            eventually(lambda: text in self.text, f'{text!r} on the page')
+        except AssertionError as error:
+            raise AssertionError(f'{error}: {self.text}') from None
+
+    def _place(self, label: str) -> tuple[int, int]:
+        """Return row and column of a text."""
+        return next((y, line.index(label)) for y, line in enumerate(self.lines) if label in line)
 
     def click(self, label: str) -> None:
         """Click a text in the terminal, as a finger or a mouse does."""
         self.wait_for(label)
-        row, line = next((y, line) for y, line in enumerate(self.lines) if label in line)
+        places: list[tuple[int, int]] = []
+        # A new label is drawn before its button has moved.
+        while len(places) < 5 or len({*places[-5:]}) > 1:
+            places.append(self._place(label))
+        row, column = places[-1]
         left, top, width, height = self.run(
             'const box = document.querySelector(".xterm-screen").getBoundingClientRect();'
             'const {width, height} = window.size;'
             'return [box.left, box.top, box.width / width, box.height / height]')
-        place = {'x': round(left + (line.index(label) + 1.5) * width),
+        place = {'x': round(left + (column + 1.5) * width),
                  'y': round(top + (row + 0.5) * height)}
         self._call('POST', '/actions', {'actions': [{
             'type': 'pointer', 'id': 'mouse', 'actions': [

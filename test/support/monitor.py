@@ -18,6 +18,7 @@ from __future__ import annotations
 
 import asyncio
 from collections.abc import Awaitable, Callable
+import math
 from typing import Any, cast
 
 from illuminator_ros.cli.monitor.app import MonitorApp
@@ -27,7 +28,7 @@ from illuminator_ros.illuminator.ros.monitor_view import VIEW as LIGHT
 from illuminator_ros.rededge.ros.monitor_view import VIEW as CAMERA
 from illuminator_ros.ros.monitor_view import Device, Diagnosis, Request, View
 from textual.pilot import Pilot
-from textual.widgets import Static
+from textual.widgets import Button
 
 NOW = 1000.0
 PRESENT: dict[str, dict[str, Any]] = {
@@ -47,6 +48,9 @@ class FakeDevice(Device):
     def submit(self, request: Request) -> None:
         """Record a request."""
         self.sent.append((self.name, request))
+
+    # An OFF that is repeated is one request.
+    require_off = submit
 
 
 def device(view: View, name: str, **values: Any) -> FakeDevice:
@@ -85,12 +89,14 @@ def camera(name: str = '/camera', fix: Any = (0, 47.3, 8.5, 480.0)) -> FakeDevic
 class FakeGraph:
     """A graph with given devices, whose time the test sets."""
 
-    def __init__(self, *devices: FakeDevice) -> None:
+    def __init__(self, *devices: FakeDevice, may_request: bool = True) -> None:
         self.now = NOW
         self.devices = list(devices)
         self.requests: list[tuple[str, Request]] = []
         self.cleared = 0
         self.answers_polled = 0
+        self.may_request = may_request
+        self._off_at = -math.inf
 
     def clock(self) -> float:
         """Return the time, s."""
@@ -98,6 +104,7 @@ class FakeGraph:
 
     # Those of the monitor itself.
     all_off = Graph.all_off
+    off_answers = Graph.off_answers
 
     def clear_gone(self) -> None:
         """Count the calls."""
@@ -130,8 +137,17 @@ class Screen:
     @property
     def lines(self) -> list[str]:
         """Return the lines that are shown."""
-        shown = [one for one in self.app.query(Static) if one.display]
-        return [one.render_line(y).text for one in shown for y in range(one.size.height)]
+        width, height = self.app.size
+        lines = [' ' * width] * height
+        for one in self.app.screen.query('*'):
+            left, top, *_ = one.content_region
+            for y in range(top, min(top + one.size.height, height) if not one.children else 0):
+                # Another part may be above it.
+                if left < width and self.app.screen.get_widget_at(left, y)[0] is one:
+                    text = one.render_line(y - top).text
+                    line = f'{lines[y][:left]}{text}{lines[y][left + len(text):]}'
+                    lines[y] = line[:width]
+        return [line.rstrip() for line in lines]
 
     @property
     def text(self) -> str:
@@ -144,8 +160,8 @@ class Screen:
         await self.settle()
 
     async def settle(self) -> None:
-        """Wait until the events so far have gone from the application to its screen and back."""
-        for one in (self.app, self.app.screen, self.app):
+        """Wait until the events so far have gone from the application to its parts and back."""
+        for one in (self.app, self.app.screen, *self.app.screen.query(Button), self.app):
             handled = asyncio.Event()
             if one.call_later(handled.set):
                 await handled.wait()
@@ -166,10 +182,10 @@ class Screen:
 
 def show(
     test: Callable[[Screen], Awaitable[None]], *devices: FakeDevice,
-    size: tuple[int, int] = (132, 40), **how: Any,
+    size: tuple[int, int] = (132, 40), may_request: bool = True, **how: Any,
 ) -> FakeGraph:
     """Show devices while a test runs; return the graph."""
-    graph = FakeGraph(*devices)
+    graph = FakeGraph(*devices, may_request=may_request)
     app = MonitorApp(cast(Graph, graph), **how)
 
     async def run() -> None:

@@ -78,9 +78,9 @@ class Terminal:
         """Set the size of the terminal."""
         fcntl.ioctl(self._slave, termios.TIOCSWINSZ, struct.pack('HHHH', lines, columns, 0, 0))
 
-    def type(self, text: str) -> None:  # noqa: A003
+    def type(self, text: str | bytes) -> None:  # noqa: A003
         """Press keys."""
-        os.write(self._master, text.encode())
+        os.write(self._master, text if isinstance(text, bytes) else text.encode())
 
     def forget(self) -> None:
         """Forget what was written so far."""

@@ -129,7 +129,21 @@ def test_screen_follows_the_size_of_the_terminal(own_ros: Ros) -> None:
         screen.forget()
         screen.resize(5, 30)
 
-        screen.wait_for('ROS graph y( |$)')
+        screen.wait_for('ROS graph v colours')
+
+
+def test_bytes_that_are_not_utf_8_do_not_end_the_monitor(own_ros: Ros) -> None:
+    with monitor(own_ros) as screen:
+        screen.wait_for('no devices in this ROS graph yet')
+
+        screen.type(b'\xff\xe4 ')
+
+        def helped() -> bool:
+            # Keys that come with such a byte are lost.
+            screen.type('h')
+            return 'this help' in screen.raw
+
+        eventually(helped)
 
 
 def test_without_a_terminal_monitor_prints_a_table(own_ros: Ros) -> None:

@@ -16,10 +16,14 @@
 
 from __future__ import annotations
 
+import asyncio
 from collections.abc import Iterator
 import contextlib
+import os
 from pathlib import Path
 import re
+import socket
+import subprocess
 import sys
 import urllib.error
 import urllib.request
@@ -28,11 +32,20 @@ import pytest
 
 pytest.importorskip('textual_serve')
 
-from support.browser import Browser, IS_INSTALLED, running_browser  # noqa: E402
+import aiohttp  # noqa: E402
+from support.browser import ENTER, IS_INSTALLED, running_browser  # noqa: E402
 from support.ports import free_port  # noqa: E402
-from support.processes import ended, is_running, Program, python, run  # noqa: E402
+from support.processes import (  # noqa: E402
+    ended,
+    environment,
+    is_running,
+    Program,
+    python,
+    ROOT,
+    run,
+)
 from support.ros import own_domain  # noqa: E402
-from support.waiting import eventually  # noqa: E402
+from support.waiting import eventually, PATIENCE  # noqa: E402
 
 MONITOR = 'illuminator_ros.monitor'
 TABS = 10
@@ -63,7 +76,7 @@ def status(url: str, **headers: str) -> int:
     """Return the status of the answer to a browser that has no cookies yet."""
     opener = urllib.request.build_opener(urllib.request.HTTPCookieProcessor())
     try:
-        with opener.open(urllib.request.Request(url, headers=headers)) as answer:
+        with opener.open(urllib.request.Request(url, headers=headers), timeout=PATIENCE) as answer:
             return int(answer.status)
     except urllib.error.HTTPError as error:
         return error.code
@@ -76,40 +89,120 @@ def test_page_operates_a_light_in_ten_tabs_and_on_a_phone_for_the_bearer_of_the_
         assert status(f'{site}?token=wrong') == 403
         browser.open(url)
         assert browser.run('return location.href') == site
-        assert_switches(browser, ['on/off', 'enter yes'], '1 light: 1 ON')
+        browser.wait_for('/illuminator')
+        # Keys work without a click first.
+        browser.press(' ')
+        browser.wait_for('It can dazzle')
+        browser.press(ENTER)
+        browser.wait_for('1 light: 1 ON')
         assert browser.run(
             'return performance.getEntriesByType("resource").map(one => new URL(one.name).origin)'
             '.filter(origin => origin != location.origin)') == []
 
         # The token was used; the next one is for another browser.
         assert status(url) == 403
-        _, following = urls(server, 2)
+        _, look, following = urls(server, 3)
         assert status(following) == 200
 
+        tabs = [browser.tab]
         for _ in range(TABS - 1):
-            browser.new_tab()
+            tabs.append(browser.new_tab())
             browser.open(site)
-        browser.wait_for('1 light: 1 ON')
+            browser.wait_for('1 light: 1 ON')
+        browser.click('0 off')
+        for tab in tabs:
+            browser.use(tab)
+            browser.wait_for('1 light: 1 off')
+        browser.use(tabs.pop())
+        before = children(server)
+        assert len(before) == TABS
+        browser.close_tab()
+        eventually(lambda: len(children(server)) == TABS - 1)
+        browser.use(tabs[-1])
+
         browser.cdp('Emulation.setDeviceMetricsOverride', width=390, height=844,
                     deviceScaleFactor=1, mobile=True)
         browser.open(site)
-        assert_switches(browser, ['0 off'], '1 light: 1 off')
+        browser.wait_for('/illuminator')
+        browser.click('on/off')
+        browser.click('enter yes')
+        browser.wait_for('1 light: 1 ON')
+        browser.click('ALL OFF')
+        browser.wait_for('ALL OFF: 1 of 1 confirmed')
+        browser.wait_for('1 light: 1 off')
         assert browser.run('return document.documentElement.scrollWidth') <= 390
         columns = browser.run('return window.size.width')
         assert max(map(len, browser.lines)) <= columns
 
+        browser.open(look)
+        browser.wait_for('/illuminator')
+        assert 'ALL OFF' not in browser.text
+        browser.press('0')
+        browser.wait_for('off: FAILED: this monitor may only look')
+
         # Each tab is a process, which ends with the server, even if that is killed.
-        tabs = Path(f'/proc/{server.pid}/task/{server.pid}/children').read_text().split()
-        assert len(tabs) == TABS
+        left = children(server)
         server.kill()
-        eventually(lambda: not any(map(is_running, tabs)))
+        eventually(lambda: not any(map(is_running, left)))
 
 
-def assert_switches(browser: Browser, labels: list[str], state: str) -> None:
-    browser.wait_for('/illuminator')
-    for label in labels:
-        browser.click(label)
-    browser.wait_for(state)
+def test_ten_browsers_show_what_one_of_them_switches() -> None:
+    async def switch(url: str) -> None:
+        async with aiohttp.ClientSession() as session:
+            sockets = [await session.ws_connect(f'{url}ws', headers={'Origin': url.rstrip('/')})
+                       for _ in range(TABS)]
+
+            async def all_show(text: str) -> None:
+                for socket in sockets:
+                    while text not in (await socket.receive(PATIENCE)).data.decode():
+                        pass
+
+            await all_show('1 light: 1 off')
+            await sockets[0].send_json(['stdin', ' '])
+            while 'It can dazzle' not in (await sockets[0].receive(PATIENCE)).data.decode():
+                pass
+            await sockets[0].send_json(['stdin', '\r'])
+            await all_show(': 1 ON')
+            await sockets[0].send_json(['stdin', '0'])
+            await all_show(': 1 off')
+
+    with served() as (_, url):
+        asyncio.run(switch(url))
+
+
+def children(server: Program) -> list[str]:
+    """Return the process ids of the tabs."""
+    return Path(f'/proc/{server.pid}/task/{server.pid}/children').read_text().split()
+
+
+def test_pages_are_served_while_nothing_reads_the_output_of_the_server() -> None:
+    port = free_port()
+    reading, writing = os.pipe()
+    os.set_blocking(writing, False)
+    with contextlib.suppress(BlockingIOError):
+        while os.write(writing, b' ' * 4096):
+            pass
+    os.set_blocking(writing, True)
+    with subprocess.Popen([sys.executable, '-m', MONITOR, '--web', f'127.0.0.1:{port}'],
+                          stdout=writing, stderr=writing, env=environment(), cwd=ROOT) as server:
+        try:
+            eventually(lambda: answers(port))
+            url = f'http://127.0.0.1:{port}/'
+            assert status(url, Host='a[') == 400
+            assert status(url) == 200
+            server.terminate()
+            assert server.wait(PATIENCE) == 0
+        finally:
+            server.kill()
+            os.close(reading)
+            os.close(writing)
+
+
+def answers(port: int) -> bool:
+    with contextlib.suppress(OSError):
+        socket.create_connection(('127.0.0.1', port)).close()
+        return True
+    return False
 
 
 def test_other_sites_and_names_are_refused() -> None:

@@ -29,11 +29,13 @@ import time
 from typing import Any
 
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
+from rcl_interfaces.msg import Log
 from rclpy.exceptions import NameValidationException
 from rclpy.node import Node
 from rclpy.qos import QoSProfile, ReliabilityPolicy
 from rclpy.serialization import deserialize_message
 from rclpy.subscription import Subscription
+from rclpy.validate_full_topic_name import validate_full_topic_name
 
 from ...ros import monitor_view as shared
 from ...ros.graph import type_name
@@ -45,13 +47,17 @@ MAX_DEVICES, MAX_DIAGNOSES = 256, 10
 # Messages of /diagnostics that one poll takes, values of a diagnosis, bytes of any message.
 MAX_DIAGNOSTICS, MAX_VALUES, MAX_BYTES = 256, 200, 65536
 MAX_TEXT = 1000
+# Characters that a device's name must leave for those of its topics and services.
+MAX_ENDPOINT = 64
 # One poll of this number queries the graph, and one of this number adds to the trends.
-QUERY_POLLS, TREND_POLLS = 2, 8
+QUERY_POLLS, TREND_POLLS = 5, 20
 # s for the discovery of a service or subscriber, and for an answer: longer than a bridge takes,
 # whatever its device does.
 DISCOVERY_LIMIT, ANSWER_LIMIT = 2.0, 8.0
 # s after an OFF in which a further OFF waits for its answer.
 OFF_INTERVAL = 0.5
+# s after an OFF of ALL OFF that failed until it is sent again, and until it is given up.
+OFF_RETRY, OFF_LIMIT = 1.0, 60.0
 # s in which a value that was requested with success counts as requested: diagnostics show it
 # only once a second.
 WANTED_LIFETIME = 2.0
@@ -74,10 +80,18 @@ def devices_among(
     for view in views:
         last = f'/{view.signature[0]}'
         for name in (topic.removesuffix(last) for topic in types if topic.endswith(last)):
-            if name and all(type_name(view.topics[topic].type) in types.get(f'{name}/{topic}', ())
-                            and publishers(f'{name}/{topic}') for topic in view.signature):
+            if is_usable(name) and all(
+                    type_name(view.topics[topic].type) in types.get(f'{name}/{topic}', ())
+                    and publishers(f'{name}/{topic}') for topic in view.signature):
                 found.setdefault(name, view)
     return found
+
+
+def is_usable(name: str) -> bool:
+    """Return whether topics and services below a name are valid: not all of a graph are ROS's."""
+    with contextlib.suppress(NameValidationException):
+        return bool(name) and validate_full_topic_name(f'{name}/{"x" * MAX_ENDPOINT}')
+    return False
 
 
 def sane(value: Any) -> Any:
@@ -105,9 +119,13 @@ class GraphDevice(Device):
     the bridge may have been restarted.
     """
 
-    def __init__(self, node: Node, name: str, view: View, now: float, source: str = '') -> None:
+    def __init__(
+        self, node: Node, name: str, view: View, now: float, source: str = '', *,
+        may_request: bool = True,
+    ) -> None:
         super().__init__(name, view, now, source, heard_at=now)
         self._node = node
+        self._may_request = may_request
         self._subscriptions = {topic: node.create_subscription(
             one.type, f'{name}/{topic}', _taken_by_poll,
             STATE_QOS if one.is_state else SAMPLE_QOS) for topic, one in view.topics.items()}
@@ -116,6 +134,11 @@ class GraphDevice(Device):
         self._lanes: dict[tuple[str, ...], Iterator[None]] = {}
         self._waiting: dict[tuple[str, ...], Request] = {}
         self._off_at = -math.inf
+        # The OFF that is repeated until it is confirmed, when next, and until when, s.
+        self._required: Request | None = None
+        self._retry_at = self._required_until = math.inf
+        # The text of the last message on each topic, by its name.
+        self._published: dict[str, str] = {}
 
     def take(self, now: float) -> None:
         """Take the newest values."""
@@ -127,7 +150,7 @@ class GraphDevice(Device):
                 self.values[topic] = value = sane(spec.read(message))
                 if not spec.is_state or known is not None and known != value:
                     self.changed_at[topic] = now
-        if self.view.off is not None:
+        if self.view.off is not None and self._may_request:
             # The discovery of its service takes a while.
             self._endpoint(self.view.off(self))
 
@@ -140,9 +163,27 @@ class GraphDevice(Device):
             self.diagnoses[kind] = shared.Diagnosis(
                 min(status.level[0], 3), sane(status.message), values)
 
+    def log(self, text: str) -> None:
+        """Take a line of the node's log, which may say that a message was refused."""
+        topic, separator, reason = text.partition(': ')
+        if separator and (request := self._published.get(topic.removeprefix('~/'))):
+            self.note(request, shared.FAILED, reason)
+        self.news = text, self.now
+
+    def require_off(self, request: Request) -> None:
+        """Send an OFF, and again until it is confirmed or :data:`OFF_LIMIT` has passed."""
+        self._required = request
+        self._retry_at, self._required_until = math.inf, self.now + OFF_LIMIT
+        self.submit(request)
+
     def submit(self, request: Request) -> None:
         """Send a request, or let it wait for the one before."""
+        if not self._may_request:
+            self.note(request.text, shared.FAILED, 'this monitor may only look')
+            return
         lane = request.name, *request.values
+        if self._required is not None and 'enabled' in request.values and not request.is_off:
+            self._required = None
         self.wanted |= {name: (value, math.inf) for name, value in request.values.items()}
         self._waiting[lane] = request
         if lane not in self._lanes or (
@@ -153,6 +194,9 @@ class GraphDevice(Device):
     def poll_answers(self, now: float) -> None:
         """Take answers, send what can be sent, and give up requests without an answer."""
         self.now = now
+        if self._required is not None and now >= self._retry_at:
+            self._retry_at = math.inf
+            self.submit(self._required)
         for lane, steps in list(self._lanes.items()):
             # A step yields None.
             if next(steps, 'ended'):
@@ -178,12 +222,24 @@ class GraphDevice(Device):
             self._off_at = self.now if request.is_off else -math.inf
             self.note(request.text, shared.PENDING)
             is_done, answer = yield from self._exchange(request)
-            self.note(request.text, shared.DONE if is_done else shared.FAILED, sane(answer))
+            outcome = shared.FAILED if not is_done else (
+                shared.SENT if request.name in self._published else shared.DONE)
+            self.note(request.text, outcome, sane(answer))
+            if request.is_off:
+                self._note_off(is_done, outcome, sane(answer))
             if lane in self._waiting and (is_done or self._waiting[lane].is_off):
                 continue
             self._waiting.pop(lane, None)
             until = self.now + WANTED_LIFETIME if is_done else -math.inf
             self.wanted |= {name: (value, until) for name, value in request.values.items()}
+
+    def _note_off(self, is_done: bool, outcome: tuple[str, str], answer: str) -> None:
+        if is_done or self.now >= self._required_until:
+            self._required = None
+        elif self._required is not None:
+            self._retry_at = self.now + OFF_RETRY
+            answer += ', trying again'
+        self.off = outcome, answer
 
     def _exchange(self, request: Request) -> Generator[None, None, tuple[bool, str]]:
         """Send a request; return whether it succeeded, and the answer."""
@@ -195,7 +251,8 @@ class GraphDevice(Device):
             yield
         if hasattr(endpoint, 'publish'):
             endpoint.publish(request.message)
-            return True, 'sent, which has no answer'
+            self._published[request.name] = request.text
+            return True, ''
         future, until = endpoint.call_async(request.message), self.now + ANSWER_LIMIT
         while not future.done():
             if self.now >= until:
@@ -213,28 +270,46 @@ class Graph:
     The devices that a node discovers.
 
     :param source: of commands, see :class:`Device`.
+    :param may_request: whether requests are sent, or refused here.
     :ivar clock: returns the time, s.
     :ivar devices: in the order of the views, then by name.
     """
 
     def __init__(
         self, node: Node, views: Sequence[View], source: str = '',
-        clock: Callable[[], float] = time.monotonic,
+        clock: Callable[[], float] = time.monotonic, *, may_request: bool = True,
     ) -> None:
         self._node = node
         self._views = views
         self._source = source
         self.clock = clock
+        self.may_request = may_request
         self.devices: list[GraphDevice] = []
         self._diagnostics = node.create_subscription(
             DiagnosticArray, '/diagnostics', _taken_by_poll, DIAGNOSTICS_QOS)
+        self._log = node.create_subscription(Log, '/rosout', _taken_by_poll, DIAGNOSTICS_QOS)
         self._polls = 0
+        self._off_at = -math.inf
 
     def all_off(self) -> None:
-        """Switch off every device that can be switched off, unless it is gone."""
-        for device in self.devices:
-            if device.view.off is not None and not device.is_gone:
-                device.submit(device.view.off(device))
+        """Switch off every device that can be switched off."""
+        self._off_at = self.clock()
+        for device in self.devices if self.may_request else ():
+            device.off = None
+            if device.view.off is not None and device.is_gone:
+                device.off = shared.FAILED, 'it is gone'
+            elif device.view.off is not None:
+                device.off = shared.PENDING, ''
+                device.require_off(device.view.off(device))
+
+    @property
+    def off_answers(self) -> list[tuple[str, tuple[str, str], str]]:
+        """Return name, outcome and answer of each device until ALL OFF is over."""
+        answers = [(device.name, *device.off) for device in self.devices if device.off]
+        is_over = self.clock() > self._off_at + (
+            shared.NEWS_LIFETIME if all(outcome == shared.DONE for _, outcome, _ in answers)
+            else 2 * OFF_LIMIT)
+        return [] if is_over else answers
 
     def clear_gone(self) -> None:
         """Remove the devices that are gone."""
@@ -256,8 +331,8 @@ class Graph:
         for device in self.devices:
             device.take(now)
             if not self._polls % TREND_POLLS:
-                device.trend.append(device.values.get(device.view.trend)
-                                    if device.state in device.view.states else None)
+                device.trend.append(device.view.trend(device) if device.view.trend is not None
+                                    and not device.is_stale else None)
         self._polls += 1
         by_name = {device.name: device for device in self.devices}
         for array in _taken(self._diagnostics, MAX_DIAGNOSTICS):
@@ -265,6 +340,11 @@ class Graph:
                 values = {sane(one.key): sane(one.value) for one in status.values[:MAX_VALUES]}
                 if known := by_name.get(values.get('node', '')):
                     known.diagnose(status, values)
+        for line in _taken(self._log, MAX_DIAGNOSTICS):
+            # The name of a logger has dots instead of slashes.
+            known = by_name.get(f'/{line.name.replace(".", "/")}')
+            if known and line.level >= Log.INFO:
+                known.log(sane(line.msg))
 
     def _query(self, now: float) -> None:
         found = devices_among(self._node.get_topic_names_and_types(), self._views,
@@ -272,9 +352,8 @@ class Graph:
         for device in self.devices:
             device.is_gone = found.pop(device.name, None) is not device.view
         for name in sorted(found)[:MAX_DEVICES - len(self.devices)]:
-            # The graph also has names that other middleware has made.
-            with contextlib.suppress(NameValidationException):
-                self.devices.append(GraphDevice(self._node, name, found[name], now, self._source))
+            self.devices.append(GraphDevice(
+                self._node, name, found[name], now, self._source, may_request=self.may_request))
         self.devices.sort(key=lambda device: (self._views.index(device.view), device.name))
 
 

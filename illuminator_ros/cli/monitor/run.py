@@ -77,8 +77,9 @@ def parser() -> argparse.ArgumentParser:
     made.add_argument('--web', type=option(address), nargs='?', const=address(DEFAULT_WEB),
                       metavar='HOST:PORT', help=f'serve a browser (default: {DEFAULT_WEB})')
     made.add_argument('--token', action='store_true',
-                      help='admit a browser only by a one-time token, which the printed URL has; '
-                           'every address except loopback needs it')
+                      help='admit a browser only by a one-time token: of the printed URLs, one is '
+                           'to look only; every address except loopback needs it')
+    made.add_argument('--look', action='store_true', help='show devices, and request nothing')
     made.add_argument('--once', action='store_true', help='print one table and end')
     made.add_argument('--json', action='store_true', help='print all values as JSON and end')
     made.add_argument('--wait', type=float, default=6.0, metavar='S',
@@ -109,7 +110,7 @@ def run(
         node = Node(f'illuminator_monitor_{uuid.uuid4().hex[:8]}', enable_rosout=False,
                     start_parameter_services=False)
     views = [one.load('view') for one in payloads.values() if one.view]
-    graph = Graph(node, views, options.source)
+    graph = Graph(node, views, options.source, may_request=not options.look)
     is_terminal = os.environ.get('TERM', 'dumb') not in ('dumb', 'unknown') and all(
         stream is not None and stream.isatty() for stream in (sys.stdin, sys.stdout))
     try:
@@ -127,7 +128,8 @@ def _watch(graph: Graph, ascii_only: bool, termination: Termination, is_tab: boo
     from .app import MonitorApp
     # Python itself takes UTF-8 for the locale POSIX.
     ascii_only = ascii_only or locale.nl_langinfo(locale.CODESET) != 'UTF-8'
-    app = (MonitorApp if is_tab else terminal.TerminalApp)(graph, ascii_only=ascii_only)
+    app = (MonitorApp if is_tab else terminal.TerminalApp)(
+        graph, ascii_only=ascii_only, touch=is_tab)
     termination.calls(functools.partial(app.call_later, app.exit), last=app.restore)
     with terminal.quiet_errors():
         app.run()

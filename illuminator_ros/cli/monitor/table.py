@@ -20,9 +20,24 @@ from collections.abc import Iterable, Sequence
 import functools
 from itertools import groupby
 import json
+import re
 from typing import TypeVar
 
-from ...ros.monitor_view import Cell, Column, Device, LEVELS, measured, STATE_STYLES, UNKNOWN, View
+from ...ros.monitor_view import (
+    Cell,
+    Column,
+    DANGEROUS,
+    Device,
+    Diagnosis,
+    DONE,
+    LEVELS,
+    measured,
+    NEWS_LIFETIME,
+    PENDING,
+    STATE_STYLES,
+    UNKNOWN,
+    View,
+)
 
 D = TypeVar('D', bound=Device)
 
@@ -30,6 +45,14 @@ D = TypeVar('D', bound=Device)
 def state(device: Device) -> Cell:
     """Return the state of a device with its style."""
     return device.state, {**STATE_STYLES, **device.view.states}.get(device.state, '')
+
+
+def level(device: Device) -> Cell:
+    """Return the worst level of a device with its style, marked if the device is dangerous."""
+    if device.level is None:
+        return UNKNOWN
+    word, style = LEVELS[device.level]
+    return (f'{word}!', 'bold red') if device.attention == DANGEROUS else (word, style)
 
 
 def link(device: Device, key: str) -> str:
@@ -43,6 +66,37 @@ def last(device: Device) -> list[Cell]:
         return []
     text, outcome, answer, _ = device.action
     return [f'{text}: ', outcome, f': {answer}' if answer else '']
+
+
+def report(device: Device) -> list[Cell]:
+    """Return what the row of a device says: the newest first, then what is wrong, then values."""
+    parts: list[list[Cell]] = []
+    if device.action is not None and (
+            device.action[1] == PENDING or device.now < device.action[3] + NEWS_LIFETIME):
+        # The details have the answer; a row has what is wrong behind it.
+        parts.append(last(device)[:2] if device.action[1] == DONE else last(device))
+    news, at = device.news
+    if device.now < at + NEWS_LIFETIME:
+        # The row has the name.
+        parts.append([re.sub(rf'^{device.view.kind} \d+/\d+:? ', '', news)])
+    parts += [[one.message] for one in problems(device)]
+    if notice := device.view.notice(device):
+        parts.append([notice])
+    values = (column.cell(device) for column in device.view.columns)
+    parts.append(['  '.join(one if isinstance(one, str) else one[0] for one in values)])
+    return [cell for part in parts for cell in ('; ', *part)][1:]
+
+
+def off_report(answers: Sequence[tuple[str, Cell, str]]) -> list[Cell]:
+    """Return how many devices have confirmed ALL OFF, and the answer of each other one."""
+    others = [(name, outcome, answer) for name, outcome, answer in answers if outcome != DONE]
+    cells: list[Cell] = [(f'ALL OFF: {len(answers) - len(others)} of {len(answers)} confirmed',
+                          'bold')]
+    if not others:
+        cells.append(': ' + ', '.join(name for name, _, _ in answers))
+    for name, outcome, answer in others:
+        cells += ['; ', f'{name} ', outcome, f': {answer}' if answer else '']
+    return cells
 
 
 def columns(view: View, name_width: int = 0) -> list[Column]:
@@ -68,11 +122,16 @@ def counts(devices: Sequence[Device]) -> str:
     return f'{len(devices)} {view.kind}{"s" * (len(devices) > 1)}: {", ".join(found)}'
 
 
+def problems(device: Device) -> list[Diagnosis]:
+    """Return the diagnoses of a device that have a finding, that of its link last."""
+    return [one for _, one in sorted(
+        device.diagnoses.items(), key=lambda item: item[0] == 'link') if one.level]
+
+
 def findings(device: Device) -> str:
     """Return what the diagnostics of a device report."""
-    found = [f'{LEVELS[one.level][0]}: {one.message}' for _, one in sorted(
-        device.diagnoses.items(), key=lambda item: item[0] == 'link') if one.level]
-    return '; '.join(found) or ('OK' if device.diagnoses else UNKNOWN)
+    found = [f'{LEVELS[one.level][0]}: {one.message}' for one in problems(device)]
+    return '; '.join(found) or (UNKNOWN if device.level is None else LEVELS[device.level][0])
 
 
 def plain(devices: Sequence[Device]) -> list[str]:

@@ -42,6 +42,12 @@ class TerminalDriver(LinuxDriver):
         # Textual would start again although it has not stopped.
         signal.signal(signal.SIGCONT, signal.SIG_DFL)
 
+    def run_input_thread(self) -> None:
+        """See :meth:`LinuxDriver.run_input_thread`; go on after bytes that are not UTF-8."""
+        while not self.exit_event.is_set():
+            with contextlib.suppress(UnicodeDecodeError):
+                super().run_input_thread()
+
 
 class TerminalApp(MonitorApp):
     """The monitor on the terminal at stdin."""

@@ -29,7 +29,6 @@ from ...ros.monitor_view import Column, Device, Key, Request, Topic, UNKNOWN
 
 # Degrees for one press of an arrow key.
 STEP = 5.0
-DIAL_WIDTH = 31
 # The limit of ~/cmd/angles, and the directions of positive and negative angles in ROS.
 AXES = {'roll': (math.pi, 'right', 'left'), 'pitch': (math.pi / 2, 'down', 'up'),
         'yaw': (math.pi, 'left', 'right')}
@@ -43,9 +42,13 @@ def angle(device: Device, axis: str) -> float | None:
 
 def described(device: Device, axis: str) -> str:
     """Return the angle of an axis with its direction."""
-    if (known := angle(device, axis)) is None:
-        return UNKNOWN
-    degrees = round(math.degrees(known), 1)
+    known = angle(device, axis)
+    return UNKNOWN if known is None else direction(axis, known)
+
+
+def direction(axis: str, radians: float) -> str:
+    """Return an angle in degrees, with a word for its sign."""
+    degrees = round(math.degrees(radians), 1)
     return f'{abs(degrees):.1f} {AXES[axis][1 + (degrees < 0)] if degrees else ""}'.rstrip()
 
 
@@ -66,7 +69,7 @@ def nudge(device: Device, typed: str, axis: str, step: float) -> Request | str:
     # NaN leaves an axis as it is. The newest setpoint replaces others, so it has their targets.
     targets = {one: aim if one == axis else device.wants(one, math.nan) for one in AXES}
     return Request(
-        f'{axis} to {math.degrees(aim):.1f} degrees', f'{device.prefix}cmd/angles', Vector3Stamped,
+        f'{axis} to {direction(axis, aim)}', f'{device.prefix}cmd/angles', Vector3Stamped,
         Vector3Stamped(header=Header(frame_id=device.values['angles'][0]),
                        vector=Vector3(**dict(zip('xyz', targets.values(), strict=True)))),
         {one: target for one, target in targets.items() if math.isfinite(target)})
@@ -99,14 +102,10 @@ def neutral(device: Device, typed: str) -> Request:
 
 
 def _details(device: Device) -> Iterable[shared.Line]:
-    for axis, (limit, *_) in AXES.items():
-        # The range that the gimbal reports, and left and up at the left of the dial.
-        low, high = (device.number('device', f'{axis}_{end}_rad') for end in ('min', 'max'))
-        low, high = -limit if low is None else low, limit if high is None else high
-        if axis == 'yaw':
-            low, high = high, low
-        yield axis, [(shared.dial(angle(device, axis), low, high, DIAL_WIDTH), 'cyan'),
-                     f' {described(device, axis)}']
+    for axis in AXES:
+        ends = [device.number('device', f'{axis}_{end}_rad') for end in ('min', 'max')]
+        range_ = ' to '.join(direction(axis, end) for end in ends if end is not None)
+        yield axis, [described(device, axis), f' (range: {range_})' * bool(range_)]
     # The diagnostics also know it from before this monitor, but up to a second later.
     known = device.number('device', 'controller_s')
     since = device.since('controller') or (known is not None and shared.age(known))

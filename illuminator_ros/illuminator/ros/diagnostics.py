@@ -46,6 +46,7 @@ LAMP_VALUES = {
                      'strobe_duty_cycle_percent', 'error_flags', 'uptime_s'), 'as on the topics'),
     'temperature_c': 'degC, if measured',
     'status_s_ago': 'age of the last status, s',
+    'off_in_s': 'until `off_after_silence` switches the light off, s',
     **HOLDER_VALUES,
     'agreed': 'the configuration agreed with the light, which parameters hold',
     **dict.fromkeys((field.name for field in fields(Identity)), 'COMPONENT_INFORMATION_BASIC'),
@@ -213,6 +214,8 @@ def _lamp_values(light: LightSnapshot, now: float) -> dict[str, diagnostics.Valu
             'uptime_s': status.uptime_ms / 1000.0,
             'status_s_ago': now - light.status_at,
         }
+    if math.isfinite(light.off_at):
+        values['off_in_s'] = max(light.off_at - now, 0.0)
     values |= holder_values(light.holder, light.held_since, now)
     if light.configuration:
         values['agreed'] = light.configuration.describe()

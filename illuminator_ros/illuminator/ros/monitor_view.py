@@ -32,9 +32,8 @@ from ...ros.monitor_view import Column, Device, Key, measured, Request, Topic, U
 # Brightness steps, %; strobe for a light that has none, s and %.
 STEP, FINE_STEP = 10.0, 1.0
 STROBE_PERIOD, STROBE_DUTY_CYCLE = 1.0, 50.0
-# K; a smaller difference is drawn as a flat line.
-SMALLEST_SPAN = 4.0
-BAR_WIDTH = 10
+# ILLUMINATOR_ERROR_FLAGS_THERMISTOR_FAILURE; the monitor does not import MAVLink.
+THERMISTOR_FAILURE = 4
 
 
 def switch(device: Device, typed: str = '', on: bool | None = None) -> Request:
@@ -62,12 +61,36 @@ def dim(device: Device, typed: str, step: float) -> Request | str:
     start = device.wants('brightness', agreed(device))
     if start is None:
         return 'its brightness is not known yet'
-    target = min(max(round(start + step, 1), 0.0), 100.0)
-    text = f'brightness {target:g} %'
+    target = min(max(round(start + step, 1), 0.0), 100.0) if step else start
+    text = f'brightness {target:g} %' if step else 'keep on'
     if device.prefix:
         return Request(text, f'{device.prefix}cmd/brightness', Float32, Float32(data=target),
                        {'brightness': target})
     return _set(text, brightness=target)
+
+
+def keep_on(device: Device, typed: str) -> Request | str:
+    """Begin ``off_after_silence`` again, by a request that does not switch on a light."""
+    return dim(device, typed, 0.0) if device.values.get('enabled') else 'it is not on'
+
+
+def temperature(device: Device) -> float | None:
+    """Return the temperature, None if its sensor failed: the last value remains."""
+    failed = (device.values.get('error_flags') or 0) & THERMISTOR_FAILURE
+    return None if failed else device.values.get('temperature')
+
+
+def is_dangerous(device: Device) -> bool:
+    """Return whether a light may be on that is lost, has a finding, or did not confirm an OFF."""
+    return device.values.get('enabled') is True and (
+        device.is_stale or device.off is not None and device.off[0] == shared.FAILED
+        or any(device.level_of(one) for kind, one in device.diagnoses.items() if kind == 'lamp'))
+
+
+def _notice(device: Device) -> str:
+    seconds = device.number('lamp', 'off_in_s')
+    return '' if seconds is None or device.is_stale else (
+        f'off in {shared.age(seconds)} without a request: o keeps it on')
 
 
 def strobe(device: Device, typed: str) -> Request | str:
@@ -104,12 +127,10 @@ def _details(device: Device) -> Iterable[shared.Line]:
         measured(shines, '%') + ('' if limit == shines else f' (agreed: {limit:g} %)'),
         _strobe(device), values.get('mode'), f'{lamp("vendor")} {lamp("model")}'.strip(),
         serial and f'no. {serial}', uptime and f'up {shared.age(uptime)}')
-    yield 'light', [(shared.bar(shines or 0.0, BAR_WIDTH), 'yellow'),
-                    f' {", ".join(filter(None, facts))}']
-    if known := [value for value in device.trend if value is not None]:
-        yield 'temp', [measured(values.get('temperature'), 'C ', '.1f'),
-                       (shared.sparkline(device.trend, SMALLEST_SPAN).lstrip(), 'cyan'),
-                       f' {min(known):.1f} to {max(known):.1f} in 2 min']
+    yield 'light', [', '.join(filter(None, facts))]
+    now = temperature(device)
+    if now is not None and (known := [value for value in device.trend if value is not None]):
+        yield 'temp', [f'{now:.1f} C, {min(known):.1f} to {max(known):.1f} in 2 min']
 
 
 VIEW = shared.View(
@@ -120,7 +141,7 @@ VIEW = shared.View(
         'temperature': Topic(Temperature, lambda message: message.temperature, is_state=False)},
     ('error_flags', 'brightness', 'enabled', 'connected'),
     (Column('BRIGHT', 6, lambda device: measured(device.values.get('brightness'), '%')),
-     Column('TEMP', 8, lambda device: measured(device.values.get('temperature'), 'C', '.1f')),
+     Column('TEMP', 8, lambda device: measured(temperature(device), 'C', '.1f')),
      Column('STROBE', 11, _strobe),
      Column('MODE', 8, lambda device: device.values.get('mode', UNKNOWN).partition('_')[0])),
     _details,
@@ -130,10 +151,11 @@ VIEW = shared.View(
      Key(('-', '_', 'left'), 'darker by 10 %', 'darker', functools.partial(dim, step=-STEP)),
      Key(('.', '>'), 'brighter by 1 %', '', functools.partial(dim, step=FINE_STEP)),
      Key((',', '<'), 'darker by 1 %', '', functools.partial(dim, step=-FINE_STEP)),
+     Key(('o',), 'keep it on: off_after_silence begins again', 'keep on', keep_on),
      Key(('s',), 'strobe, which asks first, or no strobe', 'strobe', strobe),
      shared.trigger_key('r', 'ask for identity and status again', 'refresh', 'refresh'),
      shared.RELEASE_SOURCE),
     states={'ON': 'bold green', 'off': ''},
     state=lambda device: {True: 'ON', False: 'off', None: shared.NOT_KNOWN}[
         device.values.get('enabled')],
-    trend='temperature', off=switch_off)
+    trend=temperature, is_dangerous=is_dangerous, notice=_notice, off=switch_off)

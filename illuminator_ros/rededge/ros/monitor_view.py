@@ -17,6 +17,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
+import re
 
 from sensor_msgs.msg import NavSatFix
 from std_msgs.msg import Bool, UInt32
@@ -26,7 +27,7 @@ from ...ros.monitor_view import Column, Device, Topic, trigger_key, UNKNOWN
 
 # The inputs, as /diagnostics names them, and the styles of their states.
 INPUTS = ('fix', 'velocity', 'satellites', 'imu', 'attitude', 'mount', 'time_reference')
-STYLES = {'ok': 'green', 'missing': 'dim', 'stale': 'yellow', 'refused': 'bold red'}
+STYLES = {'ok': 'green', 'missing': 'yellow', 'stale': 'yellow', 'refused': 'bold red'}
 
 
 def place(device: Device) -> str:
@@ -50,8 +51,12 @@ def _inputs(device: Device) -> str:
 def _details(device: Device) -> Iterable[shared.Line]:
     yield 'image', [f'{_image(device)}, at {place(device)}']
     cells: list[shared.Cell] = []
+    findings = device.diagnoses['camera'].message if 'camera' in device.diagnoses else ''
     for name in INPUTS:
         state, seconds = device.diagnosed('camera', name), device.number('camera', f'{name}_s_ago')
+        if state == 'missing' and not re.search(rf'~/{name}\b', findings):
+            # The camera does not need it.
+            state = 'unused'
         cells += [f'{name} ', (state or UNKNOWN, STYLES.get(state, '')),
                   '   ' if seconds is None else f' {shared.age(seconds)}   ']
     yield 'inputs', cells
