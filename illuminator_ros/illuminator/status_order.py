@@ -26,6 +26,9 @@ from .model import Mode, Status
 WRAP_MS = 1 << 32
 # s by which the uptime of a restarted light may exceed the time since the status before.
 BOOT_SLACK = 5.0
+# s after a restart in which no light starts again: statuses that overtake each other, or come from
+# two lights with one address, would show a restart each, and each is followed by requests.
+BOOT_TIME = 1.0
 # s with nothing but lower uptimes after which the light has restarted.
 LOWER_TIME = 3.0
 # After a loss the light has restarted if its uptime has advanced by less than this share of it.
@@ -63,6 +66,7 @@ class StatusOrder:
         self.newest_at = -math.inf
         self.restarts = 0
         self._lower_since = math.inf
+        self._restarted_at = -math.inf
         self._was_lost = False
         # The statuses that have come lately, the newest last, and when each came last, s.
         self._recent: dict[Status, float] = {}
@@ -83,6 +87,7 @@ class StatusOrder:
             return Order.LATE
         if order is Order.RESTARTED:
             self.restarts += 1
+            self._restarted_at = now
             self._recent.clear()
         self.newest, self.newest_at = status, now
         self._lower_since, self._was_lost = math.inf, False
@@ -105,8 +110,9 @@ class StatusOrder:
         if ahead_ms >= 0:
             return Order.NEWEST
         self._lower_since = min(self._lower_since, now)
-        if (status.uptime_ms <= 1000 * (elapsed + BOOT_SLACK)
-                or now >= self._lower_since + LOWER_TIME):
+        has_booted = (status.uptime_ms <= 1000 * (elapsed + BOOT_SLACK)
+                      and now >= self._restarted_at + BOOT_TIME)
+        if has_booted or now >= self._lower_since + LOWER_TIME:
             return Order.RESTARTED
         return Order.LATE
 

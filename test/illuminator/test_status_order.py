@@ -49,6 +49,8 @@ def status(uptime: float = 0.0, **fields: Any) -> Status:
     # The uptime is at most the time since the newest, and 5 s.
     ([(0, 100), (1, 6.0)], 'NR'), ([(0, 100), (1, 6.1)], 'NL'),
     ([(0, 100), (20, 25.0)], 'NR'), ([(0, 100), (20, 25.1)], 'NL'),
+    # Two lights with one address, or statuses that overtake each other: one restart a second.
+    ([(0, 100), (1, 0.1), (1.05, 102), (1.1, 0.2), (1.9, 103), (2.2, 1.3)], 'NRNLNR'),
     # Nothing but lower ones has come for 3 s.
     ([(0, 100), (1, 50), (2, 51), (3.9, 52.9), (4, 53), (4.1, 53.1)], 'NLLLRN'),
     ([(0, 100), (1, 50), (3, 103), (3.5, 52.5), (6.4, 55.4), (6.5, 55.5)], 'NLNLLR'),
