@@ -25,6 +25,7 @@ from rcl_interfaces import msg
 from rclpy.node import Node
 from rclpy.parameter import Parameter
 
+from .rclpy_private import parameter_overrides
 from ..mavlink.messages import Address
 from ..mavlink.signing import Signing, SigningMode
 from ..mavlink.signing_files import KeyFileError, load_signing, TimestampStore
@@ -273,7 +274,7 @@ def given_parameters(node: Node) -> Mapping[str, Parameter]:
     rclpy has no public access to values of the wrong type, such as an integer for a double, and to
     parameters that are not declared.
     """
-    return node._parameter_overrides
+    return parameter_overrides(node)
 
 
 class ChangeableParameters:
