@@ -103,7 +103,7 @@ def test_all_of_fifty_calls_at_once_are_answered(own_ros: Ros, port: int) -> Non
 
 @pytest.fixture
 def bridge(own_ros: Ros, port: int) -> Iterator[Program]:
-    """Yield a bridge with the package's profile of Fast DDS, not with that of the tests."""
+    """Yield a bridge with the package's profile of Fast DDS, not with the tests' profile."""
     with ended(python('illuminator_ros.bridge', *bridge_arguments(port), env={
             'ROS_DOMAIN_ID': str(own_ros.domain), profile_variable(): ''})) as bridge:
         bridge.wait_for('link open')
