@@ -1,15 +1,17 @@
-# The bridge on Ubuntu 24.04 with ROS 2 Jazzy, for amd64 and arm64; doc/ros.md has its use.
-FROM ros:jazzy-ros-core AS build
+# The bridge on Ubuntu 24.04 with ROS 2 Jazzy, or with --build-arg ROS=kilted, for amd64 and arm64;
+# doc/ros.md has its use.
+ARG ROS=jazzy
+FROM ros:${ROS}-ros-core AS build
 SHELL ["/bin/bash", "-c"]
 # pymavlink has a pip key only, and rosdep asks for the variable on Ubuntu 24.04 (PEP 668).
 ENV PIP_BREAK_SYSTEM_PACKAGES=1
 RUN apt-get update && apt-get install -y --no-install-recommends \
       python3-colcon-common-extensions python3-pip python3-rosdep && \
-    rosdep init && rosdep update --rosdistro jazzy
+    rosdep init && rosdep update --rosdistro "$ROS_DISTRO"
 WORKDIR /ws
 COPY . src/illuminator_ros
 RUN rosdep install --from-paths src --ignore-src -y --dependency-types=exec && \
-    source /opt/ros/jazzy/setup.bash && colcon build --packages-select illuminator_ros
+    source "/opt/ros/$ROS_DISTRO/setup.bash" && colcon build --packages-select illuminator_ros
 
 # docker build --target test .
 FROM build AS test

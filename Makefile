@@ -1,6 +1,7 @@
-# Without ROS, make demo and make test install ROS 2 wheels into .venv; with ROS sourced they use
-# its rclpy.
-PYTHON_IN_VENV := .venv/bin/python
+# Without ROS, make demo and make test install wheels of ROS 2 Jazzy into .venv; with ROS sourced
+# they use its rclpy. With ROS=kilted they install those of Kilted into .venv-kilted.
+ROS =
+PYTHON_IN_VENV := .venv$(addprefix -,$(filter-out jazzy,$(ROS)))/bin/python
 TESTS ?= test
 
 SECONDS ?= 60
@@ -11,7 +12,7 @@ BENCH ?=
 
 help:
 	@echo 'make demo    run a simulated light and a camera with their nodes, and show what they do'
-	@echo 'make test    run all checks and tests'
+	@echo 'make test    run all checks and tests; with ROS=kilted on ROS 2 Kilted instead of Jazzy'
 	@echo 'make unit    run the tests that need no ROS'
 	@echo 'make check   run ruff and mypy'
 	@echo 'make lint    run ruff, mypy and the linters of ROS'
@@ -20,15 +21,18 @@ help:
 	@echo 'make bench   measure each target beside its peers, 7 minutes; options in BENCH'
 	@echo 'make pictures  draw the pictures of the documentation again, half a minute'
 	@echo 'make doc-tables  write the tables of the documentation that the code knows'
-	@echo 'make clean   remove .venv and all build files'
+	@echo 'make environment  install the packages that the tests need'
+	@echo 'make clean   remove .venv, .venv-kilted and all build files'
 
 environment:
-	@python3 tools/environment.py
+	@python3 tools/environment.py test $(ROS)
 
-demo: environment
+demo:
+	@python3 tools/environment.py demo $(ROS)
 	@$(PYTHON_IN_VENV) demo/run.py
 
-test: check
+# The types of rclpy differ: mypy checks with those of Jazzy.
+test: $(if $(filter-out jazzy,$(ROS)),environment,check)
 	@$(PYTHON_IN_VENV) -m pytest -n 4 --dist loadfile --no-loadscope-reorder $(TESTS)
 
 unit: environment
@@ -60,4 +64,4 @@ doc-tables: environment
 	@$(PYTHON_IN_VENV) -m tools.doc_tables
 
 clean:
-	rm -rf .venv build install log .pytest_cache .mypy_cache .ruff_cache .hypothesis
+	rm -rf .venv .venv-kilted build install log .pytest_cache .mypy_cache .ruff_cache .hypothesis

@@ -29,6 +29,7 @@ def files(folder: str) -> list[str]:
 # "develop", which put them into lib/illuminator_ros (setup.cfg), where "ros2 run" looks.
 prefix = 'illuminator-' if {'bdist_wheel', 'dist_info', 'editable_wheel'} & {*sys.argv} else ''
 
+# Dependencies and extras are in pyproject.toml.
 setup(
     name=package_name,
     # With package.xml's set by catkin_prepare_release, which wants it written here in full.
@@ -43,20 +44,6 @@ setup(
           for folder in ('config', 'config/sros2', 'launch')),
     ],
     python_requires='>=3.10',
-    # The oldest versions that the tests have passed with.
-    install_requires=['setuptools', 'pymavlink>=2.4.50', 'fastcrc>=0.3'],
-    extras_require={
-        'monitor': ['textual>=8', 'textual-serve>=1.1'],
-        'serial': ['pyserial>=3.5'],
-        'yaml': ['pyyaml>=5.4'],
-        # "colcon test" looks here for pytest.
-        # scipy is the oracle for rotations; mavsdk is another player at a gimbal.
-        # mcap reads recordings without ROS; cyclonedds is another middleware.
-        'test': ['pytest', 'pytest-timeout', 'hypothesis', 'pyserial', 'pyyaml', 'scipy',
-                 'mavsdk>=4.1', 'mcap>=1.2', 'mcap-ros2-support>=0.5',
-                 'cyclonedds>=11.0', 'textual>=8',
-                 'textual-serve>=1.1'],
-    },
     zip_safe=True,
     maintainer='The illuminator_ros developers',
     maintainer_email='illuminator_ros@example.org',

@@ -15,7 +15,8 @@
 """
 Record a run with a light, a gimbal and a camera, all simulated, as an MCAP file.
 
-Foxglove and PlotJuggler open the file without ROS. Needs ``pip install mcap``.
+Foxglove and PlotJuggler open the file without ROS. This program needs mcap, which
+``make environment`` installs.
 """
 
 from __future__ import annotations

@@ -114,6 +114,13 @@ def test_modules_import_only_from_folders_below_their_own() -> None:
     } == {}
 
 
+def test_one_module_uses_private_parts_of_rclpy() -> None:
+    assert [module for module in MODULES
+            if any(name.startswith(('rclpy.impl', 'rclpy._')) for name in imports(module))
+            or '_parameter_overrides' in identifiers(module)
+            ] == [f'{PACKAGE}.ros.rclpy_private']
+
+
 def test_modules_outside_the_ros_folders_do_not_import_ros() -> None:
     without_ros = [module for module in MODULES if folder(module)[-1:] not in (('ros',), ('cli',))
                    or module.split('.')[2:3] in (['simulator'], ['conformance'])]

@@ -23,51 +23,70 @@ import sys
 import pytest
 
 ROOT = Path(__file__).parents[1]
-INTERPRETER = """#!/bin/sh
-echo "{version}: $*" >> {log}
-case "$1 $2" in
-  "-c "*) echo "$0 3 {version}" ;;
-  "-m venv") mkdir -p "$3/bin" && touch "$3/pyvenv.cfg" && cp "$0" "$3/bin/python" ;;
+PYTHON = r"""#!/bin/sh
+echo "{version}: $*" >> {folder}/log
+case "$*" in
+  *import\ numpy*) echo numpy==1.26.4 ;;
+  "-c "*) echo "$0 3.{version}" ;;
+  "-m venv "*)
+    for venv; do :; done
+    mkdir -p "$venv/bin"
+    echo "include-system-site-packages = $(echo "$*" | grep -q system-site && echo true)" \
+        > "$venv/pyvenv.cfg"
+    cp "$0" "$venv/bin/python" ;;
+  "-m pip "*) cp {folder}/uv "$(dirname "$0")" ;;
 esac
 """
+# FAULT is a command that it runs instead of an installation.
+UV = """#!/bin/sh
+case "$*" in
+  *--help) echo {options}; exit ;;
+esac
+echo "uv: $*" >> {folder}/log
+eval "$FAULT"
+"""
+MAKE_AGAIN = '. When make is run again, it goes on from here\n'
 
 
 class Project:
-    """A copy of the tool in a folder with a ``.venv`` of Python 3.11 and some interpreters."""
+    """A copy of the tool in a folder, where Python 3.12 is installed."""
 
     def __init__(self, folder: Path) -> None:
         self.folder = folder
-        self.log = folder / 'log'
-        self.log.touch()
         (folder / 'tools').mkdir()
         (folder / 'bin').mkdir()
-        (folder / '.venv' / 'bin').mkdir(parents=True)
-        (folder / '.venv' / 'pyvenv.cfg').touch()
         shutil.copy(ROOT / 'tools' / 'environment.py', folder / 'tools')
-        self.program('.venv/bin/python', INTERPRETER.format(version=11, log=self.log))
-        for version in (12, 13):
-            self.program(f'bin/python3.{version}',
-                         INTERPRETER.format(version=version, log=self.log))
+        shutil.copy(ROOT / 'pyproject.toml', folder)
+        self.program('uv', UV, options='--group')
+        self.program('bin/python3', PYTHON, version='12')
 
-    def program(self, path: str, text: str) -> None:
+    def program(self, path: str, text: str, **values: str) -> None:
         """Write an executable."""
-        (self.folder / path).write_text(text)
+        (self.folder / path).parent.mkdir(parents=True, exist_ok=True)
+        (self.folder / path).write_text(text.format(folder=self.folder, **values))
         (self.folder / path).chmod(0o755)
 
-    def run(self, *arguments: str, **environment: str) -> tuple[int, str]:
+    def run(self, *arguments: str, machine: str = 'x86_64', **environment: str) -> tuple[int, str]:
         """Run the tool; return its exit status and output."""
         clean = {name: value for name, value in os.environ.items()
                  if name not in ('PYTHON', 'ROS_DISTRO')}
         path = f'{self.folder / "bin"}:/usr/bin:/bin'
+        tool = ('import os, runpy, sys, types; '
+                f'os.uname = lambda: types.SimpleNamespace(machine={machine!r}); '
+                'sys.argv[0] = "tools/environment.py"; '
+                'runpy.run_path(sys.argv[0], run_name="__main__")')
         outcome = subprocess.run(
-            [sys.executable, *(arguments or ('tools/environment.py',))], cwd=self.folder,
+            [sys.executable, '-c', tool, *(arguments or ('demo',))], cwd=self.folder,
             env={**clean, 'PATH': path, **environment}, text=True, timeout=60,
             stdout=subprocess.PIPE, stderr=subprocess.STDOUT)
         return outcome.returncode, outcome.stdout
 
     def calls(self) -> str:
-        """Return the calls of the interpreters, the first words of each."""
-        return self.log.read_text()
+        """Return the calls since the last time, but those for versions."""
+        log = self.folder / 'log'
+        lines = log.read_text().splitlines() if log.exists() else []
+        log.write_text('')
+        return '\n'.join(line for line in lines if ' -c ' not in line)
 
 
 @pytest.fixture
@@ -75,43 +94,130 @@ def project(tmp_path: Path) -> Project:
     return Project(tmp_path)
 
 
-def test_venv_of_another_python_is_kept_and_installed_into(project: Project) -> None:
-    status, output = project.run()
+def test_demonstration_gets_its_packages_and_the_tests_add_theirs(project: Project) -> None:
+    assert project.run('demo')[0] == 0
+    venv = project.folder / '.venv'
+    assert project.calls().splitlines() == [
+        f'12: -m venv --without-pip {venv}',
+        '12: -m ensurepip --default-pip',
+        '12: -m pip install --only-binary uv --retries 2 uv>=0.7',
+        f'uv: pip install --python {venv}/bin/python -r pyproject.toml --extra monitor '
+        '--extra serial --group jazzy']
 
-    assert (status, output.splitlines()[0].startswith('installing into .venv')) == (0, True)
-    assert '11: -m pip install' in project.calls()
-    assert '-m venv' not in project.calls()
+    assert project.run('test')[0] == 0
+    assert project.calls() == (
+        f'uv: pip install --python {venv}/bin/python -r pyproject.toml --all-extras '
+        '--group test --group jazzy --group lint --group peers')
+
+
+def test_nothing_is_installed_while_the_declared_packages_are_there(project: Project) -> None:
+    project.run('test')
+    project.calls()
+
+    assert [project.run(use) for use in ('test', 'demo')] == [(0, '')] * 2
+    assert project.calls() == ''
+
+    text = (project.folder / 'pyproject.toml').read_text()
+    (project.folder / 'pyproject.toml').write_text(text.replace('pymavlink>=', 'pymavlink>=9'))
+    project.run('demo')
+    assert project.calls().startswith('uv: pip install')
+
+
+def test_kilted_has_an_environment_of_its_own(project: Project) -> None:
+    project.run('demo')
+    project.calls()
+
+    assert project.run('demo', 'kilted')[0] == 0
+    assert f'--python {project.folder}/.venv-kilted/bin/python' in (calls := project.calls())
+    assert calls.endswith('--group kilted')
+
+
+@pytest.mark.parametrize(('options', 'used'), [('--group', True), ('--extra', False)],
+                         ids=['new', 'old'])
+def test_uv_on_the_path_is_used_if_it_knows_groups(
+        project: Project, options: str, used: bool) -> None:
+    project.program('bin/uv', UV, options=options)
+
+    assert project.run()[0] == 0
+    assert ('-m pip install' not in project.calls()) == used
+
+
+@pytest.mark.parametrize(('fault', 'message'), [
+    ('echo "No space left on device (os error 28)"; exit 1',
+     'the disk is full; the demonstration needs 0.5 GB, the tests 1.5'),
+    ('echo "Caused by: error sending request for url (URL)"; exit 1',
+     'no package index answers over the network'),
+    ('echo "x No solution found"; exit 1', 'x No solution found\n'),
+    ('kill -INT $PPID; sleep 5', 'interrupted'),
+], ids=['full disk', 'no network', 'anything else', 'Ctrl-C'])
+def test_failed_installation_is_explained_and_the_next_run_completes_it(
+        project: Project, fault: str, message: str) -> None:
+    status, output = project.run(FAULT=fault)
+    assert (status, output.partition('\n')[2]) == (1, f'environment: {message}{MAKE_AGAIN}')
+
+    status, output = project.run()
+    assert (status, 'its installation was interrupted' in output) == (0, True)
+    assert project.run() == (0, '')
+
+
+def test_python_without_venv_module_is_explained(project: Project) -> None:
+    project.program('bin/python3', PYTHON.replace(
+        '"-m venv "*)', '"-m venv "*) echo "python3: No module named venv"; exit 1 ;; no)'),
+        version='12')
+
+    assert project.run()[1].endswith(
+        'environment: this Python has no venv module; on Debian and Ubuntu: '
+        f'sudo apt install python3-venv{MAKE_AGAIN}')
+
+
+def test_rclpy_and_numpy_of_a_sourced_ros_are_used(project: Project) -> None:
+    status, output = project.run('test', ROS_DISTRO='kilted')
+
+    assert (status, 'the sourced ROS 2 Kilted' in output) == (0, True)
+    calls = project.calls()
+    assert 'venv --without-pip --system-site-packages ' in calls
+    assert calls.endswith('--all-extras --group test numpy==1.26.4')
+
+
+def test_another_distribution_than_the_sourced_one_is_refused(project: Project) -> None:
+    assert project.run('test', 'kilted', ROS_DISTRO='jazzy') == (
+        1, 'environment: ROS jazzy is sourced; use another terminal for ROS=kilted\n')
+
+
+def test_venv_made_without_ros_is_made_anew_when_ros_is_sourced(project: Project) -> None:
+    project.run()
+
+    assert 'made without ROS, which is sourced now' in project.run(ROS_DISTRO='jazzy')[1]
+
+
+def test_venv_of_another_python_is_kept_and_installed_into(project: Project) -> None:
+    project.program('.venv/bin/python', PYTHON, version='11')
+
+    assert project.run()[0] == 0
+    assert '-m venv' not in (calls := project.calls())
+    assert '11: -m pip install' in calls
 
 
 def test_venv_is_made_anew_if_python_asks_for_another_version(project: Project) -> None:
-    status, output = project.run(PYTHON='python3.13')
+    project.run()
+    project.program('bin/python3.13', PYTHON, version='13')
 
-    assert (status, 'PYTHON asks for another' in output) == (0, True)
+    assert 'PYTHON asks for another' in project.run(PYTHON='python3.13')[1]
     assert '13: -m venv' in project.calls()
-    assert '13: -m pip install' in project.calls()
 
 
-@pytest.mark.parametrize(('shim', 'message'), [
-    ('echo "pyenv: python3.9: command not found" >&2; exit 127',
-     'pyenv: python3.9: command not found'),
-    ('echo "$0 3 9"', 'there are ROS 2 wheels for Python 3.10 to 3.13 only'),
-], ids=['shim of a version that is not there', 'version without wheels'])
-def test_chosen_python_that_cannot_be_used_is_explained(
-    project: Project, shim: str, message: str,
-) -> None:
+@pytest.mark.parametrize('shim', ['exit 127', 'echo "$0 3.9"'], ids=['does not run', 'too old'])
+def test_chosen_python_that_cannot_be_used_is_named(project: Project, shim: str) -> None:
     project.program('bin/python3.9', f'#!/bin/sh\n{shim}\n')
 
     status, output = project.run(PYTHON='python3.9')
 
-    assert (status, message in output) == (1, True), output
-    assert 'venv' not in project.calls()
+    assert (status, project.calls()) == (1, '')
+    assert output.startswith('environment: python3.9 starts no Python 3.10 to 3.13')
 
 
-def test_machine_without_wheels_gets_two_ways_to_go_on(project: Project) -> None:
-    status, output = project.run('-c', (
-        "import platform, runpy; platform.machine = lambda: 'aarch64'; "
-        "runpy.run_path('tools/environment.py', run_name='__main__')"))
+def test_machine_without_wheels_is_told_what_to_do(project: Project) -> None:
+    status, output = project.run(machine='aarch64')
 
     assert (status, project.calls()) == (1, '')
-    for text in ('this is aarch64', 'source /opt/ros/', 'docker run '):
-        assert text in output
+    assert 'Source ROS 2 Jazzy, or use its image: see "Platforms" in doc/ros.md' in output

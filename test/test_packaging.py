@@ -17,6 +17,7 @@
 import ast
 import importlib
 from pathlib import Path
+import re
 import shutil
 import subprocess
 import sys
@@ -24,16 +25,20 @@ import sys
 from catkin_pkg.changelog import get_changelog_from_path
 from catkin_pkg.package import parse_package
 from catkin_pkg.package_version import update_changelog_sections, update_versions
+from illuminator_ros.cli.entry_point import OLDEST
+from illuminator_ros.mavlink.transport.serial import OLDEST_PYSERIAL
 import pytest
 from support.ports import free_port
 from support.processes import Program
 
 ROOT = Path(__file__).parents[1]
 PACKAGE = 'illuminator_ros'
-# Modules whose rosdep key differs from their name; fastcrc comes with pymavlink.
+# Modules and packages whose rosdep key differs from their name; fastcrc comes with pymavlink.
 KEYS = {'fastcrc': 'python3-pymavlink-pip', 'hypothesis': 'python3-hypothesis',
         'numpy': 'python3-numpy',
         'pymavlink': 'python3-pymavlink-pip', 'pytest': 'python3-pytest',
+        'pytest-timeout': 'python3-pytest-timeout', 'pyserial': 'python3-serial',
+        'pyyaml': 'python3-yaml',
         'scipy': 'python3-scipy', 'serial': 'python3-serial',
         'yaml': 'python3-yaml',
         'catkin_pkg': 'python3-catkin-pkg-modules'}
@@ -92,6 +97,55 @@ def test_release_sets_the_version_everywhere(copy: Path) -> None:
     update_versions({str(copy): parse_package(str(copy))}, '12.3.4')
 
     assert versions(copy) == ['12.3.4'] * 3
+
+
+class Declared:
+    """The requirements in pyproject.toml."""
+
+    def __init__(self) -> None:
+        tomllib = pytest.importorskip('tomllib', reason='Python 3.10 does not read TOML')
+        text = tomllib.loads((ROOT / 'pyproject.toml').read_text())
+        self.own: list[str] = text['project']['dependencies']
+        self.extras: dict[str, list[str]] = text['project']['optional-dependencies']
+        self.groups: dict[str, list[str]] = text['dependency-groups']
+
+    def packages(self, *lists: list[str]) -> dict[str, str]:
+        """Return the packages of lists, and the own ones, with the oldest version, '' if any."""
+        return {re.split(r'\[|<|>', text)[0]: text.partition('>=')[2].partition(',')[0]
+                for texts in (self.own, *lists) for text in texts}
+
+
+@pytest.fixture
+def declared() -> Declared:
+    return Declared()
+
+
+def test_package_xml_has_the_python_packages_of_pyproject(declared: Declared) -> None:
+    package = parse_package(str(ROOT))
+    programs = declared.packages(declared.extras['serial'], declared.extras['yaml'])
+    tests = {**programs, **declared.packages(declared.extras['test'])}
+
+    for names, depends in ((programs, package.exec_depends),
+                           (tests, package.exec_depends + package.test_depends)):
+        assert {KEYS[name] for name in names if name != 'setuptools'} == {
+            depend.name for depend in depends if depend.name.startswith('python3-')}
+
+
+def test_documentation_and_programs_name_the_oldest_versions_of_pyproject(
+        declared: Declared) -> None:
+    oldest = declared.packages(*declared.extras.values(), *declared.groups.values())
+    texts = [(path.relative_to(ROOT), path.read_text()) for path in (
+        ROOT / 'README.md', ROOT / 'Dockerfile', *ROOT.glob('doc/*.md'),
+        *ROOT.glob('.github/*/*'), *(ROOT / PACKAGE).rglob('*.py'))]
+
+    named = {(name, *pair) for name, text in texts
+             for pair in re.findall(r"'([\w-]+)>=([\d.]+)'", text)}
+
+    assert {name for name, _, _ in named} >= {Path('doc/monitor.md'), Path('doc/ros.md')}
+    assert [one for one in named if oldest.get(one[1]) != one[2]] == []
+    names = {'rclpy': 'ros-jazzy-rclpy', 'textual_serve': 'textual-serve'}
+    assert [one for one in OLDEST.values() if oldest[names.get(one[0], one[0])] != one[1]] == []
+    assert '.'.join(map(str, OLDEST_PYSERIAL)) == oldest['pyserial']
 
 
 def test_package_declares_its_imports() -> None:

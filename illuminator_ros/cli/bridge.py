@@ -209,5 +209,6 @@ def _use_profile() -> None:
     names = ('FASTRTPS_DEFAULT_PROFILES_FILE', 'FASTDDS_DEFAULT_PROFILES_FILE')
     files = ('DEFAULT_FASTRTPS_PROFILES.xml', 'DEFAULT_FASTDDS_PROFILES.xml')
     if not (any(map(os.environ.get, names)) or any(map(os.path.exists, files))):
+        from ..ros.fast_dds import profile_variable
         profile = os.path.join(os.path.dirname(__file__), os.pardir, 'ros', 'fastdds.xml')
-        os.environ.update(dict.fromkeys(names, os.path.abspath(profile)))
+        os.environ[profile_variable()] = os.path.abspath(profile)

@@ -37,7 +37,7 @@ _REMEDIES = {
 }
 _MONITOR = _REMEDIES['textual']
 # The oldest version of each package that works, by the module that it has, and the remedy.
-_OLDEST = {
+OLDEST = {
     'pymavlink': ('pymavlink', '2.4.50', "pip install 'pymavlink>=2.4.50'"),
     'rclpy': ('rclpy', '7.1', 'install ROS 2 Jazzy or newer'),
     'serial': ('pyserial', '3.5', "pip install 'pyserial>=3.5'"),
@@ -102,14 +102,17 @@ def _missing_package(error: Exception) -> str:
 
 def _old_package() -> str:
     """Return which imported package is too old, with the remedy; '' if none is."""
-    # Slow to import.
-    from importlib.metadata import PackageNotFoundError, version
+    # Slow to import, and impossible where descriptors are lacking.
+    try:
+        from importlib.metadata import PackageNotFoundError, version
+    except (ImportError, OSError):
+        return ''
 
     def numbers(text: str) -> list[int]:
         return [int(number) for number in re.findall(r'\d+', text)]
 
-    for module, (package, oldest, remedy) in _OLDEST.items():
-        with contextlib.suppress(PackageNotFoundError):
+    for module, (package, oldest, remedy) in OLDEST.items():
+        with contextlib.suppress(PackageNotFoundError, OSError):
             if module in sys.modules and numbers(found := version(package)) < numbers(oldest):
                 return f'{package} {found} is too old; {oldest} or newer is needed: {remedy}'
     return ''

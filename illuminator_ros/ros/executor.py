@@ -37,13 +37,13 @@ from rclpy.context import Context
 from rclpy.exceptions import InvalidHandle
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.guard_condition import GuardCondition
-from rclpy.impl.implementation_singleton import rclpy_implementation as _rclpy
 from rclpy.node import Node
 from rclpy.qos import QoSProfile
 from rclpy.service import Service
 from rclpy.subscription import Subscription
 
 from .answer_spacing import AnswerSpacing, MAX_SPREAD
+from .rclpy_private import rclpy_implementation as _rclpy
 from .throttled_log import NodeLog
 
 # Answers that wait for their time; more would fill the memory and come too late.

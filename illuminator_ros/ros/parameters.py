@@ -28,6 +28,7 @@ from rclpy.exceptions import InvalidHandle
 from rclpy.node import Node
 from rclpy.parameter import Parameter
 
+from .rclpy_private import parameter_overrides
 from .throttled_log import NodeLog
 from ..mavlink.messages import Address
 from ..mavlink.signing import Signing, SigningMode
@@ -279,7 +280,7 @@ def given_parameters(node: Node) -> Mapping[str, Parameter]:
     rclpy has no public access to values of the wrong type, such as an integer for a double, and to
     parameters that are not declared.
     """
-    return node._parameter_overrides
+    return parameter_overrides(node)
 
 
 class ChangeableParameters:

@@ -22,9 +22,9 @@ import logging
 import threading
 import time
 
-from rclpy.impl.rcutils_logger import RcutilsLogger
 from rclpy.logging import LoggingSeverity
 
+from .rclpy_private import RcutilsLogger
 from ..mavlink.messages import Address
 
 # Lines of one kind in PERIOD, s; the last of those left out is written after it.

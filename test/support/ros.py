@@ -23,6 +23,7 @@ from pathlib import Path
 import threading
 from typing import Any
 
+from illuminator_ros.ros.fast_dds import profile_variable
 from rcl_interfaces import srv
 from rcl_interfaces.msg import ParameterEvent
 from rclpy.parameter import Parameter, parameter_value_to_python
@@ -47,9 +48,7 @@ def own_domain() -> Iterator[int]:
     """Yield a ROS domain that no other process on this machine uses."""
     with claimed_domain() as domain:
         os.environ['ROS_AUTOMATIC_DISCOVERY_RANGE'] = 'LOCALHOST'
-        # Fast DDS 2, which Jazzy has, reads the first name; Fast DDS 3 reads the second one.
-        for name in ('FASTRTPS_DEFAULT_PROFILES_FILE', 'FASTDDS_DEFAULT_PROFILES_FILE'):
-            os.environ[name] = str(Path(__file__).with_name('fastdds.xml'))
+        os.environ[profile_variable()] = str(Path(__file__).with_name('fastdds.xml'))
         yield domain
 
 

@@ -26,11 +26,12 @@ import sys
 
 from illuminator_ros.mavlink.dialect import mavlink
 from illuminator_ros.mavlink.link import Link
+from illuminator_ros.ros.fast_dds import profile_variable
 import pytest
 from std_srvs.srv import SetBool
 from support.fork_server import prepare_child
 from support.light import ON_OFF, ServedLight
-from support.processes import ended, environment, python
+from support.processes import ended, environment, Program, python
 from support.recording import Call
 from support.ros import bridge_arguments, Parameters, Ros, running_bridge, STREAM
 from support.slow import pass_time_until
@@ -100,15 +101,21 @@ def test_all_of_fifty_calls_at_once_are_answered(own_ros: Ros, port: int) -> Non
         assert all(call.result().message for call in calls)
 
 
-def test_bridge_receives_through_no_port_in_shared_memory(own_ros: Ros, port: int) -> None:
-    # Other processes may keep writing to the old port of a bridge that was killed and restarted.
-    own_profile = dict.fromkeys(
-        ('FASTRTPS_DEFAULT_PROFILES_FILE', 'FASTDDS_DEFAULT_PROFILES_FILE'), '')
-
-    with ended(python('illuminator_ros.bridge', *bridge_arguments(port),
-                      env={'ROS_DOMAIN_ID': str(own_ros.domain), **own_profile})) as bridge:
+@pytest.fixture
+def bridge(own_ros: Ros, port: int) -> Iterator[Program]:
+    """Yield a bridge with the package's profile of Fast DDS, not with the tests' profile."""
+    with ended(python('illuminator_ros.bridge', *bridge_arguments(port), env={
+            'ROS_DOMAIN_ID': str(own_ros.domain), profile_variable(): ''})) as bridge:
         bridge.wait_for('link open')
+        yield bridge
 
-        # Each reader of a port keeps the port's lock file open.
-        opened = [os.readlink(link) for link in Path(f'/proc/{bridge.pid}/fd').iterdir()]
-        assert not [name for name in opened if re.match('/dev/shm/fast.*_port.*_el', name)]
+
+def test_bridge_receives_through_no_port_in_shared_memory(bridge: Program) -> None:
+    # Other processes may keep writing to the old port of a bridge that was killed and restarted.
+    # Each reader of a port keeps the port's lock file open.
+    opened = [os.readlink(link) for link in Path(f'/proc/{bridge.pid}/fd').iterdir()]
+    assert not [name for name in opened if re.match('/dev/shm/fast.*_port.*_el', name)]
+
+
+def test_middleware_has_no_warning_about_its_profile(bridge: Program) -> None:
+    assert 'PROFILES_FILE' not in bridge.log

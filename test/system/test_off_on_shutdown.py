@@ -109,6 +109,9 @@ def test_light_that_is_not_confirmed_off_is_an_error_that_does_not_delay_the_end
 # A bridge that waits for its lights for longer than the process lasts.
 HURRIED = """
 from runpy import run_module
+from signal import pthread_sigmask, SIG_BLOCK, SIGTERM
+# As the program does before it imports rclpy, whose threads must not take the signal.
+pthread_sigmask(SIG_BLOCK, {SIGTERM})
 from illuminator_ros.ros import bridge
 bridge.OFF_LIMIT = 30.0
 run_module('illuminator_ros.bridge', run_name='__main__')

@@ -79,8 +79,8 @@ def test_missing_pyserial_is_named_with_the_remedy(monkeypatch: pytest.MonkeyPat
 
 def test_old_pyserial_is_named_with_its_version_and_the_remedy(
         monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setitem(sys.modules, 'serial', SimpleNamespace(__version__='3.4'))
-    with pytest.raises(OSError, match="pyserial 3.4 is too old; .* pip install 'pyserial>=3.5'"):
+    monkeypatch.setitem(sys.modules, 'serial', SimpleNamespace(__version__='3.4b1'))
+    with pytest.raises(OSError, match="pyserial 3.4b1 is too old; .* pip install 'pyserial>=3.5'"):
         open_channel(parse_url('serial:///dev/ttyLIGHT:57600'))
 
 

@@ -24,6 +24,7 @@ import functools
 import math
 import os
 from pathlib import Path
+import re
 import struct
 import termios
 import tty
@@ -56,7 +57,7 @@ def open_serial(url: SerialUrl) -> Channel:
     except ImportError:
         raise OSError('a serial port needs pyserial: apt install python3-serial, or '
                       'pip install pyserial') from None
-    if tuple(map(int, serial.__version__.split('.')[:2])) < OLDEST_PYSERIAL:
+    if tuple(map(int, re.findall(r'\d+', serial.__version__)[:2])) < OLDEST_PYSERIAL:
         raise OSError(f'pyserial {serial.__version__} is too old; 3.5 or newer is needed: '
                       "pip install 'pyserial>=3.5'")
     try:
