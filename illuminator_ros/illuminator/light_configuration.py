@@ -233,7 +233,7 @@ class LightConfiguration:
 
     def _change(self, values: Changes) -> Configure:
         """
-        Return the change that sets some fields, and those that are required.
+        Return the change that sets some fields, and the required fields.
 
         :raises InvalidValue: if nothing is agreed yet and the values are not complete.
         """

@@ -29,7 +29,7 @@ BOOT_SLACK = 5.0
 # s after a restart in which no light starts again: statuses that overtake each other, or come from
 # two lights with one address, would show a restart each, and each is followed by requests.
 BOOT_TIME = 1.0
-# s with nothing but lower uptimes after which the light has restarted.
+# s with only lower uptimes after which the light has restarted.
 LOWER_TIME = 3.0
 # After a loss the light has restarted if its uptime has advanced by less than this share of it.
 RUNNING_SHARE = 0.5

@@ -227,12 +227,12 @@ class Switch:
             self._tell(origin if is_told else '')
 
     def _is_late(self, now: float) -> bool:
-        """Return whether the state is that of a command of ours that ended unconfirmed."""
+        """Return whether a command of ours that ended unconfirmed asked for this state."""
         return self.enabled is not None and (
             self._property.unconfirmed(now) == SWITCHES[self.enabled])
 
     def _tell(self, origin: str) -> None:
-        """Report a state that differs from the one that was reported last."""
+        """Report a state that differs from the last reported state."""
         if self.enabled is not None and self.enabled is not self._told:
             self._told = self.enabled
             if origin and not self._target.commands.refusal:

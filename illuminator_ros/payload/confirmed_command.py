@@ -22,7 +22,7 @@ come in one round trip.
 
 A status counts if it came after an acknowledgement of the command, or after its last try, and
 after the fence: where the command before it ended unconfirmed, its frames and answers may still be
-under way. Within the fence only a status counts that nothing but this command can have caused.
+under way. Within the fence a status counts only if this command alone can have caused it.
 Nothing is concluded from the clock of the device.
 """
 
@@ -177,7 +177,7 @@ Done = Callable[[Result, float], None]
 
 class Terms(NamedTuple):
     """
-    What a command is sent under. Times are s.
+    The terms under which a command is sent. Times are s.
 
     :param asked_at: when the change was requested.
     :param limit_at: the time by which the command ends, infinity for none.

@@ -33,7 +33,7 @@ from .confirmed_command import Change, ConfirmedCommand, Done, FENCE, Result, Ta
 from ..mavlink.command_sender import Position
 
 S = TypeVar('S')
-# What a command sets: MAV_CMD, params and position.
+# The values that a command sets: MAV_CMD, params and position.
 Value = tuple[int, tuple[float, ...], Position | None]
 # Callers that may wait for one value.
 MAX_CALLERS = 32

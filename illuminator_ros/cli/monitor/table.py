@@ -123,7 +123,7 @@ def counts(devices: Sequence[Device]) -> str:
 
 
 def problems(device: Device) -> list[Diagnosis]:
-    """Return the diagnoses of a device that have a finding, that of its link last."""
+    """Return the diagnoses of a device that have a finding, the diagnosis of its link last."""
     return [one for _, one in sorted(
         device.diagnoses.items(), key=lambda item: item[0] == 'link') if one.level]
 

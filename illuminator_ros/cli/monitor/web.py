@@ -144,7 +144,7 @@ class Gate:
             text='The token is wrong or was used. The monitor has printed the present one.'))
 
     def connect(self, server: web.Server) -> asyncio.Protocol:
-        """Return the protocol of a new connection, and drop those that are too many."""
+        """Return the protocol of a new connection; drop strangers if there are too many."""
         transports = [one.transport for one in server.connections if one.transport is not None]
         strangers = [one for one in transports if one not in self._rights]
         for one in strangers[:max(len(strangers) + 1 - MAX_STRANGERS, 0)]:
