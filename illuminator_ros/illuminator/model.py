@@ -351,7 +351,6 @@ class Status:
             otherwise.strobe_period if period is None else shortest(period),
             otherwise.strobe_duty_cycle if duty is None else shortest(duty))
 
-
     def shows_the_state_of(self, other: Status) -> bool:
         """Return whether a light may send both without having been changed."""
         return self.enabled == other.enabled and not unexpected_differences(

@@ -24,7 +24,7 @@ import pytest
 
 pytest.importorskip('textual_serve')
 
-from illuminator_ros.cli.monitor import web  # noqa: E402
+from illuminator_ros.cli.monitor import web  # noqa: E402,I100
 from support.ports import free_port  # noqa: E402
 
 Connection = tuple[asyncio.StreamReader, asyncio.StreamWriter]

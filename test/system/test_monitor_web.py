@@ -32,7 +32,7 @@ import pytest
 
 pytest.importorskip('textual_serve')
 
-import aiohttp  # noqa: E402
+import aiohttp  # noqa: E402,I100
 from support.browser import ENTER, IS_INSTALLED, running_browser  # noqa: E402
 from support.ports import free_port  # noqa: E402
 from support.processes import (  # noqa: E402
@@ -149,21 +149,21 @@ def test_page_operates_a_light_in_ten_tabs_and_on_a_phone_for_the_bearer_of_the_
 def test_ten_browsers_show_what_one_of_them_switches() -> None:
     async def switch(url: str) -> None:
         async with aiohttp.ClientSession() as session:
-            sockets = [await session.ws_connect(f'{url}ws', headers={'Origin': url.rstrip('/')})
-                       for _ in range(TABS)]
+            headers = {'Origin': url.rstrip('/')}
+            tabs = [await session.ws_connect(f'{url}ws', headers=headers) for _ in range(TABS)]
 
             async def all_show(text: str) -> None:
-                for socket in sockets:
-                    while text not in (await socket.receive(PATIENCE)).data.decode():
+                for tab in tabs:
+                    while text not in (await tab.receive(PATIENCE)).data.decode():
                         pass
 
             await all_show('1 light: 1 off')
-            await sockets[0].send_json(['stdin', ' '])
-            while 'It can dazzle' not in (await sockets[0].receive(PATIENCE)).data.decode():
+            await tabs[0].send_json(['stdin', ' '])
+            while 'It can dazzle' not in (await tabs[0].receive(PATIENCE)).data.decode():
                 pass
-            await sockets[0].send_json(['stdin', '\r'])
+            await tabs[0].send_json(['stdin', '\r'])
             await all_show(': 1 ON')
-            await sockets[0].send_json(['stdin', '0'])
+            await tabs[0].send_json(['stdin', '0'])
             await all_show(': 1 off')
 
     with served() as (_, url):

@@ -163,6 +163,7 @@ def test_a_stop_of_the_process_is_noted_before_the_calls_that_waited_meanwhile(
     now, pauses, order = [1000.0], list[float](), list[object]()
 
     class Selector(selectors.SelectSelector):
+
         def select(self, timeout: float | None = None) -> list[tuple[selectors.SelectorKey, int]]:
             now[0] += pauses.pop() if pauses else 0.0
             return super().select(0)

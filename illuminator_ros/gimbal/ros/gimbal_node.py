@@ -314,4 +314,3 @@ class GimbalNode:
             known=self._why_none(),
             limit_reached=self._client.limit_reached,
             interval=self._client.settings.attitude_interval, started=self._started)
-
