@@ -91,7 +91,7 @@ def test_light_is_left_on_with_a_warning_without_the_parameter(own_ros: Ros, por
 
 
 @pytest.mark.parametrize(('start', 'result', 'line'), [
-    (start_slow_bridge, mavlink.MAV_RESULT_DENIED, 'refused: MAV_RESULT_DENIED (1 try, '),
+    (start_slow_bridge, mavlink.MAV_RESULT_DENIED, 'refused: MAV_RESULT_DENIED'),
     (start_bridge, None, 'no confirmation in time'),
 ])
 def test_light_that_is_not_confirmed_off_is_an_error_that_does_not_delay_the_end(
@@ -174,9 +174,11 @@ def test_off_is_the_last_change_whatever_is_requested_at_the_end(
             program.kill()
 
         for one in (light, other):
-            if not loss or not program.count(f'light {one.fake.source} may still be on'):
+            # A busy machine may need more than 0.6 s.
+            may_be_on = program.count(f'light {one.fake.source} may still be on')
+            if not loss or not may_be_on:
                 assert_goes_off(one)
-                assert program.count(f'light {one.fake.source} is off')
+            assert may_be_on or program.count(f'light {one.fake.source} is off'), program.log
             changes = one.commands(ON_OFF, CONFIGURE)
             assert (changes[-1].command, changes[-1].param1) == (ON_OFF, 0.0)
 
