@@ -349,8 +349,10 @@ class Light:
             caller.done(Result(False, refusal, superseded=bool(closed)), now)
         elif not caller.is_stream:
             self._take_over(source, now)
+            # Calls that overlap, of which none succeeds, must not hold off the silence for ever.
+            if not sources.are_calling:
+                self._switch.silence.called_at = now
             sources.begin_call(source)
-            self._switch.silence.called_at = now
         return not refusal
 
     def _take_stream(self, source: str, desired: DesiredState, now: float) -> None:

@@ -25,7 +25,7 @@ from .commands import SWITCHES
 from .model import Mode, Status
 from ..mavlink.command_sender import format_seconds
 from ..mavlink.dialect import mavlink
-from ..payload.confirmed_command import Done, Result, Target
+from ..payload.confirmed_command import Done, REPEAT_INTERVAL, Result, Target
 from ..payload.device_property import Caller, Desired, Outcome, Property
 
 ON, OFF = SWITCHES[True], SWITCHES[False]
@@ -81,6 +81,8 @@ class Switch:
         self._report: Done | None = None
         self._is_finally_off = False
         self._silence_due = math.inf
+        # When an automatic OFF may follow one that the light has shown.
+        self._off_due = -math.inf
         # The state and the failure that were reported last.
         self._told: bool | None = None
         self._told_failure = ''
@@ -107,6 +109,10 @@ class Switch:
         """Send what the goal asks for; the light must be connected."""
         desired = self.goal(now)
         under_way = self._property.desired
+        if desired is not None and desired.insists and under_way is None and now < self._off_due:
+            # Two lights with one address end an OFF and need the next at the speed of the line.
+            self._silence_due = self._off_due
+            return
         if desired is not None and (under_way is None or not under_way.equals(desired)):
             self._want(desired, now)
         command = self._property.command
@@ -256,6 +262,7 @@ class Switch:
                 self.enabled = on
                 self._required = None
                 self._is_finally_off = not on
+                self._off_due = now + REPEAT_INTERVAL if not on else -math.inf
                 detail = next((one.detail for one in outcome.callers if one.detail), '')
                 self._tell(detail or desired.reason or events.A_REQUEST)
                 if self._report is not None and not on:

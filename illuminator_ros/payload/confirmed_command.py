@@ -21,9 +21,9 @@ it, and nothing else is a success. Each try carries a request for the status, so
 come in one round trip.
 
 A status counts if it came after an acknowledgement of the command, or after its last try, and
-after the fence: where the command before it ended unconfirmed, its frames and answers may still be
-under way. Within the fence a status counts only if this command alone can have caused it.
-Nothing is concluded from the clock of the device.
+after the fence: where the command before it was not acknowledged, its frames and answers may
+still be under way. Within the fence a status counts only if this command alone can have caused
+it. Nothing is concluded from the clock of the device.
 """
 
 from __future__ import annotations
@@ -48,7 +48,7 @@ from ..mavlink.messages import Address, result_name
 # s from the acknowledgement, or the last try, or the end of the fence, to the status that shows
 # the change.
 CONFIRMATION_TIMEOUT = 1.0
-# s after the last frame of an unconfirmed command in which its frames and answers may come.
+# s after the last frame of an unacknowledged command in which its frames and answers may come.
 FENCE = 1.5
 # s between requests for the status after one that does not show the change; the last one repeats.
 REQUEST_WAITS = (0.05, 0.1, 0.2, 0.25)

@@ -40,7 +40,7 @@ MAX_CALLERS = 32
 # s in which a command that ended unconfirmed may still take effect.
 LATE_TIME = 30.0
 # Values whose frames may be under way at once; with more, nothing counts before they have passed.
-MAX_VALUES = 16
+MAX_VALUES = 128
 
 
 class Caller(NamedTuple):
@@ -123,7 +123,7 @@ class Property(Generic[S]):
     :ivar newest: the newest status, None before the first.
     :ivar newest_at: when it came, s.
     :ivar sent_at: when a command was sent last, s.
-    :ivar fence: until then the frames of a command that ended unconfirmed may be under way, s.
+    :ivar fence: until then the frames of a command that was not acknowledged may be under way, s.
     """
 
     def __init__(self, target: Target) -> None:
@@ -137,8 +137,8 @@ class Property(Generic[S]):
         self._callers: list[Caller] = []
         self._next_callers: list[Caller] = []
         self._unconfirmed: Change[S] | None = None
-        # The values whose frames may be under way before the fence.
-        self._under_way: set[Value] = set()
+        # The values whose frames may be under way, and until when, s.
+        self._under_way: dict[Value, float] = {}
 
     def want(self, desired: Desired[S], now: float, caller: Caller | None = None) -> None:
         """Move the property to a value; callable again with the same one."""
@@ -169,8 +169,7 @@ class Property(Generic[S]):
 
     def _start(self, desired: Desired[S], callers: list[Caller], now: float) -> None:
         asked_at = callers[0].asked_at if callers else now
-        if now >= self.fence:
-            self._under_way.clear()
+        self._under_way = {value: end for value, end in self._under_way.items() if now < end}
         self.desired, self._callers, self.sent_at = desired, callers, now
         terms = Terms(asked_at, asked_at + desired.limit, self.fence,
                       self._is_sole_cause(desired), desired.insists, desired.is_last)
@@ -188,7 +187,7 @@ class Property(Generic[S]):
         if desired.limit > FENCE:
             return False
         change = desired.change
-        others = self._under_way - {_value(change)}
+        others = self._under_way.keys() - {_value(change)}
         is_new = len(others) == len(self._under_way) < MAX_VALUES or not others
         return is_new and self.newest is not None and change.shown_by(self.newest) is False
 
@@ -237,10 +236,10 @@ class Property(Generic[S]):
         self.command, self.desired, self._callers, self._next_callers = None, None, [], []
         is_settled = result.success or result.refused
         self._unconfirmed = None if is_settled else desired.change
-        if not result.success or command.is_under_way:
+        if command.is_under_way:
             self.fence = max(self.fence, command.last_sent + FENCE)
         if now < self.fence and len(self._under_way) < MAX_VALUES:
-            self._under_way.add(_value(desired.change))
+            self._under_way[_value(desired.change)] = self.fence
         if waiting and goes_on:
             self._start(desired, waiting, now)
         else:

@@ -29,6 +29,7 @@ import pytest
 from support.back_to_back import Pair
 from support.fake_light import FakeLight
 from support.faulty_wire import Faults
+from support.shared_address import SharedAddress
 
 ON_OFF, CONFIGURE = mavlink.MAV_CMD_ILLUMINATOR_ON_OFF, mavlink.MAV_CMD_DO_ILLUMINATOR_CONFIGURE
 SILENCE = 5.0
@@ -164,16 +165,33 @@ def test_an_on_that_takes_effect_after_it_has_failed_does_not_count_as_a_request
     assert light.fields['enable'] == 0
 
 
-def test_calls_that_are_refused_do_not_postpone_the_off_after_silence() -> None:
+@pytest.mark.parametrize('latency', [0.002, 0.15])
+@pytest.mark.parametrize('period', [1.0, 0.25])
+def test_calls_that_are_refused_do_not_postpone_the_off_after_silence(
+    period: float, latency: float,
+) -> None:
     light = FakeLight()
-    pair = silenced(light)
+    pair = silenced(light, latency=latency)
     assert pair.enable(True).success
     light.results[CONFIGURE] = mavlink.MAV_RESULT_DENIED
-    for _ in range(6):
-        assert not pair.configure(brightness=20.0).success
-        pair.run(1.0)
+    answers = []
+    for number in range(round((SILENCE + 1.0) / period)):
+        # Where the round trip is longer than the period, the calls overlap.
+        answers.append(pair.ask_configure(brightness=20.0 + number % 2))
+        pair.run(period)
 
+    assert not any(one.success for answer in answers for one in answer.results)
     assert light.fields['enable'] == 0
+
+
+def test_a_light_that_shows_on_again_after_each_off_gets_four_offs_a_second() -> None:
+    on, off = FakeLight(enable=1), FakeLight()
+    on.applies = False
+    pair = Pair(SharedAddress(off, on), settings=Settings(off_after_silence=SILENCE)).settle()
+    pair.run(SILENCE + 10.0)
+
+    # The silence has lasted for 10 to 15 s.
+    assert 10 < len(pair.commands(ON_OFF)) <= 65
 
 
 @pytest.mark.parametrize('before', ['a failed request', 'throttling'])

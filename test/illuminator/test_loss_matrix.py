@@ -32,6 +32,10 @@ LINES: dict[str, tuple[tuple[str, ...], tuple[str, ...]]] = {
 }
 
 
+# The share of commands that must be confirmed, though the users call again at once.
+LEAST = {('drop', 0.0): 1.0, ('drop', 0.3): 0.98, ('drop', 0.5): 0.88}
+
+
 def play(line: str, share: float) -> Run:
     there, back = (Faults(**dict.fromkeys(kinds, share)) for kinds in LINES[line])
     return Run(there, back, f'{line} {share}')
@@ -44,7 +48,7 @@ def test_every_command_has_one_outcome_and_it_is_true(line: str, share: float) -
     assert list(run.untruths()) == []
     confirmed = run.outcomes[CONFIRMED] / len(run.requests)
     print(f'{line} {share:.0%}: {confirmed:.1%} confirmed')
-    assert share or confirmed == 1.0
+    assert confirmed >= LEAST.get((line, share), 0.0)
 
 
 def test_the_same_seed_gives_the_same_answers() -> None:

@@ -229,6 +229,20 @@ def test_a_program_that_sets_each_second_is_not_locked_out_by_a_set_that_failed(
     assert results == [False, True, True, True, True]
 
 
+def test_a_stream_of_brightness_is_followed_again_after_a_lost_acknowledgement(
+    fake: FakeLight, faked: Pair,
+) -> None:
+    fake.results[CONFIGURE] = [None, mavlink.MAV_RESULT_ACCEPTED]
+    for number in range(500):
+        if number == 400:
+            begun = faked.now
+        faked.light.set_brightness(10.0 + number % 80, faked.now)
+        faked.turn()
+        faked.run(0.02)
+
+    assert len([at for at, _ in faked.commands_at(CONFIGURE) if at >= begun]) >= 95
+
+
 def test_an_on_of_a_stream_that_waits_is_not_sent_after_a_later_off(
     fake: FakeLight, faked: Pair,
 ) -> None:

@@ -202,11 +202,11 @@ def test_within_the_fence_a_status_counts_that_only_this_value_can_have_caused(
 
 @pytest.mark.parametrize(('results', 'between', 'seconds'), [
     # The end of the command before -> how long the next one takes, with the value between them.
-    ([ACCEPTED], 0.0, ROUND_TRIP), ([DENIED, ACCEPTED], 0.0, FENCE),
+    ([ACCEPTED], 0.0, ROUND_TRIP), ([DENIED, ACCEPTED], 0.0, ROUND_TRIP),
     ([None, None, None, None, ACCEPTED], 0.0, FENCE - 1.0),
     ([None, None, None, None, ACCEPTED], FENCE - 1.0, ROUND_TRIP)],
     ids=['confirmed', 'refused', 'not acknowledged', 'not acknowledged and waited'])
-def test_the_fence_ends_1_5_s_after_the_last_frame_of_a_command_that_failed(
+def test_the_fence_ends_1_5_s_after_the_last_frame_of_a_command_without_an_acknowledgement(
     results: list[int | None], between: float, seconds: float,
 ) -> None:
     bench = PropertyBench(0, *results).report()

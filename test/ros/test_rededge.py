@@ -305,10 +305,10 @@ def test_a_required_input_that_never_comes_is_logged_with_its_topic_and_publishe
     with (running_camera() as camera,
           running_node(own_ros, camera, slow_python, heartbeat_timeout=60.0) as node):
         own_ros.publisher(Imu, '/rededge/imu', '/rededge')
-        for line in ('~/fix (/rededge/fix has no publisher)',
-                     '~/imu or ~/attitude (/rededge/imu has 1 publisher; '
-                     '/rededge/attitude has no publisher)'):
-            pass_time_until(lambda line=line: node.count(f'nothing received on {line}'), step=2.0)
+        lines = ('nothing received on ~/fix (/rededge/fix has no publisher)',
+                 'nothing received on ~/imu or ~/attitude (/rededge/imu has 1 publisher; '
+                 '/rededge/attitude has no publisher)')
+        pass_time_until(lambda: all(map(node.count, lines)), step=2.0)
 
 
 def test_several_publishers_of_an_input_are_logged_and_in_the_diagnostics(own_ros: Ros) -> None:
