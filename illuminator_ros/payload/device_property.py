@@ -236,7 +236,8 @@ class Property(Generic[S]):
         self.command, self.desired, self._callers, self._next_callers = None, None, [], []
         is_settled = result.success or result.refused
         self._unconfirmed = None if is_settled else desired.change
-        if command.is_under_way:
+        # The acknowledgement of a superseded command may be that of an earlier command.
+        if command.is_under_way or result.superseded:
             self.fence = max(self.fence, command.last_sent + FENCE)
         if now < self.fence and len(self._under_way) < MAX_VALUES:
             self._under_way[_value(desired.change)] = self.fence
