@@ -131,14 +131,15 @@ class Light:
         self._emit(events.StatusReceived(self.address, status, now, self._temperature))
 
     def _expects(self, status: Status) -> bool:
-        return self._switch.expects(status) or self._configuration.expects(status)
+        return (self._switch.changes.expects(status)
+                or self._configuration.changes.expects(status))
 
     def _take_state(self, status: Status, now: float) -> None:
         switch, configuration, states = self._switch, self._configuration, self._changing
-        switched_at, was_changing = switch.sent_at, states.are_changing
+        switched_at, was_changing = switch.changes.sent_at, states.are_changing
         states.take(status, now, is_commanded=(
-            switch.is_pending or configuration.is_pending
-            or now <= max(switched_at, configuration.sent_at) + IMPLIED_TIME))
+            switch.changes.is_busy or configuration.changes.is_busy
+            or now <= max(switched_at, configuration.changes.sent_at) + IMPLIED_TIME))
         if states.are_changing and not was_changing:
             self._emit(events.StatesChanging(self.address, True))
         is_followed = not states.are_changing
@@ -264,7 +265,7 @@ class Light:
             replaces it.
         """
         caller = Caller(done, now, source, is_stream, detail)
-        if self._may_send(caller, DesiredState(enabled=on), now):
+        if self._take_request(caller, DesiredState(enabled=on), now):
             if not on:
                 self._prepare_off(now)
             self._switch.ask(on, now, caller)
@@ -274,7 +275,7 @@ class Light:
         """End what an OFF must not be followed by, where the brightness is the switch."""
         if self._configuration.brightness_is_switch:
             self._configuration.cancel('superseded by off', now)
-            self._switch.fence_until(self._configuration.fence)
+            self._switch.changes.fence_until(self._configuration.changes.fence)
 
     def configure(self, changes: Changes, now: float, done: Done) -> None:
         """
@@ -285,7 +286,7 @@ class Light:
         :param changes: values by name, see :data:`~.model.FIELDS`; if one is wrong none is sent.
         """
         caller = Caller(done, now, DEFAULT)
-        if self._may_send(caller, DesiredState(), now):
+        if self._take_request(caller, DesiredState(), now):
             self._configuration.configure(changes, now, caller)
         self._update(now)
 
@@ -302,7 +303,7 @@ class Light:
             if not (result.superseded or self.is_held_by_other(source)):
                 self._emit(events.SetpointFailed(self.address, result.message))
 
-        if self._may_send(Caller(failed, now, source, is_stream=True),
+        if self._take_request(Caller(failed, now, source, is_stream=True),
                           DesiredState(brightness=brightness), now):
             self._configuration.set_brightness(brightness)
         self._update(now)
@@ -329,8 +330,12 @@ class Light:
         """Ask for a status, unless such a request is under way."""
         self._queries.request_status(now)
 
-    def _may_send(self, caller: Caller, desired: DesiredState, now: float) -> bool:
-        """Return whether a request may be sent now; if not, answer it with the reason."""
+    def _take_request(self, caller: Caller, desired: DesiredState, now: float) -> bool:
+        """
+        Take a request: it counts for its source, and ends what lower sources have requested.
+
+        :return: whether it may be sent now; if not, it is answered with the reason.
+        """
         closed, sources, source = self._commands.refusal, self._sources, caller.source
         refusal = closed
         if not refusal:
@@ -409,9 +414,10 @@ class Light:
             self._send_remembered(change.after, now)
 
     def _is_known_off(self, now: float) -> bool:
-        return self.connected and self._switch.enabled is False and not self._may_be_on(now)
+        return self.connected and self._switch.enabled is False and not self.may_be_on(now)
 
-    def _may_be_on(self, now: float) -> bool:
+    def may_be_on(self, now: float) -> bool:
+        """Return whether the light is on, or may go on by a command of ours that was sent."""
         return self._switch.may_be_on(now) or self._configuration.may_switch(now)
 
     def _send_remembered(self, source: str, now: float) -> None:
@@ -447,7 +453,7 @@ class Light:
             if configuration.brightness_is_switch and switch.is_off_due(now):
                 self._prepare_off(now)
             switch.update(now)
-            if not (switch.outcomes or configuration.outcomes):
+            if not (switch.changes.outcomes or configuration.changes.outcomes):
                 return
 
     def _finish(self, outcome: Outcome[Status], now: float) -> None:
@@ -494,10 +500,6 @@ class Light:
             report(Result(False, self.unreachable(now), permanent=True), now)
         self._update(now)
 
-    def may_stay_on(self, now: float) -> bool:
-        """Return whether the light is on, or may go on by an ON of ours that was sent."""
-        return self._may_be_on(now)
-
     # Time
 
     def poll(self, now: float) -> None:
@@ -510,8 +512,8 @@ class Light:
             self._emit(events.StatesChanging(self.address, False))
         self._queries.poll(now, self.heard_at if self.connected else math.inf)
         self._take_holder(self._sources.poll(now), now)
-        self._switch.poll(now)
-        self._configuration.poll(now)
+        self._switch.changes.poll(now)
+        self._configuration.changes.poll(now)
         self._update(now)
 
     def next_deadline(self) -> float:

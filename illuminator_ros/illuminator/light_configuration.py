@@ -42,7 +42,7 @@ from .model import (
 )
 from ..mavlink.messages import Address
 from ..payload.confirmed_command import Change, Result, Target
-from ..payload.device_property import Caller, Desired, LATE_TIME, Outcome, Property
+from ..payload.device_property import Caller, Desired, Outcome, Property
 
 # s; rqt_reconfigure gives up after 1.0 s, and the answer must arrive before. The middleware waits
 # up to 0.1 s before it sends an answer to a client that it has not discovered yet.
@@ -118,7 +118,7 @@ class LightConfiguration:
     :ivar agreed: the configuration that the light last accepted from us or, if another sender has
         changed it since, last reported; None before either.
     :ivar exceeded: how the light exceeds the limits.
-    :ivar outcomes: of the values that have ended, which :meth:`take_outcomes` returns.
+    :ivar changes: the property of the light; :meth:`take_outcomes` returns its outcomes.
     """
 
     def __init__(
@@ -131,8 +131,7 @@ class LightConfiguration:
         self._commands = target.commands
         self._limits = limits
         self._restores = restores
-        self._property: Property[Status] = Property(target)
-        self.outcomes = self._property.outcomes
+        self.changes: Property[Status] = Property(target)
         self._required = Required({})
         self._setpoint: float | None = None
         # Small steps away from it add up to a change.
@@ -180,7 +179,7 @@ class LightConfiguration:
 
     @property
     def _is_dark(self) -> bool:
-        status = self._property.newest
+        status = self.changes.newest
         return status is not None and status.is_dark
 
     def update(self, now: float, *, is_off_pending: bool) -> None:
@@ -190,7 +189,7 @@ class LightConfiguration:
         :param is_off_pending: whether an OFF is under way, which a brightness may undo.
         """
         self._is_off_pending = is_off_pending
-        if self._property.desired is not None or not (
+        if self.changes.desired is not None or not (
                 self._required.fields or self._setpoint is not None):
             return
         self._check_required()
@@ -204,13 +203,13 @@ class LightConfiguration:
         if desired.reason == _SETPOINT:
             value, self._setpoint = self._setpoint, None
             if (self.agreed is not None and self.agreed.brightness == value
-                    and self._property.unconfirmed(now) is None):
+                    and self.changes.unconfirmed(now) is None):
                 return
         else:
             self._required.is_tried = True
             if any(reason is Reason.LIMIT for _, reason in self._required.fields.values()):
                 self._limited_at = now
-        self._property.want(desired, now)
+        self.changes.want(desired, now)
 
     def _check_required(self) -> None:
         """Drop required values that are outside the range that the light reports."""
@@ -237,7 +236,7 @@ class LightConfiguration:
 
         :raises InvalidValue: if nothing is agreed yet and the values are not complete.
         """
-        desired, note = self._property.desired, ''
+        desired, note = self.changes.desired, ''
         names = [*values, *self._sendable()]
         values = {**self._sendable(), **values}
         base = self.agreed
@@ -270,7 +269,7 @@ class LightConfiguration:
 
         Otherwise a light that once reported a value out of its range would deny every change.
         """
-        status = self._property.newest
+        status = self.changes.newest
         if status is None:
             return base
         reported, ruled_out = status.configuration(base), {}
@@ -298,11 +297,11 @@ class LightConfiguration:
                 self._limits.check(name, value)
             change = self._change(values)
         except InvalidValue as error:
-            self.outcomes.append(Outcome(
+            self.changes.outcomes.append(Outcome(
                 Desired(NOTHING_CHANGED), Result(False, str(error), permanent=True), None,
                 (caller,)))
             return
-        self._property.want(Desired(change, limit=CONFIGURE_LIMIT), now, caller)
+        self.changes.want(Desired(change, limit=CONFIGURE_LIMIT), now, caller)
 
     def set_brightness(self, brightness: float) -> None:
         """Take a setpoint of a stream, %, checked; the next update sends it."""
@@ -312,7 +311,7 @@ class LightConfiguration:
             brightness = self._limits.max_brightness
             self._emit(events.SetpointClipped(self._address, str(error)))
         self._setpoint = brightness
-        desired = self._property.desired
+        desired = self.changes.desired
         if (desired is not None and desired.reason == _SETPOINT
                 and isinstance(desired.change, Configure)
                 and desired.change.configuration.brightness == brightness):
@@ -338,14 +337,14 @@ class LightConfiguration:
     def cancel(self, message: str, now: float) -> None:
         """End all requests; required values stay."""
         self._setpoint = None
-        self._property.cancel(message, now, superseded=True)
+        self.changes.cancel(message, now, superseded=True)
 
     def lost(self, message: str, now: float) -> None:
         """End all requests, since the light is lost."""
         if self._setpoint is not None:
             self._setpoint = None
             self._emit(events.SetpointFailed(self._address, message))
-        self._property.cancel(message, now)
+        self.changes.cancel(message, now)
 
     def close(self, message: str, now: float) -> None:
         """End everything, since the process ends."""
@@ -356,7 +355,7 @@ class LightConfiguration:
         """Replace the limits, and bring a light that exceeds them back within them."""
         self._limits, self._limited_at = limits, -math.inf
         self._drop_limits()
-        desired = self._property.desired
+        desired = self.changes.desired
         if desired is not None and isinstance(desired.change, Configure):
             goal = desired.change.configuration
             limited = limits.clipped(goal, self.strobe_range)
@@ -364,10 +363,10 @@ class LightConfiguration:
                 # A resend would exceed the limits. The newest setpoint is sent as the limit.
                 if desired.reason == _SETPOINT and self._setpoint is None:
                     self._setpoint = limited.brightness
-                self._property.cancel(
+                self.changes.cancel(
                     ', '.join(limits.excess(goal)) or 'a limit was changed', now,
                     superseded=bool(desired.reason))
-        if status := self._property.newest:
+        if status := self.changes.newest:
             self._keep_limits(status, now)
 
     def _drop_limits(self) -> None:
@@ -383,7 +382,7 @@ class LightConfiguration:
     @property
     def strobe_range(self) -> StrobeRange:
         """Return the strobe periods that the light reports to be possible."""
-        status = self._property.newest
+        status = self.changes.newest
         return status.strobe_range if status is not None else StrobeRange()
 
     @property
@@ -392,34 +391,14 @@ class LightConfiguration:
         return self._required.failure or self._failure[0]
 
     @property
-    def is_pending(self) -> bool:
-        """Whether a command is under way."""
-        return self._property.command is not None
-
-    @property
-    def sent_at(self) -> float:
-        """When a command was sent last, s."""
-        return self._property.sent_at
-
-    def expects(self, status: Status) -> bool:
-        """Return whether a status shows what the command under way changes."""
-        desired = self._property.desired
-        return desired is not None and desired.change.shown_by(status) is True
-
-    @property
     def brightness_is_switch(self) -> bool:
         """Whether a brightness above 0 switches the light on, as in ArduSub."""
         return self._off_brightness == 0.0
 
-    @property
-    def fence(self) -> float:
-        """Until when frames of an unconfirmed command may be under way, s."""
-        return self._property.fence
-
     def may_switch(self, now: float) -> bool:
         """Return whether a command of ours may have switched the light by its brightness."""
         return self.brightness_is_switch and (
-            self.is_pending or now <= self._property.sent_at + IMPLIED_TIME)
+            self.changes.is_busy or now <= self.changes.sent_at + IMPLIED_TIME)
 
     def excess(self, status: Status) -> tuple[str, ...]:
         """Describe how a status exceeds the limits."""
@@ -436,18 +415,18 @@ class LightConfiguration:
         :param can_follow: whether the parameters follow what it shows.
         :param switched_at: when the light was last switched by us, s.
         """
-        was_pending = self.is_pending
+        was_pending = self.changes.is_busy
         if status.enabled is False:
             self._off_brightness = status.brightness
-        late = self._property.unconfirmed(now)
-        self._property.reported(status, now)
+        late = self.changes.unconfirmed(now)
+        self.changes.reported(status, now)
         if not was_pending:
             self._compare(status, now, late=late, can_follow=can_follow, switched_at=switched_at)
         self._keep_limits(status, now)
 
     def restarted(self, status: Status, now: float) -> None:
         """Take the first status after a restart: the configuration may be lost."""
-        desired, wanted = self._property.desired, self.agreed
+        desired, wanted = self.changes.desired, self.agreed
         if desired is not None and isinstance(desired.change, Configure):
             # A set ends before the fence of the restart, and its values must not be lost with it.
             wanted = desired.change.configuration
@@ -459,7 +438,7 @@ class LightConfiguration:
             # The light has other values now.
             self._drop_limits()
         self._limited_at = -math.inf
-        self._property.restarted(status, now)
+        self.changes.restarted(status, now)
         if desired is None:
             self._compare(status, now, late=None, can_follow=True, switched_at=-math.inf)
         self._keep_limits(status, now)
@@ -522,9 +501,10 @@ class LightConfiguration:
         cause = events.ChangeCause.ROUNDING
         if far:
             cause = events.ChangeCause.LIGHT
-            if late is not None and late.shown_by(status) and now <= self.sent_at + LATE_TIME:
+            if late is not None and late.shown_by(status):
                 cause = events.ChangeCause.LATE_EFFECT
-            elif now <= IMPLIED_TIME + (switched_at if late else max(switched_at, self.sent_at)):
+            elif now <= IMPLIED_TIME + max(
+                    switched_at, -math.inf if late else self.changes.sent_at):
                 cause = events.ChangeCause.REQUEST
         self._adopt(replace(self.agreed, **{name: getattr(reported, name) for name in names}),
                     cause)
@@ -560,7 +540,7 @@ class LightConfiguration:
                  if reason is Reason.LIMIT]
         self._required.drop([name for name in known if name not in beyond])
         values = {name: getattr(limited, name) for name in beyond if name not in known}
-        if excess and values and not self.is_pending:
+        if excess and values and not self.changes.is_busy:
             self._required = self._required.merged(
                 values, Reason.LIMIT, max(now, self._limited_at + LIMIT_INTERVAL))
 
@@ -568,8 +548,8 @@ class LightConfiguration:
 
     def take_outcomes(self, now: float) -> Iterator[Outcome[Status]]:
         """Return what has ended."""
-        while self.outcomes:
-            outcome = self.outcomes.popleft()
+        while self.changes.outcomes:
+            outcome = self.changes.outcomes.popleft()
             desired, result, change = outcome.desired, outcome.result, outcome.desired.change
             assert isinstance(change, Configure)
             if result.success:
@@ -578,7 +558,7 @@ class LightConfiguration:
                     name for name, value in self._required.values.items()
                     if name in change.names or value == getattr(change.configuration, name)])
             elif result.contradicted:
-                self._failure = result.message, change.configuration, self._property.newest
+                self._failure = result.message, change.configuration, self.changes.newest
             if desired.reason == _REQUIRED and not result.superseded:
                 self._required_ended(result, now)
             elif desired.reason == _SETPOINT and not (result.success or result.superseded):
@@ -622,14 +602,10 @@ class LightConfiguration:
 
     # Time
 
-    def poll(self, now: float) -> None:
-        """Do what is due."""
-        self._property.poll(now)
-
     def next_deadline(self) -> float:
-        """Return when :meth:`poll` or :meth:`update` has something to do."""
-        due = self._property.next_deadline()
-        if self._property.desired is None and self._sendable():
+        """Return when ``changes.poll`` or :meth:`update` has something to do."""
+        due = self.changes.next_deadline()
+        if self.changes.desired is None and self._sendable():
             due = min(due, self._required.due)
         return due
 

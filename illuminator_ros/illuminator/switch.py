@@ -62,7 +62,7 @@ class Switch:
         0 for never.
     :ivar enabled: as reported, None if unknown.
     :ivar silence: of all who may request something.
-    :ivar outcomes: of the values that have ended, which :meth:`take_outcomes` returns.
+    :ivar changes: the property of the light; :meth:`take_outcomes` returns its outcomes.
     """
 
     def __init__(
@@ -72,8 +72,7 @@ class Switch:
         self._target = target
         self._emit = emit
         self.silence = Silence(off_after_silence)
-        self._property: Property[Status] = Property(target)
-        self.outcomes = self._property.outcomes
+        self.changes: Property[Status] = Property(target)
         self._asked: Desired[Status] | None = None
         # The OFF of a release, until the light shows it.
         self._required: Desired[Status] | None = None
@@ -108,14 +107,14 @@ class Switch:
     def update(self, now: float) -> None:
         """Send what the goal asks for; the light must be connected."""
         desired = self.goal(now)
-        under_way = self._property.desired
+        under_way = self.changes.desired
         if desired is not None and desired.insists and under_way is None and now < self._off_due:
             # Two lights with one address end an OFF and need the next at the speed of the line.
             self._silence_due = self._off_due
             return
         if desired is not None and (under_way is None or not under_way.equals(desired)):
             self._want(desired, now)
-        command = self._property.command
+        command = self.changes.command
         if command is not None and command.terms.insists:
             self._tell_failure(command.failure(), now)
         waits = self.silence.limit and self.may_be_on(now) and not self.is_off_pending
@@ -125,7 +124,7 @@ class Switch:
         if desired.insists and self._report is None:
             self._emit(events.AutomaticSwitch(self._target.address, False, desired.reason))
         self._told_failure = ''
-        self._property.want(desired, now, caller)
+        self.changes.want(desired, now, caller)
 
     def _tell_failure(self, failure: str, now: float) -> None:
         """Report why an automatic OFF is not confirmed: once, or each reason at the end."""
@@ -134,9 +133,9 @@ class Switch:
         if self._report is not None:
             self._report(Result(False, failure), now)
         elif not self._told_failure:
-            assert self._property.desired is not None
+            assert self.changes.desired is not None
             self._emit(events.AutomaticSwitch(
-                self._target.address, False, self._property.desired.reason, failure))
+                self._target.address, False, self.changes.desired.reason, failure))
         self._told_failure = failure
 
     # Requests
@@ -150,14 +149,10 @@ class Switch:
         """Switch the light off until it shows that, or a request switches it on."""
         self._required = Desired(OFF, reason, insists=True)
 
-    def fence_until(self, fence: float) -> None:
-        """Count nothing before a time: commands that may switch the light are under way."""
-        self._property.fence = max(self._property.fence, fence)
-
     def cancel(self, message: str, now: float, *, superseded: bool = False) -> None:
         """End the command under way; an automatic OFF is sent again by the next update."""
         self._asked = None
-        self._property.cancel(message, now, superseded=superseded)
+        self.changes.cancel(message, now, superseded=superseded)
 
     def close(self, message: str, now: float) -> None:
         """End everything that is desired, since the process ends."""
@@ -167,36 +162,21 @@ class Switch:
     def switch_off_finally(self, now: float, report: Done) -> None:
         """Switch the light off whenever it may be on; see :meth:`.light.Light.close`."""
         self._report, self._is_finally_off = report, False
-        report(Result(False, 'sent, not confirmed' if now < self._property.fence else ''), now)
+        report(Result(False, 'sent, not confirmed' if now < self.changes.fence else ''), now)
 
     # Known facts
 
     @property
-    def is_pending(self) -> bool:
-        """Whether a command is under way."""
-        return self._property.command is not None
-
-    @property
     def is_off_pending(self) -> bool:
         """Whether an OFF is under way."""
-        return self._property.is_pending(OFF)
-
-    @property
-    def sent_at(self) -> float:
-        """When a switch was last sent, s."""
-        return self._property.sent_at
-
-    def expects(self, status: Status) -> bool:
-        """Return whether a status shows what the command under way changes."""
-        desired = self._property.desired
-        return desired is not None and desired.change.shown_by(status) is True
+        return self.changes.is_pending(OFF)
 
     def may_be_on(self, now: float) -> bool:
         """Return whether the light is on, or may go on by an ON of ours."""
         return bool(
-            self.enabled or self._property.is_pending(ON)
-            or self._property.unconfirmed(now) == ON
-            and (self.enabled is None or now < self._property.fence))
+            self.enabled or self.changes.is_pending(ON)
+            or self.changes.unconfirmed(now) == ON
+            and (self.enabled is None or now < self.changes.fence))
 
     @property
     def off_at(self) -> float:
@@ -216,16 +196,16 @@ class Switch:
         """
         before, self.enabled = self.enabled, status.enabled
         is_late = self._is_late(now)
-        if self.enabled and is_told and not self.is_pending and (
+        if self.enabled and is_told and not self.changes.is_busy and (
                 before is None or not (before or is_late or may_be_ours or self._was_hot)):
             # Another sender has switched it on, or it was on when it was found.
             self.silence.requested_at = now
-        if self.enabled is False and not self.is_pending:
+        if self.enabled is False and not self.changes.is_busy:
             self._required = None
-        self._property.reported(status, now)
+        self.changes.reported(status, now)
         self._was_hot = bool(
             status.error_flags & mavlink.ILLUMINATOR_ERROR_FLAGS_OVER_TEMPERATURE_SHUTDOWN)
-        if not self.outcomes and not self.is_pending:
+        if not self.changes.outcomes and not self.changes.is_busy:
             origin = (events.LATE_EFFECT if is_late else
                       events.A_REQUEST if may_be_ours else events.OTHER_SENDER)
             is_told = is_told and not (
@@ -235,7 +215,7 @@ class Switch:
     def _is_late(self, now: float) -> bool:
         """Return whether a command of ours that ended unconfirmed asked for this state."""
         return self.enabled is not None and (
-            self._property.unconfirmed(now) == SWITCHES[self.enabled])
+            self.changes.unconfirmed(now) == SWITCHES[self.enabled])
 
     def _tell(self, origin: str) -> None:
         """Report a state that differs from the last reported state."""
@@ -248,14 +228,14 @@ class Switch:
         """Take the first status after a restart, which confirms nothing."""
         self.enabled = status.enabled
         self._tell('')
-        self._property.restarted(status, now)
+        self.changes.restarted(status, now)
 
     def take_outcomes(self, now: float) -> Iterator[Outcome[Status]]:
         """Return what has ended."""
-        while self.outcomes:
-            outcome = self.outcomes.popleft()
+        while self.changes.outcomes:
+            outcome = self.changes.outcomes.popleft()
             desired, result, on = outcome.desired, outcome.result, outcome.desired.change == ON
-            under_way = self._property.desired
+            under_way = self.changes.desired
             if self._asked and not (under_way and under_way.equals(self._asked)):
                 self._asked = None
             if result.success:
@@ -273,10 +253,6 @@ class Switch:
 
     # Time
 
-    def poll(self, now: float) -> None:
-        """Do what is due."""
-        self._property.poll(now)
-
     def next_deadline(self) -> float:
-        """Return when :meth:`poll` or :meth:`update` has something to do."""
-        return min(self._property.next_deadline(), self._silence_due)
+        """Return when ``changes.poll`` or :meth:`update` has something to do."""
+        return min(self.changes.next_deadline(), self._silence_due)

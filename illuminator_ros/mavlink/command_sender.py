@@ -41,7 +41,7 @@ PROGRESS_TIMEOUT = 3.0
 # s between tries of a command that was temporarily rejected: the first, doubling up to the last.
 REJECTED_BACKOFF = (0.1, 0.8)
 # s after a stop of the process in which requests may have waited as long.
-LATE_TIME = 1.0
+OLD_REQUEST_TIME = 1.0
 # s between the tries of a command while the process ends, which has less than a second.
 CLOSING_TIMEOUT = 0.1
 # The most targets whose last round trip, or missing answer, is kept.
@@ -331,7 +331,7 @@ class CommandSender:
     def lateness(self, now: float) -> str:
         """Return why a request that comes now may be late, for people; '' if it is not."""
         seconds, at = self._stall
-        if now >= at + LATE_TIME:
+        if now >= at + OLD_REQUEST_TIME:
             return ''
         return (f'the request may be {format_seconds(seconds)} old, since this process was '
                 'stopped as long; repeat it')

@@ -191,6 +191,10 @@ class Property(Generic[S]):
         is_new = len(others) == len(self._under_way) < MAX_VALUES or not others
         return is_new and self.newest is not None and change.shown_by(self.newest) is False
 
+    def fence_until(self, fence: float) -> None:
+        """Count nothing before a time: other commands that may set the property are under way."""
+        self.fence = max(self.fence, fence)
+
     def cancel(self, message: str, now: float, *, superseded: bool = False) -> None:
         """Give up the desired value, and send its command no more."""
         if self.command is not None:
@@ -236,9 +240,9 @@ class Property(Generic[S]):
         self.command, self.desired, self._callers, self._next_callers = None, None, [], []
         is_settled = result.success or result.refused
         self._unconfirmed = None if is_settled else desired.change
-        # The acknowledgement of a superseded command may be that of an earlier command.
+        # A superseded command may have got the acknowledgement of an earlier command.
         if command.is_under_way or result.superseded:
-            self.fence = max(self.fence, command.last_sent + FENCE)
+            self.fence_until(command.last_sent + FENCE)
         if now < self.fence and len(self._under_way) < MAX_VALUES:
             self._under_way[_value(desired.change)] = self.fence
         if waiting and goes_on:
@@ -249,9 +253,18 @@ class Property(Generic[S]):
 
     # Known facts
 
+    @property
+    def is_busy(self) -> bool:
+        """Whether a command is under way."""
+        return self.command is not None
+
     def is_pending(self, change: Change[S]) -> bool:
         """Return whether a change is under way."""
         return self.desired is not None and self.desired.change == change
+
+    def expects(self, status: S) -> bool:
+        """Return whether a status shows the change that is under way."""
+        return self.desired is not None and self.desired.change.shown_by(status) is True
 
     def unconfirmed(self, now: float) -> Change[S] | None:
         """Return the change of the last command if it ended unconfirmed and may have an effect."""

@@ -280,7 +280,7 @@ def test_a_light_that_is_on_or_gets_an_on_may_be_left_on_without_an_off(
         ending.pair.ask_enable(ask)
     ending.begin(off=False)
 
-    assert ending.pair.light.may_stay_on(ending.pair.now) is may_be_left_on
+    assert ending.pair.light.may_be_on(ending.pair.now) is may_be_left_on
 
 
 @pytest.mark.parametrize(('results', 'sends_status', 'reason'), [
