@@ -87,8 +87,10 @@ def _time_link_and_services() -> None:
 
         def __init__(
             self, label: str, work: Any, finish: Any, faults: Any, clock: Any, selector: Any,
+            **options: Any,
         ) -> None:
-            super().__init__(label, work, finish, faults, clock, selector or _TimedSelector())
+            super().__init__(
+                label, work, finish, faults, clock, selector or _TimedSelector(), **options)
 
     class TimedLine(line.Line):
 
