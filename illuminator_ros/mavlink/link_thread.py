@@ -37,9 +37,9 @@ MAX_CALLS = 2
 ROOM_TIMEOUT = 0.25
 # s; the pause of a loop after an exception, and the shortest time between log lines.
 FAULT_PAUSE = 0.1
+FAULT_LOG_INTERVAL = 1.0
 # s by which a wait may be longer than intended before the process counts as stopped meanwhile.
 STALL_TIME = 2.0
-FAULT_LOG_INTERVAL = 1.0
 
 _log = logging.getLogger(__name__)
 
@@ -76,6 +76,64 @@ class FaultLog:
             _log.exception('internal error in the link')
 
 
+class Waker:
+    """Ends the wait of a thread from other threads."""
+
+    def __init__(self) -> None:
+        self._read, self._write = socket.socketpair()
+        self._read.setblocking(False)
+        self._write.setblocking(False)
+        self._poll = select.poll()
+        self._poll.register(self._read, select.POLLIN)
+
+    def fileno(self) -> int:
+        """Return the descriptor that is ready to be read after a call of :meth:`wake`."""
+        return self._read.fileno()
+
+    def wake(self) -> None:
+        """End the wait; callable from any thread."""
+        # A full buffer has woken the thread already; a closed one has no thread to wake.
+        with contextlib.suppress(OSError):
+            self._write.send(b'\0')
+
+    def wait(self, seconds: float) -> None:
+        """Wait to be woken."""
+        self._poll.poll(1000 * seconds)
+
+    def clear(self) -> None:
+        """Be ready for the next wait."""
+        with contextlib.suppress(BlockingIOError):
+            self._read.recv(4096)
+
+    def close(self) -> None:
+        """Free the descriptors."""
+        self._read.close()
+        self._write.close()
+
+
+class StallDetector:
+    """
+    Detects that the process was stopped (SIGSTOP, docker pause).
+
+    :param monotonic: s, the machine's own clock.
+    """
+
+    def __init__(self, monotonic: Callable[[], float]) -> None:
+        self._monotonic = monotonic
+        self._woken_at = monotonic()
+
+    def waited(self, seconds: float) -> float:
+        """
+        Note the end of a wait.
+
+        :param seconds: the longest time that it should have taken.
+        :return: s for which the process was stopped, 0 if it was not.
+        """
+        before, self._woken_at = self._woken_at, self._monotonic()
+        stall = self._woken_at - before - seconds
+        return stall if stall > STALL_TIME else 0.0
+
+
 class LinkThread:
     """
     Waits for descriptors, calls and deadlines, and handles each in this thread.
@@ -108,21 +166,16 @@ class LinkThread:
         self._clock = clock
         self._stalled = stalled
         self._due = 0.0
-        # When the last wait ended, s.
-        self._monotonic = monotonic
-        self._woken_at = monotonic()
+        self._detector = StallDetector(monotonic)
         # When the turn begins no more messages and calls, s.
         self._turn_ends = math.inf
         self._calls: deque[Callable[[float], None]] = deque()
         # Set while few calls wait.
         self._room = threading.Event()
         self._room.set()
-        self._wake_out, self._wake_in = socket.socketpair()
-        self._wake_out.setblocking(False)
-        self._wake_in.setblocking(False)
-        self.selector.register(self._wake_out, selectors.EVENT_READ, self._woken)
-        self._calls_only = select.poll()
-        self._calls_only.register(self._wake_out, select.POLLIN)
+        self._waker = Waker()
+        self.selector.register(
+            self._waker, selectors.EVENT_READ, lambda waker, events: waker.clear())
         self._stopping = threading.Event()
         self._starting = threading.Lock()
         self._thread = threading.Thread(target=self._run, name='mavlink-link', daemon=True)
@@ -152,7 +205,7 @@ class LinkThread:
             self._stopping.set()
             if self._thread.ident is None:
                 self._release()
-        self._wake()
+        self._waker.wake()
         if self._thread.is_alive() and threading.current_thread() is not self._thread:
             self._thread.join(timeout)
 
@@ -172,24 +225,19 @@ class LinkThread:
         if len(self._calls) >= MAX_CALLS:
             # The thread wakes after this, and sets it again.
             self._room.clear()
-        self._wake()
+        self._waker.wake()
 
     def call_first(self, function: Callable[[float], None]) -> None:
         """Have ``function(now)`` called in this thread, before the calls that wait."""
         self._calls.appendleft(function)
-        self._wake()
-
-    def _wake(self) -> None:
-        # A full buffer has woken the thread already; a closed one has no thread to wake.
-        with contextlib.suppress(OSError):
-            self._wake_in.send(b'\0')
+        self._waker.wake()
 
     # In this thread
 
     def pause(self, seconds: float) -> None:
         """Wait for calls only, if that takes 1 ms at least: poll() cannot wait for less."""
         if seconds >= 0.001 and not self._calls:
-            self._calls_only.poll(1000 * seconds)
+            self._waker.wait(seconds)
 
     def is_turn_over(self) -> bool:
         """Return whether this turn must begin no more messages and calls."""
@@ -202,19 +250,13 @@ class LinkThread:
         # A stop of the process (SIGSTOP, docker pause) interrupts the wait, which then finds
         # nothing. Frames that came meanwhile precede the deadlines that have passed.
         ready = self.selector.select(min(wait, MAX_WAIT)) or self.selector.select(0)
-        before, self._woken_at = self._woken_at, self._monotonic()
         self._turn_ends = self._clock() + TURN_TIME
-        stall = self._woken_at - before - min(max(wait, 0.0), MAX_WAIT)
-        if stall > STALL_TIME:
+        if stall := self._detector.waited(min(max(wait, 0.0), MAX_WAIT)):
             self._faults.call(self._stalled, stall)
         for key, events in ready:
             key.data(key.fileobj, events)
         self._run_calls()
         self._due = self._work()
-
-    def _woken(self, handle: object, events: int) -> None:
-        with contextlib.suppress(BlockingIOError):
-            self._wake_out.recv(4096)
 
     def _run_calls(self) -> None:
         for _ in range(len(self._calls)):
@@ -238,5 +280,4 @@ class LinkThread:
 
     def _release(self) -> None:
         self.selector.close()
-        self._wake_out.close()
-        self._wake_in.close()
+        self._waker.close()
