@@ -303,8 +303,8 @@ class Light:
             if not (result.superseded or self.is_held_by_other(source)):
                 self._emit(events.SetpointFailed(self.address, result.message))
 
-        if self._take_request(Caller(failed, now, source, is_stream=True),
-                          DesiredState(brightness=brightness), now):
+        caller = Caller(failed, now, source, is_stream=True)
+        if self._take_request(caller, DesiredState(brightness=brightness), now):
             self._configuration.set_brightness(brightness)
         self._update(now)
 
