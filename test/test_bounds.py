@@ -20,6 +20,7 @@ from collections import Counter
 from collections.abc import Callable, Iterator, Mapping
 import functools
 import itertools
+from types import SimpleNamespace
 from typing import Any, NamedTuple
 from unittest.mock import Mock
 
@@ -188,10 +189,15 @@ def simulator(message: Message) -> object:
 def ros_requests(limit: int) -> object:
     pytest.importorskip('rclpy')
     from illuminator_ros.ros.link_call import LinkCalls
-    calls = LinkCalls(Mock(), Mock(), limit)
+
+    class BusyLink(list[object]):
+        call = list.append
+
+    link: Any = BusyLink()
+    calls = LinkCalls(link, Mock(), limit)
     for _ in range(COUNT):
         calls.ask(lambda now, answer: None, Mock(), str)
-    return calls
+    return SimpleNamespace(link=list(link))
 
 
 def monitored() -> object:
@@ -293,7 +299,7 @@ ROWS = {
          'DeadlineQueue.deadlines': simulated.MAX_DELAYED},
         {**SENT, **dict.fromkeys(('DeadlineQueue.heap', 'DeadlineQueue.entered'),
                                  2 * simulated.MAX_DELAYED + SPARE)}),
-    'requests of ROS': Row(functools.partial(ros_requests, 64), {'LinkCalls.waiting': 64}),
+    'requests of ROS': Row(functools.partial(ros_requests, 64), {'SimpleNamespace.link': 64}),
     'devices of the monitor': Row(monitored, {'Graph.devices': 256}),
     'kinds of log lines': Row(log_lines, {'NodeLog.kinds': 256}),
 }

@@ -27,6 +27,7 @@ from illuminator_ros.ros.payload import Host
 from illuminator_ros.ros.payload_node import PayloadNode
 from illuminator_ros.ros.throttled_log import NodeLog
 import pytest
+from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 from support.ros import Ros
 from support.waiting import eventually
@@ -41,9 +42,9 @@ def first(own_ros: Ros) -> Iterator[PayloadNode]:
 
 @pytest.fixture
 def pool(first: PayloadNode) -> Iterator[NodeManager]:
-    pool = NodeManager(first, [], NodeLog(first.get_logger()), lambda: None)
+    executor = SingleThreadedExecutor(context=first.context)
+    pool = NodeManager(first, [], NodeLog(first.get_logger()), executor, lambda: None)
     yield pool
-    pool.end()
     for node in pool.nodes:
         node.destroy_node()
 
