@@ -36,7 +36,6 @@ from illuminator_ros.mavlink import frame_writer
 from illuminator_ros.mavlink.command_receiver import MAX_RESULTS
 from illuminator_ros.mavlink.command_sender import CommandSender, MAX_TARGETS
 from illuminator_ros.mavlink.component import Component, Endpoint
-from illuminator_ros.mavlink.deadline_queue import SPARE
 from illuminator_ros.mavlink.duplicate_filter import MAX_FRAMES
 from illuminator_ros.mavlink.forward_queue import ForwardQueue, MAX_QUEUED
 from illuminator_ros.mavlink.forwarded_commands import MAX_COMMANDS
@@ -245,10 +244,7 @@ LINK = {
     'Receiver.streams': MAX_DECODERS, 'Traffic.sources': MAX_SOURCES}
 SENT = {
     'LoopbackFilter.sent': frame_writer.MAX_FRAMES, 'CommandSender.round_trips': MAX_TARGETS,
-    'CommandSender.unanswering': MAX_TARGETS, 'CommandSender.pending': FOUND,
-    # Two requests to each, remembered for 5 s.
-    **dict.fromkeys(('DeadlineQueue.heap', 'DeadlineQueue.entered'), 2 * FOUND + SPARE),
-    'DeadlineQueue.deadlines': FOUND}
+    'CommandSender.unanswering': MAX_TARGETS, 'CommandSender.pending': FOUND}
 STAMPS = {'LoopbackFilter.stamps': frame_writer.MAX_STAMPS}
 LIGHTS = {'IlluminatorClient.lights': MAX_DEVICES}
 ROWS = {
@@ -296,9 +292,7 @@ ROWS = {
     'delayed answers of the simulator': Row(
         functools.partial(simulator, CommandLong(*LIGHT, 405, 0, 1, 0, 0, 0, 0, 0, 0)),
         {**LINK, 'SimulatedComponents.peers': simulated.MAX_PEERS,
-         'DeadlineQueue.deadlines': simulated.MAX_DELAYED},
-        {**SENT, **dict.fromkeys(('DeadlineQueue.heap', 'DeadlineQueue.entered'),
-                                 2 * simulated.MAX_DELAYED + SPARE)}),
+         'SimulatedComponent.delayed': simulated.MAX_DELAYED}, SENT),
     'requests of ROS': Row(functools.partial(ros_requests, 64), {'SimpleNamespace.link': 64}),
     'devices of the monitor': Row(monitored, {'Graph.devices': 256}),
     'kinds of log lines': Row(log_lines, {'NodeLog.kinds': 256}),

@@ -34,7 +34,6 @@ from .messages import (
 from .remote_managers import Repetition
 from ..mavlink.command_sender import Command, CommandSender
 from ..mavlink.component import Payload
-from ..mavlink.deadline_queue import DeadlineQueue
 from ..mavlink.dialect import mavlink
 from ..mavlink.messages import Address, Heartbeat, Message
 from ..payload.listeners import Listeners
@@ -87,7 +86,6 @@ class GimbalClient(Payload):
         self.settings = settings
         self._commands = commands
         self._components: dict[Address, _Component] = {}
-        self._queries: DeadlineQueue[Address] = DeadlineQueue()
         self._next_query = -math.inf
 
     def change_settings(self, settings: GimbalSettings, now: float) -> None:
@@ -129,7 +127,6 @@ class GimbalClient(Payload):
                 if component is not None and not any(
                         one.lacks_information_of(source) for one in self._gimbals.values()):
                     component.query.finish()
-                    self._queries.set(source, math.inf)
         elif (isinstance(message, GimbalDeviceInformation)
                 and (gimbal := self._sender(source, message.gimbal_device_id, now))):
             gimbal.take_device_information(message)
@@ -192,44 +189,39 @@ class GimbalClient(Payload):
         if component := self._components.get(source):
             if now >= component.heard_at + RETURN_AFTER:
                 component.query = Repetition()
-                self._queries.set(source, now)
             component.heard_at = now
-        elif self._component(source, now):
+        elif component := self._component(source, now):
             likely = (heartbeat.autopilot != mavlink.MAV_AUTOPILOT_INVALID
                       or heartbeat.type == mavlink.MAV_TYPE_GIMBAL)
-            self._queries.set(source, now if likely else now + UNLIKELY_DELAY)
+            component.query = Repetition(now if likely else now + UNLIKELY_DELAY)
 
     def _forget_component(self, now: float) -> bool:
         address, component = min(self._components.items(), key=lambda item: item[1].heard_at)
         if now < component.heard_at + FORGET_AFTER:
             return False
         del self._components[address]
-        self._queries.set(address, math.inf)
         return True
 
     def _reopen(self, manager: Address, now: float) -> None:
         """Request the information of a manager that has sent a status but no information."""
         component = self._component(manager, now)
-        if component is None:
-            return
-        if component.query.due == math.inf:
-            component.query = Repetition()
-        if component.query.due == -math.inf:
-            self._queries.set(manager, now)
+        if component is not None and component.query.due == math.inf:
+            component.query = Repetition(now)
 
     def _request_information(self, now: float) -> None:
-        due = self._queries.due(now)
-        if not due or now < self._next_query:
+        if now < self._query_due():
             return
-        address = due[0]
-        component = self._components[address]
+        address, component = min(self._components.items(), key=lambda item: item[1].query.due)
         component.query.take(now)
-        self._queries.set(address, component.query.due)
         self._next_query = now + REQUEST_SPACING
         if now < component.heard_at + FORGET_AFTER:
             message_id = float(GimbalManagerInformation.id)
             self._commands.start(
                 Command(address, mavlink.MAV_CMD_REQUEST_MESSAGE, (message_id,)), now)
+
+    def _query_due(self) -> float:
+        return max(self._next_query, min(
+            (one.query.due for one in self._components.values()), default=math.inf))
 
     # The end
 
@@ -261,7 +253,7 @@ class GimbalClient(Payload):
 
     def next_deadline(self) -> float:
         """See :meth:`Payload.next_deadline`."""
-        return min((max(self._next_query, self._queries.next_deadline()),
+        return min((self._query_due(),
                     *(min(gimbal.next_deadline(), _forgotten_at(gimbal))
                       for gimbal in self._gimbals.values())))
 
