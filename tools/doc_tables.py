@@ -36,6 +36,7 @@ from illuminator_ros.illuminator.checks.requirements import REQUIREMENTS
 from illuminator_ros.illuminator.simulated import COMMANDS as LIGHT_COMMANDS
 from illuminator_ros.illuminator.simulated import SIMULATED
 from illuminator_ros.illuminator.simulated_properties import FAULTS, PROFILES
+from illuminator_ros.mavlink.retries import POLICIES
 from illuminator_ros.payload.checks.requirement import Requirement
 from illuminator_ros.payload.faults import FaultTable
 from illuminator_ros.payload.simulated import SimulatedType
@@ -103,6 +104,9 @@ def tool_tables() -> Tables:
              f'{field.low:.10g} to {field.high:.10g}',
              '' if field.unknown is None else str(field.unknown)]
             for cls, fields in FIELDS.items() for name, field in fields.items()],
+        ('links', 'tried again'): [
+            [one.subject, f'{one.first:g}', f'{one.longest:g}', f'{one.tries or ""}']
+            for one in POLICIES],
         ('ros', 'argument of `bridge.launch.xml`'): launch_arguments('bridge.launch.xml'),
         ('simulator', 'command'): [
             *([f'`{one.usage}`', one.help] for one in LIGHT_COMMANDS),

@@ -31,11 +31,11 @@ from .messages import (
     rates_of,
     REMOVE_SENDER,
 )
-from .remote_managers import Repetition
 from ..mavlink.command_sender import Command, CommandSender
 from ..mavlink.component import Payload
 from ..mavlink.dialect import mavlink
 from ..mavlink.messages import Address, Heartbeat, Message
+from ..mavlink.retries import GIMBAL_MESSAGE, Retries
 from ..payload.listeners import Listeners
 from ..payload.messages import GimbalDeviceAttitudeStatus
 
@@ -56,7 +56,7 @@ UNLIKELY_DELAY = 1.0
 @dataclass
 class _Component:
     heard_at: float
-    query: Repetition = field(default_factory=Repetition)
+    query: Retries = field(default_factory=lambda: Retries(GIMBAL_MESSAGE))
     # Whether it has announced a gimbal with the id 0.
     lacks_id: bool = False
 
@@ -126,7 +126,7 @@ class GimbalClient(Payload):
                 component = self._components.get(source)
                 if component is not None and not any(
                         one.lacks_information_of(source) for one in self._gimbals.values()):
-                    component.query.finish()
+                    component.query.stop()
         elif (isinstance(message, GimbalDeviceInformation)
                 and (gimbal := self._sender(source, message.gimbal_device_id, now))):
             gimbal.take_device_information(message)
@@ -188,12 +188,13 @@ class GimbalClient(Payload):
     def _hear(self, source: Address, heartbeat: Heartbeat, now: float) -> None:
         if component := self._components.get(source):
             if now >= component.heard_at + RETURN_AFTER:
-                component.query = Repetition()
+                component.query = Retries(GIMBAL_MESSAGE)
             component.heard_at = now
         elif component := self._component(source, now):
             likely = (heartbeat.autopilot != mavlink.MAV_AUTOPILOT_INVALID
                       or heartbeat.type == mavlink.MAV_TYPE_GIMBAL)
-            component.query = Repetition(now if likely else now + UNLIKELY_DELAY)
+            component.query = Retries(
+                GIMBAL_MESSAGE, now if likely else now + UNLIKELY_DELAY)
 
     def _forget_component(self, now: float) -> bool:
         address, component = min(self._components.items(), key=lambda item: item[1].heard_at)
@@ -206,13 +207,13 @@ class GimbalClient(Payload):
         """Request the information of a manager that has sent a status but no information."""
         component = self._component(manager, now)
         if component is not None and component.query.due == math.inf:
-            component.query = Repetition(now)
+            component.query = Retries(GIMBAL_MESSAGE, now)
 
     def _request_information(self, now: float) -> None:
         if now < self._query_due():
             return
         address, component = min(self._components.items(), key=lambda item: item[1].query.due)
-        component.query.take(now)
+        component.query.note_try(now)
         self._next_query = now + REQUEST_SPACING
         if now < component.heard_at + FORGET_AFTER:
             message_id = float(GimbalManagerInformation.id)

@@ -30,7 +30,6 @@ from .remote_managers import (
     is_late,
     RemoteManager,
     RemoteManagers,
-    Repetition,
     silence,
     SILENCE_LIMIT,
     STOP_LIMIT,
@@ -40,6 +39,7 @@ from .yaw_lock import YawLock
 from ..mavlink.command_sender import CommandResult, CommandSender
 from ..mavlink.dialect import mavlink, short_names
 from ..mavlink.messages import Address
+from ..mavlink.retries import GIMBAL_MESSAGE, Retries
 from ..payload.arbitration import HolderChanged
 from ..payload.command_sources import Sources, SourceSettings
 from ..payload.confirmed_command import Done, Result
@@ -94,13 +94,14 @@ class _Device:
 
     def connected(self) -> None:
         """Request everything from now on: the device may have restarted."""
-        self._identity_query = Repetition()
-        self._interval_query = Repetition(-math.inf if self._interval else math.inf)
+        self._identity_query = Retries(GIMBAL_MESSAGE)
+        self._interval_query = Retries(
+            GIMBAL_MESSAGE, -math.inf if self._interval else math.inf)
 
     def take_information(self, message: gimbal.GimbalDeviceInformation) -> None:
         """Take its identity and its ranges."""
         self.identity, self.ranges = events.DeviceIdentity.of(message), known_ranges(message)
-        self._identity_query.finish()
+        self._identity_query.stop()
 
     def take_status(self, status: GimbalDeviceAttitudeStatus, now: float) -> bool:
         """Take its attitude and its flags; return whether the status counts: late ones do not."""
@@ -117,9 +118,9 @@ class _Device:
 
     def poll(self, manager: RemoteManager, now: float) -> None:
         """Request what it does not send by itself."""
-        if self._identity_query.take(now):
+        if self._identity_query.begin_try(now):
             manager.request(gimbal.GimbalDeviceInformation.id, now, to=self._address)
-        if self._interval_query.take(now):
+        if self._interval_query.begin_try(now):
             manager.send(
                 mavlink.MAV_CMD_SET_MESSAGE_INTERVAL,
                 (float(GimbalDeviceAttitudeStatus.id), self._interval * 1e6), now,
@@ -131,7 +132,7 @@ class _Device:
 
     def _interval_answered(self, result: CommandResult, now: float) -> None:
         if result.result is not None:
-            self._interval_query.finish()
+            self._interval_query.stop()
 
 
 class Gimbal:
@@ -631,7 +632,7 @@ class Gimbal:
             control.take_due = False
             if control.known.primary is None:
                 self._request_control(True, now, self._taken_automatically)
-        if manager.status_query.take(now):
+        if manager.status_query.begin_try(now):
             manager.request(gimbal.GimbalManagerStatus.id, now)
         self._device.poll(manager, now)
 

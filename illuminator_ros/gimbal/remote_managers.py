@@ -17,7 +17,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Collection, Iterator
-from dataclasses import dataclass
 import math
 from typing import Any
 
@@ -33,6 +32,7 @@ from ..mavlink.command_sender import (
 )
 from ..mavlink.dialect import mavlink
 from ..mavlink.messages import Address
+from ..mavlink.retries import GIMBAL_MESSAGE, Retries
 from ..payload.confirmed_command import Result, Target
 from ..payload.device_property import Caller, Desired, Outcome, Property
 from ..payload.messages import GimbalDeviceAttitudeStatus
@@ -50,26 +50,6 @@ STOP_LIMIT = 0.45
 LATE_LIMIT = 1000
 # The most managers of one gimbal; further ones are ignored.
 MAX_MANAGERS = 4
-
-
-@dataclass
-class Repetition:
-    """The times of the requests for a message, at growing intervals until it comes; s."""
-
-    due: float = -math.inf
-    _interval: float = 1.0
-
-    def take(self, now: float) -> bool:
-        """Return whether the message must be requested now."""
-        if now < self.due:
-            return False
-        self.due = now + self._interval
-        self._interval = min(2 * self._interval, 60.0)
-        return True
-
-    def finish(self) -> None:
-        """End the requests: the message has come."""
-        self.due = math.inf
 
 
 def is_late(time_boot_ms: int, newest: int) -> bool:
@@ -104,7 +84,7 @@ class RemoteManager:
         self.autopilot: int | None = None
         self.information: GimbalManagerInformation | None = None
         self.control: Control | None = None
-        self.status_query = Repetition()
+        self.status_query = Retries(GIMBAL_MESSAGE)
         self._status_time = 0
         self.release_due = -math.inf
         self._commands = commands
@@ -235,7 +215,7 @@ class RemoteManager:
             return False
         self._status_time = status.time_boot_ms
         self.status_at, self.control = now, Control.of(status)
-        self.status_query = Repetition(now + STATUS_REQUEST_DELAY)
+        self.status_query = Retries(GIMBAL_MESSAGE, now + STATUS_REQUEST_DELAY)
         return True
 
     def confirm_control(self, status: GimbalManagerStatus, now: float) -> None:

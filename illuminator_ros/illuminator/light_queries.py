@@ -30,15 +30,12 @@ from ..mavlink.command_sender import (
 )
 from ..mavlink.dialect import mavlink
 from ..mavlink.messages import ComponentInformationBasic
+from ..mavlink.retries import MESSAGE
 from ..payload.confirmed_command import Done, Result, Target
 from ..payload.identity import Identity
 
 # s without a status after which the light is asked for one, and between the requests.
 STATUS_TIMEOUT = 2.5
-# s from the acknowledgement of a request to the message.
-MESSAGE_TIMEOUT = 0.5
-# How often a message is requested if it is acknowledged and does not come: it may be lost.
-MAX_QUESTIONS = 3
 # s from the first request until the identity counts as unknown.
 SETTLING_TIME = 2.0
 STATUS, IDENTITY = IlluminatorStatus.msgname, ComponentInformationBasic.msgname
@@ -92,7 +89,7 @@ class MessageQuery:
             # A newer request has replaced it.
             return
         if self._questions and result.accepted:
-            self.message_until = now + MESSAGE_TIMEOUT
+            self.message_until = now + MESSAGE.first
         elif self._questions:
             self.finish(result.describe_failure(), now)
 
@@ -109,7 +106,7 @@ class MessageQuery:
         """Ask again for a message that does not come, or give up."""
         if now < self.message_until:
             return
-        if self._questions < MAX_QUESTIONS:
+        if self._questions < (MESSAGE.tries or 1):
             self._send(now)
         else:
             self.finish('acknowledged, but not sent', now)

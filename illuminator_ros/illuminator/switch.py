@@ -25,7 +25,8 @@ from .commands import SWITCHES
 from .model import Mode, Status
 from ..mavlink.command_sender import format_seconds
 from ..mavlink.dialect import mavlink
-from ..payload.confirmed_command import Done, REPEAT_INTERVAL, Result, Target
+from ..mavlink.retries import UNCONFIRMED
+from ..payload.confirmed_command import Done, Result, Target
 from ..payload.device_property import Caller, Desired, Outcome, Property
 
 ON, OFF = SWITCHES[True], SWITCHES[False]
@@ -242,7 +243,7 @@ class Switch:
                 self.enabled = on
                 self._required = None
                 self._is_finally_off = not on
-                self._off_due = now + REPEAT_INTERVAL if not on else -math.inf
+                self._off_due = now + UNCONFIRMED.first if not on else -math.inf
                 detail = next((one.detail for one in outcome.callers if one.detail), '')
                 self._tell(detail or desired.reason or events.A_REQUEST)
                 if self._report is not None and not on:

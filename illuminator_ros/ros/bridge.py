@@ -54,6 +54,7 @@ from ..mavlink.command_sender import CommandSender
 from ..mavlink.component import Component
 from ..mavlink.link import Link
 from ..mavlink.link_state import LinkEvent
+from ..mavlink.retries import RESOURCE
 from ..payload.payload_type import PayloadType
 
 # s; SIGINT and SIGTERM end the process within 1 s, including these limits and the exit of ROS.
@@ -64,8 +65,6 @@ SWITCH_INTERVAL = 0.0005
 # s between checks of the diagnostics, and from an event to the check that it causes.
 TICK = 1.0
 CHECK_INTERVAL = 0.02
-# s between attempts to start a thread while the system has none to spare.
-START_RETRY = 0.5
 # s between checks for another node of the same name, and for publishers that cannot be heard.
 GRAPH_INTERVAL = 5.0
 
@@ -219,7 +218,7 @@ class Bridge:
                 return
             except RuntimeError as error:
                 self.log.error(f'{error}: too many threads or processes; trying again', 'thread')
-                self._ended.wait(START_RETRY)
+                self._ended.wait(RESOURCE.first)
 
     def _shut_down_devices(self) -> None:
         reports: queue.SimpleQueue[tuple[NodeLog, Hashable, int | None, str]] = queue.SimpleQueue()

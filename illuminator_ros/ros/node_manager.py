@@ -29,9 +29,7 @@ from rclpy.node import Node
 from .parameters import ParameterError
 from .payload_node import PayloadNode
 from .throttled_log import NodeLog
-
-# s from a failed attempt to make a node to the next one.
-RETRY_DELAY = 2.0
+from ..mavlink.retries import RESOURCE
 
 
 @dataclass(eq=False)
@@ -117,8 +115,8 @@ class NodeManager:
             except Exception as error:
                 # Threads, descriptors or memory may be short temporarily.
                 self._log.error(f'{request.device} gets no node yet: {error}; trying again in '
-                                f'{RETRY_DELAY:g} s', f'node of {request.device}')
-                request.due = time.monotonic() + RETRY_DELAY
+                                f'{RESOURCE.first:g} s', f'node of {request.device}')
+                request.due = time.monotonic() + RESOURCE.first
         for request in self._requests:
             if request.log is not None:
                 request.log.flush()

@@ -26,10 +26,10 @@ from illuminator_ros.illuminator.messages import STATUS_ID
 from illuminator_ros.illuminator.simulated_properties import IlluminatorProperties
 from illuminator_ros.mavlink import messages as mav
 from illuminator_ros.mavlink.dialect import mavlink
+from illuminator_ros.mavlink.retries import UNCONFIRMED
 from illuminator_ros.payload.confirmed_command import (
     FENCE,
     PROGRESS_LIMIT,
-    REPEAT_INTERVAL,
     Result,
 )
 from illuminator_ros.payload.device_property import MAX_CALLERS
@@ -202,7 +202,7 @@ def test_an_off_that_replaces_an_on_is_sent_at_once_and_confirmed_after_the_fenc
     assert faked.wait_for(off).success
     assert FENCE <= off.seconds < FENCE + 0.01
     # The tries within the fence are repeated each 250 ms.
-    tries = round(FENCE / REPEAT_INTERVAL) + 1
+    tries = round(FENCE / UNCONFIRMED.first) + 1
     assert (timing(off.result.message)[0], len(faked.commands(ON_OFF))) == (tries, 1 + tries)
 
 

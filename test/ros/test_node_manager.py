@@ -18,6 +18,7 @@ from collections.abc import Callable, Iterator
 from types import SimpleNamespace
 from typing import cast
 
+from illuminator_ros.mavlink.retries import RESOURCE
 from illuminator_ros.ros import node_manager, throttled_log
 from illuminator_ros.ros.device_nodes import DeviceNodes
 from illuminator_ros.ros.diagnostics_publisher import DiagnosticsSource
@@ -91,7 +92,7 @@ def test_device_that_goes_before_its_node_is_made_gets_none(pool: NodeManager) -
 def test_device_whose_node_has_a_wrong_parameter_gets_none_and_one_line(
     pool: NodeManager, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str],
 ) -> None:
-    monkeypatch.setattr(node_manager, 'RETRY_DELAY', 0.0)
+    monkeypatch.setattr(node_manager, 'RESOURCE', RESOURCE._replace(first=0.0))
 
     def serve(node: Node, log: NodeLog) -> None:
         raise ParameterError('brightness: wrong')
