@@ -76,7 +76,10 @@ def change(fake: FakeLight, **attributes: Any) -> None:
     (True, {'fields': {'error_status': 4}}, True,
      'on, confirmed by ILLUMINATOR_STATUS: MAV_RESULT_ACCEPTED'),
     (False, {'fields': {'error_status': 2, 'enable': 1}}, True,
-     'off, confirmed by ILLUMINATOR_STATUS: MAV_RESULT_ACCEPTED'),
+     'off, accepted (ILLUMINATOR_STATUS shows off, over temperature shutdown): '
+     'MAV_RESULT_ACCEPTED'),
+    (False, {'fields': {'error_status': 2}, 'results': {ON_OFF: DENIED}}, False,
+     'refused: MAV_RESULT_DENIED'),
     (True, {'applies': False, 'fields': {'error_status': 2}}, False,
      'on not confirmed: MAV_RESULT_ACCEPTED, but ILLUMINATOR_STATUS shows off, over temperature '
      'shutdown'),
