@@ -21,7 +21,12 @@ import math
 import re
 
 from illuminator_ros.gimbal.commands import Control
-from illuminator_ros.gimbal.events import AutomaticTakeFailed, ControlChanged, GimbalKey
+from illuminator_ros.gimbal.events import (
+    AutomaticTakeFailed,
+    ControlChanged,
+    GimbalKey,
+    GimbalLost,
+)
 from illuminator_ros.gimbal.gimbal import Gimbal
 from illuminator_ros.gimbal.messages import (
     DEVICE_ID_PARAM,
@@ -291,11 +296,13 @@ def test_gm_14_status_is_out_of_date_for_a_call_that_comes_before_the_poll(ask: 
     assert not rig.gimbal.in_control
 
 
-def test_control_is_known_of_a_manager_that_sends_its_status_on_request_only() -> None:
-    rig = Rig(FakeManager(primary=OURS, streams=False)).run(60.0)
+@pytest.mark.parametrize('beat', [10, 50], ids=['', 'and a heartbeat each 5 s'])
+def test_control_is_known_of_a_manager_that_sends_its_status_on_request_only(beat: int) -> None:
+    rig = Rig(FakeManager(primary=OURS, streams=False, beat=beat)).run(60.0)
 
     assert [event.ours for event in rig.all_of(ControlChanged)] == [True]
-    assert status_requests(rig) <= 21
+    assert rig.all_of(GimbalLost) == []
+    assert status_requests(rig) <= 25
     rig.managers[0].primary = OTHER
     rig.run(3.2)
     assert rig.all_of(ControlChanged)[-1].was_lost
