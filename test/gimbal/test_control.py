@@ -108,6 +108,10 @@ def test_time_of_control_is_that_of_its_last_change() -> None:
      '1/195 has control and must release it first'),
     ({'results': {CONFIGURE: mavlink.MAV_RESULT_TEMPORARILY_REJECTED}},
      '; 1/195 has control: the log of the manager may have the reason'),
+    # ArduPilot before 4.5 has neither the command nor the status.
+    ({'results': {CONFIGURE: mavlink.MAV_RESULT_UNSUPPORTED}, 'reports': False},
+     'manager 1/1 refused "take control": MAV_RESULT_UNSUPPORTED (1 try, 20 ms); manager 1/1 has '
+     'sent no GIMBAL_MANAGER_STATUS'),
     ({'applies': False}, 'but GIMBAL_MANAGER_STATUS shows primary 1/195, secondary none'),
     ({'reports': False}, 'control taken not confirmed: MAV_RESULT_ACCEPTED, but no '
      'GIMBAL_MANAGER_STATUS came within 1.0'),
