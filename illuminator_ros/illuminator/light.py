@@ -111,6 +111,10 @@ class Light:
             self._emit(events.LightConnected(self.address))
             self._update(now)
 
+    def announce(self, now: float) -> None:
+        """Note that it has proved to be a light."""
+        self._queries.announce(now, is_heard=self.connected)
+
     def take_status(self, status: Status, now: float) -> None:
         """Take an ILLUMINATOR_STATUS, unless it is older than the one before."""
         self.heard(now)
