@@ -162,6 +162,10 @@ def test_requests_to_a_lost_light_fail_at_once_with_the_reason(
         (0.0, f'light 1/243 is lost: {reason}')}
     assert faked.recorder.failed_setpoints == [f'light 1/243 is lost: {reason}']
     assert len(faked.commands()) == sent
+    # It may hear an OFF though it is not heard.
+    answer = faked.ask_enable(False)
+    assert answer.result.message == f'light 1/243 is lost: {reason}'
+    assert [one.param1 for one in faked.commands()[sent:]] == [0.0] * (not is_closed)
 
 
 def test_after_a_stop_of_the_process_a_request_that_may_be_old_is_refused_but_not_an_off(
