@@ -390,13 +390,15 @@ class Gimbal:
         self, result: Result, manager: RemoteManager, wish: str, now: float,
     ) -> Result:
         """Add the manager, the wish and the control to a refusal."""
-        primary = self._control.known and self._control.known.primary
+        known = self._control.known
+        primary = known and known.primary
         if primary and not self.in_control and result.permanent:
             advice = f'{primary} has control and must release it first'
         else:
             who = 'this node' if self.in_control else primary or 'no component'
             advice = self.unreachable(now) or (
-                f'{who} has control: the log of the manager may have the reason')
+                f'{who} has control: the log of the manager may have the reason'
+                if known is not None else manager.lack_of_status(now))
         reason = result.message.removeprefix('refused: ')
         return result._replace(
             message=f'manager {manager.address} refused "{wish}": {reason}; {advice}')

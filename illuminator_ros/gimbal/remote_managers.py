@@ -41,8 +41,9 @@ from ..payload.mount_attitude import yaw_frame, YawFrame
 # s of silence after which a manager or a device is lost.
 SILENCE_LIMIT = 3.0
 # s since the last GIMBAL_MANAGER_STATUS after which it is requested (ArduPilot does not stream it,
-# PX4 does every 2 s), and after which control is unknown.
-STATUS_REQUEST_DELAY, STATUS_LIMIT = 3.0, 6.0
+# PX4 does every 2 s), before a manager with a heartbeat each 5 s is lost; and after which control
+# is unknown.
+STATUS_REQUEST_DELAY, STATUS_LIMIT = 2.5, 6.0
 # s for which a release of control waits until the attitude shows that the gimbal stands.
 STOP_LIMIT = 0.45
 # ms by which a status may be older than the one before it; with a longer step back, its sender has

@@ -104,6 +104,7 @@ class IlluminatorClient(Payload):
         self.events.emit(LightFound(light.address))
         for event in light.snapshot(now).events():
             self.events.emit(event)
+        light.announce(now)
         self._switch_off_finally(light, now)
 
     def _forgotten(self, light: Light) -> None:

@@ -28,12 +28,12 @@ from .messages import STATUS_ID
 from .model import Changes, SafetyLimits, Status, StrobeRange
 from .status_order import ChangingStates, Order, StatusOrder
 from .switch import OFF, ON, Silence, Switch
-from ..mavlink.command_sender import CommandSender, format_seconds
+from ..mavlink.command_sender import Command, CommandSender, format_seconds
 from ..mavlink.dialect import mavlink
 from ..mavlink.messages import Address
 from ..payload.arbitration import Cause, HolderChanged
 from ..payload.command_sources import DEFAULT, SourceSettings
-from ..payload.confirmed_command import Done, Result, Target
+from ..payload.confirmed_command import Done, FENCE, Result, Target
 from ..payload.device_property import answer, Caller, Outcome
 from ..payload.identity import Identity
 
@@ -110,6 +110,10 @@ class Light:
             self._queries.begin(now)
             self._emit(events.LightConnected(self.address))
             self._update(now)
+
+    def announce(self, now: float) -> None:
+        """Note that it has proved to be a light."""
+        self._queries.announce(now, is_heard=self.connected)
 
     def take_status(self, status: Status, now: float) -> None:
         """Take an ILLUMINATOR_STATUS, unless it is older than the one before."""
@@ -349,7 +353,10 @@ class Light:
             elif not refusal and desired.enabled is False:
                 # An OFF ends the ON that is remembered, though it may fail.
                 sources.forget_switch(source)
-            refusal = refusal or self.unreachable(now)
+            if not refusal and (refusal := self.unreachable(now)) and desired.enabled is False:
+                self._send_unheard_off()
+                # Its answer does not explain a later ON.
+                self._switch.changes.fence_until(now + FENCE)
         if refusal:
             caller.done(Result(False, refusal, superseded=bool(closed)), now)
         elif not caller.is_stream:
@@ -359,6 +366,11 @@ class Light:
                 self._switch.silence.called_at = now
             sources.begin_call(source)
         return not refusal
+
+    def _send_unheard_off(self) -> None:
+        """Send an OFF once to a light that is lost: it may hear though it is not heard."""
+        if not self._link_failure:
+            self._commands.send_once(Command(self.address, OFF.command, OFF.params))
 
     def _take_stream(self, source: str, desired: DesiredState, now: float) -> None:
         """Take a request of a stream, which counts at once."""
@@ -497,6 +509,7 @@ class Light:
         """
         self._switch.switch_off_finally(now, report)
         if not self.connected:
+            self._send_unheard_off()
             report(Result(False, self.unreachable(now), permanent=True), now)
         self._update(now)
 

@@ -130,23 +130,39 @@ class LightQueries:
         # within the heartbeat timeout.
         self._longest_silence = min(STATUS_TIMEOUT, heartbeat_timeout / 1.2)
         self._status_request = request_message(target.address, STATUS_ID)
+        self._is_announced = False
         self._asked_at = -math.inf
         self._due = math.inf
         self._status = MessageQuery(target, STATUS_ID)
         self._identity = MessageQuery(target, ComponentInformationBasic.id)
 
     def begin(self, now: float) -> None:
-        """Request interval, status and identity: the light is heard, or has restarted."""
-        if self._interval > 0:
-            self._target.commands.start(Command(
-                self._target.address, mavlink.MAV_CMD_SET_MESSAGE_INTERVAL,
-                (float(STATUS_ID), self._interval * 1e6)), now)
+        """
+        Request the status: the light is heard, or has restarted.
+
+        One that is announced is also asked for interval and identity: the address of a candidate
+        may be forged, and costs few commands.
+        """
+        if self._is_announced:
+            self._request_interval_and_identity(now)
         self._due = now + STATUS_TIMEOUT
         # A request that was sent to the silent light would be resent only later.
         if self._status.is_asking:
             self._status.ask_again(now)
         else:
             self._target.commands.start(self._status_request, now)
+
+    def announce(self, now: float, *, is_heard: bool) -> None:
+        """Note that the light has proved that it is one."""
+        self._is_announced = True
+        if is_heard:
+            self._request_interval_and_identity(now)
+
+    def _request_interval_and_identity(self, now: float) -> None:
+        if self._interval > 0:
+            self._target.commands.start(Command(
+                self._target.address, mavlink.MAV_CMD_SET_MESSAGE_INTERVAL,
+                (float(STATUS_ID), self._interval * 1e6)), now)
         self._identity.ask(now)
 
     def request_status(self, now: float) -> None:

@@ -21,6 +21,7 @@ from collections.abc import Callable, Iterable
 import contextlib
 import logging
 import math
+import random
 import select
 import selectors
 import socket
@@ -337,8 +338,13 @@ class LinkThread:
         self._turn_ends = self._clock() + TURN_TIME
         if stall := self._detector.waited(min(max(wait, 0.0), MAX_WAIT)):
             self._faults.call(self._stalled, stall)
-        for key, events in ready:
+        # A selector returns them in the same order each time: by chance each is the first one, so
+        # that none of them waits for ever for others that are always ready.
+        first = random.randrange(len(ready)) if len(ready) > 1 else 0
+        for key, events in ready[first:] + ready[:first]:
             key.data(key.fileobj, events)
+            if self.is_turn_over():
+                break
         self._calls.run(self._call)
         self._due = self._work()
 

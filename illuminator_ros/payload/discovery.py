@@ -32,7 +32,7 @@ from ..mavlink.messages import Address
 # Devices of one kind; one more is ignored, so that memory is bounded.
 MAX_DEVICES = 128
 # Candidates; one more replaces the oldest, if that has had CANDIDATE_TIME, s, to answer.
-MAX_CANDIDATES = 32
+MAX_CANDIDATES = 8
 CANDIDATE_TIME = 1.0
 # Ignored devices that are remembered, to name them where the target is missing.
 MAX_IGNORED = 8

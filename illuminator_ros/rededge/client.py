@@ -39,6 +39,8 @@ UNANSWERED_PINGS = 3
 # So many heartbeats in CONFLICT_WINDOW s show several components: each sends one a second.
 CONFLICT_HEARTBEATS = 10
 CONFLICT_WINDOW = 7.0
+# The last reports of images that are remembered, since a second path brings them again.
+RECENT_REPORTS = 8
 
 
 @dataclass(frozen=True)
@@ -132,6 +134,7 @@ class RedEdgeClient(Payload):
         self._connected = False
         self._heard_at = -math.inf
         self._heartbeats: deque[float] = deque(maxlen=CONFLICT_HEARTBEATS)
+        self._reports: deque[rededge.CameraFeedback] = deque(maxlen=RECENT_REPORTS)
 
     @property
     def target(self) -> Address:
@@ -181,6 +184,7 @@ class RedEdgeClient(Payload):
             self._connected = False
             self._heartbeats.clear()
             self._captures.forget_count()
+            self._reports.clear()
             self.events.emit(CameraLost(self.target, reason))
 
     def _loss(self, now: float) -> str:
@@ -216,7 +220,8 @@ class RedEdgeClient(Payload):
             self._pings.take(message, now)
         elif isinstance(message, rededge.CameraStatus):
             self._captures.take_status(message, now)
-        elif isinstance(message, rededge.CameraFeedback):
+        elif isinstance(message, rededge.CameraFeedback) and message not in self._reports:
+            self._reports.append(message)
             note = ("; several components have the camera's id, so another may have taken it"
                     if self._is_conflict(now) else '')
             self.events.emit(ImageTaken(message))

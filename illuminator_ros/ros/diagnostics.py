@@ -303,6 +303,10 @@ def why_nothing_is_heard(link: LinkDiagnostics, device: str) -> str:
     if signing.unsigned and not frames:
         return (f'{signing.unsigned} frames refused because they are not signed: sign them at the '
                 'other side, or set signing_mode to sign')
+    unset = [str(one) for one in link.state.traffic.sources if not one.system]
+    if unset:
+        return (f'{", ".join(unset[:5])} heard, whose system id 0 cannot be addressed: set its '
+                'system id, such as 1')
     if frames:
         return (f'{frames} frames received, none from {device}: check that it is '
                 'on, and that routers forward its frames')

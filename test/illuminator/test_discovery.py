@@ -88,6 +88,17 @@ def test_forged_heartbeats_do_not_keep_a_real_light_out() -> None:
     assert pair.enable(True).success
 
 
+def test_forged_heartbeats_get_25_commands_a_second_at_most_and_hide_no_light() -> None:
+    pair = Pair(FakeLight(stream=0.0))
+    for source in FORGED[:320]:
+        pair.controller.receive(source, ILLUMINATOR, pair.now)
+        pair.run(1 / 32)
+    pair.run(1.0)
+    commands = pair.commands(mavlink.MAV_CMD_REQUEST_MESSAGE)
+    assert len(commands) <= 25 * 11
+    assert list(pair.controller.lights) == [LIGHT]
+
+
 def test_candidates_are_bounded_cost_few_commands_and_give_way_to_a_status(client: Heard) -> None:
     for source in FORGED:
         client.receive(source, ILLUMINATOR, 0.0)

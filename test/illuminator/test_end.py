@@ -269,6 +269,19 @@ def test_a_light_that_is_found_or_heard_again_during_the_end_is_switched_off() -
     assert all(ending.reports[one.address].success for one in (found, heard))
 
 
+def test_a_light_that_hears_but_is_not_heard_is_switched_off_and_reported_as_lost(
+    ending: Ending, light: FakeLight,
+) -> None:
+    wire = ending.pair.far.wire
+    wire.faults = replace(wire.faults, drop=1.0)
+    ending.pair.run(4.0)
+    ending.begin()
+    ending.pair.run(LIMIT)
+
+    assert light.fields['enable'] == 0
+    assert not ending.reports[light.source].success
+
+
 @pytest.mark.parametrize(('enabled', 'ask', 'may_be_left_on'), [
     (1, None, True), (0, None, False), (0, True, True), (0, False, False)])
 def test_a_light_that_is_on_or_gets_an_on_may_be_left_on_without_an_off(

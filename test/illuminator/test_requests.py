@@ -76,7 +76,10 @@ def change(fake: FakeLight, **attributes: Any) -> None:
     (True, {'fields': {'error_status': 4}}, True,
      'on, confirmed by ILLUMINATOR_STATUS: MAV_RESULT_ACCEPTED'),
     (False, {'fields': {'error_status': 2, 'enable': 1}}, True,
-     'off, confirmed by ILLUMINATOR_STATUS: MAV_RESULT_ACCEPTED'),
+     'off, accepted (ILLUMINATOR_STATUS shows off, over temperature shutdown): '
+     'MAV_RESULT_ACCEPTED'),
+    (False, {'fields': {'error_status': 2}, 'results': {ON_OFF: DENIED}}, False,
+     'refused: MAV_RESULT_DENIED'),
     (True, {'applies': False, 'fields': {'error_status': 2}}, False,
      'on not confirmed: MAV_RESULT_ACCEPTED, but ILLUMINATOR_STATUS shows off, over temperature '
      'shutdown'),
@@ -159,6 +162,10 @@ def test_requests_to_a_lost_light_fail_at_once_with_the_reason(
         (0.0, f'light 1/243 is lost: {reason}')}
     assert faked.recorder.failed_setpoints == [f'light 1/243 is lost: {reason}']
     assert len(faked.commands()) == sent
+    # It may hear an OFF though it is not heard.
+    answer = faked.ask_enable(False)
+    assert answer.result.message == f'light 1/243 is lost: {reason}'
+    assert [one.param1 for one in faked.commands()[sent:]] == [0.0] * (not is_closed)
 
 
 def test_after_a_stop_of_the_process_a_request_that_may_be_old_is_refused_but_not_an_off(

@@ -325,6 +325,17 @@ def test_an_image_that_was_not_requested_here_is_reported() -> None:
     assert (rig.state.images, rig.state.image_index) == (1, 3)
 
 
+def test_a_report_that_comes_again_over_a_second_path_is_one_image() -> None:
+    rig = Rig()
+    for index in (1, 2):
+        rig.capture()
+        rig.hear(*image(index), *image(index))
+    rig.hear(*image(1))
+    assert [one.feedback for one in rig.events[1:]] == [feedback(1), feedback(2)]
+    assert rig.state.images == 2
+    assert rig.results == [(True, taken(1)), (True, taken(2))]
+
+
 @pytest.mark.parametrize('triggered', [[], [status(1)], [status(1), status(1)]],
                          ids=['no status', 'status', 'status twice'])
 @pytest.mark.parametrize('end', ['link', 'heartbeat', 'both'])

@@ -204,6 +204,7 @@ def test_another_sender_with_our_address_is_an_error_and_the_reason_for_a_missin
 
 
 FOREIGN = frame_of(heartbeat(2), 0, AUTOPILOT)
+UNADDRESSABLE = frame_of(heartbeat(mavlink.MAV_TYPE_ILLUMINATOR), 0, Address(0, 243))
 
 
 @pytest.mark.parametrize(('mode', 'received', 'reason'), [
@@ -213,6 +214,8 @@ FOREIGN = frame_of(heartbeat(2), 0, AUTOPILOT)
      '111 bytes received, no valid frame; check the baud rate'),
     (SigningMode.OFF, [FOREIGN], '1 frames received, none from an illuminator: check that it is '
      'on, and that routers forward its frames'),
+    (SigningMode.OFF, [FOREIGN, UNADDRESSABLE], '0/243 heard, whose system id 0 cannot be '
+     'addressed: set its system id, such as 1'),
     (SigningMode.REQUIRE, [FOREIGN], '1 frames refused because they are not signed: sign '
      'them at the other side, or set signing_mode to sign'),
     (SigningMode.REQUIRE, [signed_frame(1, key=WRONG_KEY)],
