@@ -71,8 +71,8 @@ def test_modules_and_files_that_ros_looks_for_are_installed(prefix: Path) -> Non
     [site] = (prefix / 'lib').glob('python*/site-packages')
     share = prefix / 'share' / 'illuminator_ros'
     modules = {path.relative_to(ROOT) for path in (ROOT / 'illuminator_ros').rglob('*.py')}
-    files = {path.relative_to(ROOT) for folder in ('config', 'launch')
-             for path in (ROOT / folder).rglob('*') if path.is_file()}
+    files = {path.relative_to(ROOT) for folder in ('config', 'examples', 'launch')
+             for path in (ROOT / folder).rglob('*.*') if path.suffix != '.pyc'}
 
     assert {path.relative_to(site) for path in site.glob('illuminator_ros/**/*.py')} == modules
     assert (site / 'illuminator_ros' / 'py.typed').is_file()
