@@ -46,7 +46,7 @@ class Input(Enum):
     TIME_REFERENCE = 'time_reference'
 
 
-# The inputs with a velocity; the first one that is fresh is used.
+# The inputs with a velocity, the preferred ones first.
 VELOCITIES = (Input.VELOCITY, Input.VELOCITY_WITH_COVARIANCE, Input.ODOMETRY)
 # Inputs that are used with later messages of others, so that their ages count from their stamps.
 USED_LATER = (*VELOCITIES, Input.TIME_REFERENCE)
