@@ -41,7 +41,7 @@ setup(
         ('share/ament_index/resource_index/packages', [f'resource/{package_name}']),
         (f'share/{package_name}', ['package.xml']),
         *((f'share/{package_name}/{folder}', files(folder))
-          for folder in ('config', 'config/sros2', 'launch')),
+          for folder in ('config', 'config/sros2', 'examples', 'launch')),
     ],
     python_requires='>=3.10',
     zip_safe=True,
