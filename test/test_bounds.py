@@ -244,14 +244,16 @@ SENT = {
     **dict.fromkeys(('DeadlineQueue.heap', 'DeadlineQueue.entered'), 2 * FOUND + SPARE),
     'DeadlineQueue.deadlines': FOUND}
 STAMPS = {'LoopbackFilter.stamps': frame_writer.MAX_STAMPS}
+HEARTBEATS = {'Client.heartbeats': MAX_SOURCES}
+OTHERS = {'Component.heartbeats': MAX_SOURCES}
 LIGHTS = {'IlluminatorClient.lights': MAX_DEVICES}
 ROWS = {
     'heartbeats of lights': Row(
         functools.partial(bridge, heartbeat(44), pause=0.1),
         {'Discovery.candidates': MAX_CANDIDATES, 'Discovery.found_at': MAX_CANDIDATES},
-        {**LINK, **SENT}),
+        {**LINK, **SENT, **HEARTBEATS}),
     'heartbeats of other components': Row(
-        functools.partial(bridge, heartbeat(2)), LINK, SENT),
+        functools.partial(bridge, heartbeat(2)), {**LINK, **HEARTBEATS}, SENT),
     'statuses': Row(functools.partial(bridge, status_message(100)), {**LINK, **LIGHTS}, SENT),
     'lights that are not the target': Row(
         functools.partial(bridge, status_message(100), wanted=lambda one: False),
@@ -274,14 +276,15 @@ ROWS = {
         waiting_frames, {'ForwardQueue.held[]': MAX_QUEUED // len(frame_of(heartbeat(6)))}),
     'commands of players': Row(
         functools.partial(players, COMMAND), {'CommandReceiver.executed': MAX_RESULTS}),
-    'heartbeats of players': Row(functools.partial(players, heartbeat(6)), {}),
+    'heartbeats of players': Row(functools.partial(players, heartbeat(6)), OTHERS),
     'gimbal devices': Row(
         functools.partial(players, ATTITUDE), {'StateTracker.other_devices': MAX_OTHER_DEVICES}),
     'mounts': Row(
         functools.partial(mounts, ATTITUDE), {'MountOrientations.mounts': MAX_MOUNTS}),
     'vehicles with mounts': Row(
         functools.partial(mounts, Attitude(*[0] * 7)), {'MountOrientations.vehicles': MAX_MOUNTS}),
-    'heartbeats of cameras': Row(functools.partial(camera, heartbeat(30)), LINK, SENT),
+    'heartbeats of cameras': Row(
+        functools.partial(camera, heartbeat(30)), {**LINK, **OTHERS}, SENT),
     'feedback of cameras': Row(
         functools.partial(camera, FEEDBACK), LINK, SENT),
     'peers of the simulator': Row(
