@@ -54,7 +54,7 @@ NOT_SERVED = ('none of these is a light, a gimbal or a MicaSense camera; an auto
 
 
 @dataclass
-class Component:
+class Heard:
     """The frames of one address."""
 
     frames: int = 0
@@ -72,7 +72,7 @@ class Port:
 
     :param url: of a serial port with the first rate.
     :param label: its name for people, which is the URL where it is not a serial port.
-    :param share: how long to listen at each rate, s, where each has the same time.
+    :param duration: how long it listens, s; each rate has an equal share.
     :param trouble: why nothing is heard: it is not opened unless this is ''.
     """
 
@@ -83,13 +83,14 @@ class Port:
         self.url = url
         self.label = label
         self.trouble = trouble
-        self.components: dict[Address, Component] = {}
+        self.components: dict[Address, Heard] = {}
         self._rates = [*dict.fromkeys((url.baud, *RATES))] if isinstance(url, SerialUrl) else [0]
         self._share = duration / len(self._rates)
         self._clock = clock
         # When the listening at the present rate began, s.
         self._since = clock()
-        self._hosts: set[str] = set()
+        # Whether each frame came from this machine.
+        self._is_loopback = True
         self._channel: Channel | None = None
         signing = Signing()
         self._receiver = Receiver(signing, CRC_EXTRA, FrameWriter(signing), time.time, {})
@@ -111,7 +112,7 @@ class Port:
             self._channel = opener(self.url)
         except OSError as error:
             self.trouble = error.strerror or str(error)
-            if 'in use' in self.trouble:
+            if 'in use' in self.trouble and isinstance(self.url, SerialUrl | UdpUrl):
                 self.trouble = IN_USE.format(users_of(self.url) or OTHER_USER)
         else:
             self._selector = selector
@@ -146,7 +147,7 @@ class Port:
         try:
             for peer, data in self._channel.receive(handle):
                 if frames := self._receiver.take(peer, data, self._clock()):
-                    self._hosts.add(peer[0] if isinstance(peer, tuple) else '')
+                    self._is_loopback &= isinstance(peer, tuple) and peer[0].startswith('127.')
                     self._take(frames)
         except OSError as error:
             self.close(f'lost: {error.strerror or error}')
@@ -155,7 +156,7 @@ class Port:
         for frame, _ in frames:
             if frame.source not in self.components and len(self.components) >= MAX_SOURCES:
                 continue
-            one = self.components.setdefault(frame.source, Component())
+            one = self.components.setdefault(frame.source, Heard())
             one.frames += 1
             one.signed |= frame.signature is not None
             one.versions.add(frame.version)
@@ -203,7 +204,7 @@ class Port:
         if isinstance(self.url, SerialUrl):
             scheme = 'serial-hwfc' if self.url.hardware_flow_control else 'serial'
             return f'{scheme}://{self.url.device}:{self.rate}'
-        if all(host.startswith('127.') for host in self._hosts):
+        if self._is_loopback:
             # As the default URL of the bridge, it hears this machine only.
             return self.label.replace('udpin://0.0.0.0:', 'udpin://127.0.0.1:')
         return self.label
