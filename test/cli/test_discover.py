@@ -29,7 +29,7 @@ from typing import Any
 
 from illuminator_ros.cli.discover.port import Port, RATES
 from illuminator_ros.cli.discover.ports import serial_ports
-from illuminator_ros.cli.discover.run import CONSOLE, lines, ports_of, UDP_PORTS
+from illuminator_ros.cli.discover.run import CONSOLE, lines, parse, ports_of, UDP_PORTS
 from illuminator_ros.gimbal.messages import GimbalManagerStatus
 from illuminator_ros.illuminator.messages import IlluminatorStatus
 from illuminator_ros.mavlink.dialect import decode, mavlink
@@ -399,6 +399,15 @@ def test_a_given_url_replaces_the_same_port_and_a_console_is_opened_only_if_it_i
         f'{tmp_path}/ttyUSB0,9600': (9600, ''), '/dev/ttyAMA0': (57600, CONSOLE),
         'udpin://127.0.0.1:14550': (0, ''), 'tcp://router:5760': (0, ''),
         **{f'udpin://0.0.0.0:{number}': (0, '') for number in UDP_PORTS if number != 14550}}
+
+
+def test_a_serial_port_may_be_given_without_its_rate() -> None:
+    by_path = '/dev/serial/by-path/platform-usb-0:1.2:1.0-port0'
+    _, given = parse([by_path, f'{by_path}:9600', '/dev/ttyUSB0,9600', '/dev/ttyUSB0'])
+
+    assert [url for _, url in given] == [
+        SerialUrl(by_path, 57600), SerialUrl(by_path, 9600), SerialUrl('/dev/ttyUSB0', 9600),
+        SerialUrl('/dev/ttyUSB0', 57600)]
 
 
 DISCOVER = 'support.quiet_discover'

@@ -23,7 +23,7 @@ from pathlib import Path
 from ...mavlink.url import SerialUrl, UdpUrl, Url
 
 # The longest command line of a program that is shown, characters.
-MAX_COMMAND = 60
+MAX_COMMAND = 80
 PTY_MAKERS = {'/dev/ptmx', '/dev/pts/ptmx'}
 
 

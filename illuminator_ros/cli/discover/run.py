@@ -113,9 +113,10 @@ def parse(args: Sequence[str] | None) -> tuple[argparse.Namespace, list[tuple[st
     parser.add_argument('--json', action='store_true', help='print the report as JSON')
     options = parser.parse_args(args)
     try:
-        # A serial port may be given without the rate, which is to be found.
-        return options, [(text, parse_url(f'serial://{text}' if re.fullmatch('/[^,]+', text) else
-                                          text)) for text in options.url]
+        # A serial port may be given without its rate; a name by path contains colons.
+        return options, [(text, parse_url(
+            f'{text},{RATES[0]}' if re.match(r'/(?!.*[,:]\d+$)', text) else text))
+            for text in options.url]
     except ValueError as error:
         parser.error(str(error))
 
