@@ -52,7 +52,7 @@ setup(
     entry_points={
         'console_scripts': [
             *(f'{prefix}{name} = illuminator_ros.cli.{name}:main'
-              for name in ('bridge', 'conformance', 'monitor', 'simulator')),
+              for name in ('bridge', 'conformance', 'discover', 'monitor', 'simulator')),
             *(f'{prefix}{name} = illuminator_ros.cli.bridge:{name}'
               for name in ('gimbal', 'gimbal_manager', 'rededge')),
         ],

@@ -123,7 +123,7 @@ def test_one_module_uses_private_parts_of_rclpy() -> None:
 
 def test_modules_outside_the_ros_folders_do_not_import_ros() -> None:
     without_ros = [module for module in MODULES if folder(module)[-1:] not in (('ros',), ('cli',))
-                   or module.split('.')[2:3] in (['simulator'], ['conformance'])]
+                   or module.split('.')[2:3] in (['simulator'], ['conformance'], ['discover'])]
 
     assert {module: found for module in without_ros if (found := [
         *roots(imports(module)) & ROS,

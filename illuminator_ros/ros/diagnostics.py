@@ -35,7 +35,8 @@ from ..mavlink.component import Component
 from ..mavlink.duplicate_filter import OWN
 from ..mavlink.link import Link
 from ..mavlink.message_traits import name_of
-from ..mavlink.messages import Address
+from ..mavlink.messages import Address, Heartbeat
+from ..payload.component_kinds import described
 
 OK, WARN, ERROR = DiagnosticStatus.OK, DiagnosticStatus.WARN, DiagnosticStatus.ERROR
 
@@ -140,6 +141,7 @@ class LinkDiagnostics:
     :param unanswering: the devices whose last command got no acknowledgement.
     :param values: the values of the status of each line that are the same for all devices.
     :param devices: values of single devices, by address.
+    :param heartbeats: see :attr:`~..mavlink.component.Component.heartbeats`.
     """
 
     lines: Sequence[link_state.LinkSnapshot]
@@ -150,6 +152,7 @@ class LinkDiagnostics:
     unanswering: frozenset[Address]
     values: Sequence[Mapping[str, Value]]
     devices: Mapping[Address, Mapping[str, Value]]
+    heartbeats: Mapping[Address, Heartbeat]
 
     @property
     def state(self) -> link_state.LinkSnapshot:
@@ -236,7 +239,7 @@ def link_diagnostics(
         lines, [[text for (_, second), text in texts.items() if second == index]
                 for index in range(len(lines))], now, component.address,
         component.address_conflict(now), frozenset(commands.unanswering),
-        [{**values[0], **own}, *values[1:]], devices)
+        [{**values[0], **own}, *values[1:]], devices, {**component.heartbeats})
 
 
 def _line_values(
@@ -289,7 +292,7 @@ def why_nothing_is_heard(link: LinkDiagnostics, device: str) -> str:
     """
     Return the likeliest reason why no device is found on an open link, for people.
 
-    :param device: such as ``an illuminator``.
+    :param device: such as ``a light``.
     """
     signing, frames, bytes_ = link.state.signing, link.frames_received, link.bytes_received
     if link.address_conflict:
@@ -308,8 +311,8 @@ def why_nothing_is_heard(link: LinkDiagnostics, device: str) -> str:
         return (f'{", ".join(unset[:5])} heard, whose system id 0 cannot be addressed: set its '
                 'system id, such as 1')
     if frames:
-        return (f'{frames} frames received, none from {device}: check that it is '
-                'on, and that routers forward its frames')
+        return (f'{frames} frames from {described(link.state.traffic.sources, link.heartbeats)}, '
+                f'none from {device}: check that it is on, and that routers forward its frames')
     if bytes_:
         return f'{bytes_} bytes received, no valid frame; check the baud rate'
     return ('nothing is received: check that the device is on, and that it, or a router, sends '

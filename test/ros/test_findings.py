@@ -33,7 +33,7 @@ from illuminator_ros.illuminator.ros.diagnostics import (
 )
 from illuminator_ros.mavlink.dialect import mavlink
 from illuminator_ros.mavlink.link_state import LinkState
-from illuminator_ros.mavlink.messages import Address, CommandAck, heartbeat
+from illuminator_ros.mavlink.messages import Address, CommandAck, Heartbeat, heartbeat
 from illuminator_ros.mavlink.signing import Signing, SigningMode
 from illuminator_ros.ros.diagnostics import line_reports, link_diagnostics
 import pytest
@@ -203,7 +203,8 @@ def test_another_sender_with_our_address_is_an_error_and_the_reason_for_a_missin
         assert found(reported.statuses()['link']) == (ERROR, text)
 
 
-FOREIGN = frame_of(heartbeat(2), 0, AUTOPILOT)
+FOREIGN = frame_of(Heartbeat(
+    mavlink.MAV_TYPE_QUADROTOR, mavlink.MAV_AUTOPILOT_PX4, 0, 0, 4, 3), 0, AUTOPILOT)
 UNADDRESSABLE = frame_of(heartbeat(mavlink.MAV_TYPE_ILLUMINATOR), 0, Address(0, 243))
 
 
@@ -212,8 +213,9 @@ UNADDRESSABLE = frame_of(heartbeat(mavlink.MAV_TYPE_ILLUMINATOR), 0, Address(0, 
      'router, sends to this address or line'),
     (SigningMode.OFF, [bytes(range(90)), spoilt(FOREIGN)],
      '111 bytes received, no valid frame; check the baud rate'),
-    (SigningMode.OFF, [FOREIGN], '1 frames received, none from an illuminator: check that it is '
-     'on, and that routers forward its frames'),
+    (SigningMode.OFF, [FOREIGN, frame_of(heartbeat(mavlink.MAV_TYPE_GCS), 0, Address(255, 190))],
+     r'2 frames from 1/1 \(autopilot, PX4\) and 255/190 \(ground station\), none from a light: '
+     'check that it is on, and that routers forward its frames'),
     (SigningMode.OFF, [FOREIGN, UNADDRESSABLE], '0/243 heard, whose system id 0 cannot be '
      'addressed: set its system id, such as 1'),
     (SigningMode.REQUIRE, [FOREIGN], '1 frames refused because they are not signed: sign '
