@@ -18,7 +18,7 @@ from __future__ import annotations
 
 from collections.abc import Collection, Mapping
 
-from ..mavlink.dialect import mavlink, MAVLink_illuminator_status_message, short_names
+from ..mavlink.dialect import mavlink, short_names
 from ..mavlink.messages import Address, Heartbeat
 
 AUTOPILOT, LIGHT, MANAGER, GIMBAL = 'autopilot', 'light', 'gimbal manager', 'gimbal'
@@ -34,7 +34,7 @@ TYPES = {
 AUTOPILOTS = {mavlink.MAV_AUTOPILOT_ARDUPILOTMEGA: 'ArduPilot', mavlink.MAV_AUTOPILOT_PX4: 'PX4'}
 # By message. ArduSub is a light, and an autopilot a gimbal manager, without a HEARTBEAT of it.
 MESSAGES = {
-    MAVLink_illuminator_status_message.id: LIGHT,
+    440: LIGHT,  # ILLUMINATOR_STATUS
     mavlink.MAVLINK_MSG_ID_GIMBAL_MANAGER_INFORMATION: MANAGER,
     mavlink.MAVLINK_MSG_ID_GIMBAL_MANAGER_STATUS: MANAGER,
     mavlink.MAVLINK_MSG_ID_GIMBAL_DEVICE_INFORMATION: GIMBAL,
