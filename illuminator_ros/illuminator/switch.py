@@ -198,20 +198,18 @@ class Switch:
         """
         before, was_off_by_heat = self.enabled, self._is_off_by_heat
         self._take_enabled(status)
-        is_late = self._is_late(now)
-        if self.enabled and is_told and not self.changes.is_busy and not was_off_by_heat and (
-                before is None or not (before or is_late or may_be_ours)):
-            # Another sender has switched it on, or it was on when it was found.
-            self.silence.requested_at = now
+        origin = (events.LATE_EFFECT if self._is_late(now) else
+                  events.A_REQUEST if may_be_ours else events.OTHER_SENDER)
         if self.enabled is False and not self.changes.is_busy:
             self._required = None
+        elif self.enabled and is_told and not (self.changes.is_busy or was_off_by_heat) and (
+                before is None or not before and origin == events.OTHER_SENDER):
+            # Another sender has switched it on, or it was on when it was found.
+            self.silence.requested_at = now
         self.changes.reported(status, now)
-        if not self.changes.outcomes and not self.changes.is_busy:
-            origin = (events.LATE_EFFECT if is_late else
-                      events.A_REQUEST if may_be_ours else events.OTHER_SENDER)
-            is_told = is_told and not (
-                self._told is None or status.is_dimmed or status.mode is Mode.EXTERNAL_SYNC)
-            self._tell(origin if is_told else '')
+        if not (self.changes.outcomes or self.changes.is_busy):
+            shows_switch = not (status.is_dimmed or status.mode is Mode.EXTERNAL_SYNC)
+            self._tell(origin if is_told and shows_switch and self._told is not None else '')
 
     def _take_enabled(self, status: Status) -> None:
         self._is_off_by_heat = status.is_off_by_heat or (

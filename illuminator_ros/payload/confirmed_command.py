@@ -220,22 +220,28 @@ class ConfirmedCommand(Generic[S]):
     # The command
 
     def _send(self, now: float, tried: int = 0) -> None:
-        """Send the command: once if another try is due anyway, else by the command protocol."""
+        """
+        Send the command by the command protocol, which tries again until it is acknowledged.
+
+        Where more tries are due whatever the device answers, each is sent once.
+        """
         change, target, terms = self.change, self._target, self.terms
-        is_single = not change.is_idempotent
+        is_fenced = now < terms.fence
+        is_repeated = change.is_idempotent and (
+            terms.insists or is_fenced or self._is_accepted)
         self._repeat_due = math.inf
-        if change.is_idempotent and (terms.insists or now < terms.fence or self._is_accepted):
-            is_single = True
+        if is_repeated:
             is_slow = terms.insists and tried >= (UNCONFIRMED.tries or 0)
             self._repeat_due = now + (STILL_UNCONFIRMED if is_slow else UNCONFIRMED).first
-            if now < terms.fence:
+            if is_fenced:
                 self._repeat_due = min(self._repeat_due, terms.fence)
-        elif now < terms.fence:
+        elif is_fenced:
             self._ends_at = terms.fence + CONFIRMATION_TIMEOUT
             self._requests = Retries(STATUS, terms.fence, 1)
         self._sending = target.commands.start(
             Command(target.address, change.command, change.params, position=change.position),
-            now, self._answered, deadline=self._limit, retries=0 if is_single else None,
+            now, self._answered, deadline=self._limit,
+            retries=0 if is_repeated or not change.is_idempotent else None,
             tried=tried, follow_up=target.status_request)
 
     @property
