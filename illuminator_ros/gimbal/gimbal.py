@@ -40,7 +40,7 @@ from ..mavlink.command_sender import CommandResult, CommandSender
 from ..mavlink.dialect import mavlink, short_names
 from ..mavlink.messages import Address
 from ..mavlink.retries import GIMBAL_MESSAGE, Retries
-from ..payload.arbitration import HolderChanged
+from ..payload.arbitration import Cause, HolderChanged
 from ..payload.command_sources import Sources, SourceSettings
 from ..payload.confirmed_command import Done, Result
 from ..payload.device_property import answer, Caller, Desired, Outcome, Property
@@ -419,21 +419,20 @@ class Gimbal:
         self._setpoints.change_timeout(settings.setpoint_timeout, now)
         if settings.sources:
             self._sources.set_lease(settings.sources.timeout)
-            self._change_holder(self._sources.poll(now), now)
+            self._take_holder(self._sources.poll(now), now)
 
     # Sources
 
     def claim(self, source: str, now: float) -> str:
         """Claim the gimbal for a stream; return any refusal of its source, '' for none."""
-        self._change_holder(self._sources.poll(now), now)
+        self._take_holder(self._sources.poll(now), now)
         self._take_over(source, now)
-        if change := self._sources.claim(source, now):
-            self._emit(events.GimbalHeld(self.key, change))
+        self._take_holder(self._sources.claim(source, now), now)
         return self._sources.refusal(source)
 
     def begin_call(self, source: str, now: float) -> str:
         """Begin a call; return why its source may not command the gimbal, '' if it may."""
-        self._change_holder(self._sources.poll(now), now)
+        self._take_holder(self._sources.poll(now), now)
         if refusal := self._sources.refusal(source):
             return refusal
         self._take_over(source, now)
@@ -442,8 +441,7 @@ class Gimbal:
 
     def end_call(self, source: str, now: float, *, success: bool) -> None:
         """End a call, which claims the gimbal if it has succeeded."""
-        if change := self._sources.end_call(source, now, success=success):
-            self._emit(events.GimbalHeld(self.key, change))
+        self._take_holder(self._sources.end_call(source, now, success=success), now)
 
     def refusal(self, source: str) -> str:
         """Return why a source may not command the gimbal, for people; '' if it may."""
@@ -455,21 +453,21 @@ class Gimbal:
 
         :return: the source that holds it now, '' if none does.
         """
-        self._change_holder(self._sources.poll(now), now)
-        self._change_holder(self._sources.release(source, now), now)
+        self._take_holder(self._sources.poll(now), now)
+        self._take_holder(self._sources.release(source, now), now)
         return self._sources.holder or ''
 
     def _take_over(self, source: str, now: float) -> None:
         """End the setpoint and the requests of another source, unless it is a higher one."""
-        sources = self._sources
-        if sources.are_ranked and sources.commander != source and not sources.refusal(source):
+        if self._sources.takes_over(source):
             self._end_commands(f'held by {source}', now)
 
-    def _change_holder(self, change: HolderChanged[str] | None, now: float) -> None:
-        """End the setpoint and the requests of the previous source."""
+    def _take_holder(self, change: HolderChanged[str] | None, now: float) -> None:
+        """Take a change of the source that holds the gimbal."""
         if change is None:
             return
-        self._end_commands(f'held by {change.after or "no source"}', now)
+        if change.cause is not Cause.CLAIM:
+            self._end_commands(f'held by {change.after or "no source"}', now)
         self._emit(events.GimbalHeld(self.key, change))
 
     def _end_commands(self, message: str, now: float) -> None:
@@ -625,7 +623,7 @@ class Gimbal:
     def poll(self, now: float) -> None:
         """Do everything that is due."""
         self._check(now)
-        self._change_holder(self._sources.poll(now), now)
+        self._take_holder(self._sources.poll(now), now)
         manager, control = self._manager, self._control
         manager.poll(now)
         self._yaw_lock.poll(now)

@@ -367,8 +367,7 @@ class Light:
 
     def _take_over(self, source: str, now: float) -> None:
         """End the requests of another source, unless it is a higher one."""
-        sources = self._sources
-        if sources.are_ranked and sources.commander != source and not sources.refusal(source):
+        if self._sources.takes_over(source):
             self._end_requests(f'held by {source}', now)
 
     def _end_requests(self, message: str, now: float) -> None:
