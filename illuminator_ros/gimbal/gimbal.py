@@ -187,7 +187,7 @@ class Gimbal:
         self._settle(now)
 
     @property
-    def silent_since(self) -> float:
+    def lost_at(self) -> float:
         """Return when a manager last announced the gimbal or its device was last heard, s."""
         return max(self._managers.announced_at, self._device.liveness.heard_at)
 

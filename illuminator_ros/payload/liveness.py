@@ -25,24 +25,19 @@ class Liveness:
     """
     The liveness of one device. Times are s.
 
-    The device is connected from its first message until its owner notes the loss by :meth:`lose`.
-
     :param timeout: after which the device is silent.
     :param link_failure: why the link is not open, for people; '' while it is.
+    :ivar connected: whether it was heard, and :meth:`lose` was not called since.
     :ivar heard_at: the time of the last message; -inf before the first.
     :ivar lost_at: when the device was lost; infinity while it is connected.
     """
 
     def __init__(self, timeout: float, link_failure: str = '') -> None:
         self.link_failure = link_failure
+        self.connected = False
         self.heard_at = -math.inf
         self.lost_at = math.inf
         self._timeout = timeout
-
-    @property
-    def connected(self) -> bool:
-        """Whether it was heard, and was not lost since."""
-        return self.lost_at == math.inf != -self.heard_at
 
     def is_heard(self, now: float) -> bool:
         """Return whether it is connected and not silent."""
@@ -51,14 +46,14 @@ class Liveness:
     def hear(self, now: float) -> bool:
         """Take a message; return whether the device is connected by it."""
         was_connected = self.connected
-        self.heard_at, self.lost_at = now, math.inf
+        self.connected, self.heard_at, self.lost_at = True, now, math.inf
         return not was_connected
 
     def lose(self, now: float) -> bool:
         """Note the loss; return whether the device was connected."""
         was_connected = self.connected
         if was_connected:
-            self.lost_at = now
+            self.connected, self.lost_at = False, now
         return was_connected
 
     def next_deadline(self) -> float:

@@ -161,9 +161,9 @@ class WinchClient(Payload):
 
     def __init__(self, commands: CommandSender) -> None:
         self.events: Listeners[WinchReport] = Listeners()
-        self._discovery = Discovery(self._make, commands)
+        self._discovery = Discovery[mav.Address, Winch]()
         self.winches: Mapping[mav.Address, Winch] = self._discovery.devices
-        self._commands = commands
+        self._make = partial(Winch, commands=commands)
 
     def poll(self, now: float) -> None:
         """See :meth:`Payload.poll`."""
@@ -173,17 +173,14 @@ class WinchClient(Payload):
         """See :meth:`Payload.next_deadline`."""
         return self._discovery.next_deadline()
 
-    def _make(self, address: mav.Address) -> Winch:
-        return Winch(address, self._commands)
-
     def receive(self, source: mav.Address, message: mav.Message, now: float) -> None:
         """See :meth:`Payload.receive`."""
         if isinstance(message, WinchStatus):
-            if winch := self._discovery.hear(source, now, proved=True):
+            if winch := self._discovery.hear(source, now, self._make, proved=True):
                 winch.take_status(message, now)
                 self.events.emit(WinchReport(source, message.line_length))
         elif (isinstance(message, mav.Heartbeat) and message.type == mavlink.MAV_TYPE_WINCH
-                and (winch := self._discovery.hear(source, now, proved=False))):
+                and (winch := self._discovery.hear(source, now, self._make, proved=False))):
             winch.liveness.hear(now)
 
 
