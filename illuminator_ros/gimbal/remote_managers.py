@@ -35,6 +35,7 @@ from ..mavlink.messages import Address
 from ..mavlink.retries import GIMBAL_MESSAGE, Retries
 from ..payload.confirmed_command import Result, Target
 from ..payload.device_property import Caller, Desired, Outcome, Property
+from ..payload.liveness import Liveness
 from ..payload.messages import GimbalDeviceAttitudeStatus
 from ..payload.mount_attitude import yaw_frame, YawFrame
 
@@ -81,7 +82,8 @@ class RemoteManager:
 
     def __init__(self, address: Address, commands: CommandSender, key: events.GimbalKey) -> None:
         self.address = address
-        self.heard_at = self.status_at = -math.inf
+        self.liveness = Liveness(SILENCE_LIMIT)
+        self.status_at = -math.inf
         self.autopilot: int | None = None
         self.information: GimbalManagerInformation | None = None
         self.control: Control | None = None
@@ -191,18 +193,14 @@ class RemoteManager:
         """Whether it refuses components without control, as far as it is known."""
         return self.autopilot != mavlink.MAV_AUTOPILOT_ARDUPILOTMEGA
 
-    def is_heard(self, now: float) -> bool:
-        """Return whether it is not lost."""
-        return now < self.heard_at + SILENCE_LIMIT
-
     def known_control(self, now: float) -> Control | None:
         """Return the components in control, None if they are not known."""
-        is_known = self.is_heard(now) and now < self.status_at + STATUS_LIMIT
+        is_known = self.liveness.is_heard(now) and now < self.status_at + STATUS_LIMIT
         return self.control if is_known else None
 
     def control_deadline(self) -> float:
         """Return when :meth:`known_control` returns None without another message, s."""
-        return min(self.heard_at + SILENCE_LIMIT, self.status_at + STATUS_LIMIT)
+        return min(self.liveness.next_deadline(), self.status_at + STATUS_LIMIT)
 
     def lack_of_status(self, now: float) -> str:
         """Return that its status is missing, for people."""
@@ -284,12 +282,12 @@ class RemoteManagers:
         if address not in self.all and len(self.all) < MAX_MANAGERS:
             self.all[address] = RemoteManager(address, self._commands, self._key)
         if manager := self.all.get(address):
-            manager.heard_at = now
+            manager.liveness.hear(now)
         return manager
 
     def choose(self, now: float) -> None:
         """Use another manager if the used one is lost, and report further ones."""
-        heard = [one for one in self.all.values() if one.is_heard(now)]
+        heard = [one for one in self.all.values() if one.liveness.is_heard(now)]
         if not heard:
             return
         if self.used not in heard:
@@ -304,7 +302,7 @@ class RemoteManagers:
     def components_lost(self, lost: Collection[Address], now: float, reason: str) -> None:
         """Lose some managers at once."""
         for manager in [one for one in self.all.values() if one.address in lost]:
-            manager.heard_at = min(manager.heard_at, now - SILENCE_LIMIT)
+            manager.liveness.lose(now)
             manager.cancel(reason, now)
 
     def close(self, message: str, now: float) -> None:

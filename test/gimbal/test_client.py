@@ -192,10 +192,10 @@ def test_forged_components_take_no_memory_without_end() -> None:
     rig.run(1.0)
 
     assert len(keys(rig)) == limits.MAX_GIMBALS
-    assert rig.client.limit_reached
+    assert rig.client.discovery.limit_reached
     rig.run(60.1)
     assert keys(rig) == [GimbalKey(DEVICE)]
-    assert not rig.client.limit_reached
+    assert not rig.client.discovery.limit_reached
 
 
 @pytest.mark.parametrize('announcement', [FakeManager.status, FakeManager.information])

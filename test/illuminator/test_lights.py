@@ -52,7 +52,7 @@ def test_a_light_is_lost_after_the_heartbeat_timeout_and_found_again(
     fake: FakeLight, timeout: float,
 ) -> None:
     pair = Pair(fake, settings=Settings(heartbeat_timeout=timeout)).settle()
-    light, heard_at = pair.light, pair.light.heard_at
+    light, heard_at = pair.light, pair.light.liveness.heard_at
     fake.silent = True
     pair.run_until(lambda: not light.connected, within=100.0)
     assert pair.now - heard_at == pytest.approx(timeout)

@@ -154,7 +154,7 @@ def test_requests_to_a_lost_light_fail_at_once_with_the_reason(
     fake.silent = True
     if is_closed:
         faked.close()
-    faked.run(10.0 - (faked.now - faked.light.heard_at))
+    faked.run(10.0 - (faked.now - faked.light.liveness.heard_at))
     sent = len(faked.commands())
     answers = [faked.ask_enable(True), faked.ask_configure(brightness=50), faked.ask_refresh()]
     faked.light.set_brightness(50.0, faked.now)

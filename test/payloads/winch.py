@@ -24,7 +24,6 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import partial
-import math
 
 from illuminator_ros.mavlink import messages as mav
 from illuminator_ros.mavlink.command_sender import CommandSender
@@ -37,6 +36,7 @@ from illuminator_ros.payload.device_property import answer, Caller, Desired, Pro
 from illuminator_ros.payload.discovery import Discovery
 from illuminator_ros.payload.faults import Behaviour
 from illuminator_ros.payload.listeners import Listeners
+from illuminator_ros.payload.liveness import Liveness
 from illuminator_ros.payload.payload_type import PayloadType
 
 WINCH = PayloadType('winch', ros='payloads.winch_ros:WINCH',
@@ -101,19 +101,20 @@ class Winch:
 
     def __init__(self, address: mav.Address, commands: CommandSender) -> None:
         self.address = address
-        self.lost_at = math.inf
+        self.liveness = Liveness(TIMEOUT)
         self.was_commanded = False
-        self._heard_at = self._line_length = 0.0
+        self._line_length = 0.0
         self._length: Property[WinchStatus] = Property(
             Target(address, commands, 'winch', WinchStatus.id, WinchStatus.msgname))
 
-    def heard(self, now: float) -> None:
-        """Note that the winch is alive."""
-        self._heard_at, self.lost_at = now, math.inf
+    @property
+    def lost_at(self) -> float:
+        """See :class:`Device`."""
+        return self.liveness.lost_at
 
     def take_status(self, status: WinchStatus, now: float) -> None:
         """Take a status."""
-        self.heard(now)
+        self.liveness.hear(now)
         self._line_length = status.line_length
         self._length.reported(status, now)
         self._answer(now)
@@ -138,15 +139,14 @@ class Winch:
 
     def poll(self, now: float) -> None:
         """See :class:`Device`."""
-        if now >= self._heard_at + TIMEOUT:
-            self.lost_at = min(self.lost_at, now)
+        if now >= self.liveness.next_deadline():
+            self.liveness.lose(now)
         self._length.poll(now)
         self._answer(now)
 
     def next_deadline(self) -> float:
         """See :class:`Device`."""
-        lost = math.inf if self.lost_at < math.inf else self._heard_at + TIMEOUT
-        return min(lost, self._length.next_deadline())
+        return min(self.liveness.next_deadline(), self._length.next_deadline())
 
 
 class WinchClient(Payload):
@@ -161,9 +161,9 @@ class WinchClient(Payload):
 
     def __init__(self, commands: CommandSender) -> None:
         self.events: Listeners[WinchReport] = Listeners()
-        self._discovery = Discovery(self._make, commands)
+        self._discovery = Discovery[mav.Address, Winch]()
         self.winches: Mapping[mav.Address, Winch] = self._discovery.devices
-        self._commands = commands
+        self._make = partial(Winch, commands=commands)
 
     def poll(self, now: float) -> None:
         """See :meth:`Payload.poll`."""
@@ -173,18 +173,15 @@ class WinchClient(Payload):
         """See :meth:`Payload.next_deadline`."""
         return self._discovery.next_deadline()
 
-    def _make(self, address: mav.Address) -> Winch:
-        return Winch(address, self._commands)
-
     def receive(self, source: mav.Address, message: mav.Message, now: float) -> None:
         """See :meth:`Payload.receive`."""
         if isinstance(message, WinchStatus):
-            if winch := self._discovery.hear(source, now, proved=True):
+            if winch := self._discovery.hear(source, now, self._make, proved=True):
                 winch.take_status(message, now)
                 self.events.emit(WinchReport(source, message.line_length))
         elif (isinstance(message, mav.Heartbeat) and message.type == mavlink.MAV_TYPE_WINCH
-                and (winch := self._discovery.hear(source, now, proved=False))):
-            winch.heard(now)
+                and (winch := self._discovery.hear(source, now, self._make, proved=False))):
+            winch.liveness.hear(now)
 
 
 class SimulatedWinch(simulated.SimulatedDevice):

@@ -312,5 +312,5 @@ class GimbalNode:
             reports, gimbal=gimbal.snapshot(now) if gimbal else None,
             heard=self._heard(now), without_id=self._client.managers_without_id(now),
             known=self._why_none(),
-            limit_reached=self._client.limit_reached,
+            limit_reached=self._client.discovery.limit_reached,
             interval=self._client.settings.attitude_interval, started=self._started)
