@@ -210,6 +210,19 @@ def tracked() -> list[Path]:
         *MODULES.values(), *(ROOT / 'test').rglob('*.py'), *(ROOT / 'doc').rglob('*.md')]
 
 
+def test_classes_have_at_most_15_fields() -> None:
+    """More show that a class has several subjects."""
+    fields = {
+        f'{module}.{cls.name}': {
+            node.attr for node in ast.walk(cls)
+            if isinstance(node, ast.Attribute) and isinstance(node.ctx, ast.Store)
+            and isinstance(node.value, ast.Name) and node.value.id == 'self'}
+        for module, path in MODULES.items() for cls in ast.walk(ast.parse(path.read_text()))
+        if isinstance(cls, ast.ClassDef)}
+
+    assert {name: len(names) for name, names in fields.items() if len(names) > 15} == {}
+
+
 def test_no_file_refers_to_documents_outside_the_repository() -> None:
     # In parts, so that this file does not contain it.
     outside = re.compile('DESIGN' r'\.md|\.\./' 'shared/|/work' '/(shared|plan)')
