@@ -172,9 +172,13 @@ class RedEdgeClient(Payload):
 
     def _take_heartbeat(self, source: Address, now: float) -> None:
         """Take a heartbeat of the camera's component id, whatever its content."""
+        self._heartbeats.append(now)
+        own, address = self._commands.address.system, self._address
+        if self._connected and address and address.system == own != source.system:
+            # Our camera has adopted our system id, so this is the camera of another vehicle.
+            return
         self._address = source
         self._heard_at = now
-        self._heartbeats.append(now)
         if not self._connected:
             self._connected = True
             self.events.emit(CameraConnected(source))
