@@ -253,9 +253,11 @@ class Gimbal:
             self._yaw_lock.cancel(self.unavailable(now), now)
         if control is None:
             # The manager that had shown this component in control takes the zero.
-            last = self._manager.control if self._manager.liveness.is_heard(now) else None
-            self._setpoints.control_unknown(now, can_send=(
-                last is not None and last.primary == self._commands.address))
+            last = self._manager.control
+            self._setpoints.control_unknown(
+                now, is_heard=self._manager.liveness.is_heard(now), can_send=(
+                    not self._link_problem and last is not None
+                    and last.primary == self._commands.address))
         elif not self.in_control:
             self._setpoints.control_lost()
         elif is_first:

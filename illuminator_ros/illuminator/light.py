@@ -502,12 +502,13 @@ class Light:
 
         :param report: called with a failure that is not permanent when the first OFF is sent and
             when one has failed, and with a success when the light shows it. The failure of a light
-            that is not heard is permanent until it is heard.
+            without an open link is permanent.
         """
         self._switch.switch_off_finally(now, report)
         if not self.connected:
             self._send_unheard_off()
-            report(Result(False, self.unreachable(now), permanent=True), now)
+            report(Result(False, self.unreachable(now),
+                          permanent=bool(self.liveness.link_failure)), now)
         self._update(now)
 
     # Time

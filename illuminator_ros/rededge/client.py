@@ -169,8 +169,12 @@ class RedEdgeClient(Payload):
 
     def _take_heartbeat(self, source: Address, now: float) -> None:
         """Take a heartbeat of the camera's component id, whatever its content."""
-        self._address = source
         self._heartbeats.append(now)
+        own, address = self._commands.address.system, self._address
+        if self._liveness.connected and address and address.system == own != source.system:
+            # Our camera has adopted our system id, so this is the camera of another vehicle.
+            return
+        self._address = source
         if self._liveness.hear(now):
             self.events.emit(CameraConnected(source))
 

@@ -36,6 +36,7 @@ from ..mavlink.duplicate_filter import OWN
 from ..mavlink.link import Link
 from ..mavlink.message_traits import name_of
 from ..mavlink.messages import Address, Heartbeat
+from ..mavlink.transport.udp import MAX_PEERS
 from ..payload.component_kinds import described
 
 OK, WARN, ERROR = DiagnosticStatus.OK, DiagnosticStatus.WARN, DiagnosticStatus.ERROR
@@ -280,6 +281,8 @@ def line_findings(link: LinkDiagnostics, index: int) -> list[Finding]:
     """Return the findings on one line."""
     line = link.lines[index]
     return [*([] if line.is_open else [(ERROR, f'not open: {line.reason}')]),
+            *([] if line.peers <= MAX_PEERS else [(WARN, (
+                f'{line.peers} peers send, and only the first {MAX_PEERS} get an answer'))]),
             *((WARN, text) for text in link.loops[index])]
 
 

@@ -132,6 +132,19 @@ def test_a_camera_that_adopts_our_system_id_is_the_same_camera_re_8() -> None:
     assert (control.target_system, control.target_component) == ADOPTED
 
 
+def test_a_camera_with_our_system_id_is_kept_beside_those_of_other_vehicles() -> None:
+    rig = Rig()
+    for system in range(2, 50):
+        rig.hear(BEAT, source=ADOPTED)
+        rig.run(0.1)
+        rig.hear(BEAT, source=Address(system, 100))
+    assert (rig.state.address, rig.state.conflict) == (ADOPTED, True)
+    # A camera that has restarted has another system id until it hears us.
+    rig.run(3.6)
+    rig.hear(BEAT)
+    assert rig.state.address == NEW
+
+
 def test_a_camera_is_lost_after_3_5_s_and_found_again_re_9() -> None:
     rig = Rig()
     rig.run(3.4)

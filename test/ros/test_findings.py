@@ -39,7 +39,7 @@ from illuminator_ros.ros.diagnostics import line_reports, link_diagnostics
 import pytest
 from support.client import Client
 from support.fake_light import LIGHT, status_message
-from support.frames import frame_of, spoilt
+from support.frames import frame_of, heartbeat_frame, spoilt
 from support.signers import KEY, signed_frame, WRONG_KEY
 from support.simulated_link import SimulatedLink
 
@@ -201,6 +201,15 @@ def test_another_sender_with_our_address_is_an_error_and_the_reason_for_a_missin
         assert reported.statuses()['link'].message.endswith(text)
         reported.status()
         assert found(reported.statuses()['link']) == (ERROR, text)
+
+
+def test_peers_beyond_the_limit_which_get_no_answer_are_a_warning() -> None:
+    reported = Reported()
+    for port, expected in ((32, ''), (33, '33 peers send, and only the first 32 get an answer')):
+        reported.link.receive(*((heartbeat_frame(Address(2, one)), ('127.0.0.1', one))
+                                for one in range(1, port + 1)))
+        message = reported.statuses()['link'].message
+        assert ('peers' in message, expected in message) == (bool(expected), True)
 
 
 FOREIGN = frame_of(Heartbeat(
