@@ -18,8 +18,8 @@ from __future__ import annotations
 
 from illuminator_ros.mavlink.dialect import mavlink
 from illuminator_ros.mavlink.messages import Heartbeat, Message
-from illuminator_ros.payload.checks import component_requirements as component
-from illuminator_ros.payload.checks.requirement import PayloadChecks, Requirement, requirement
+from illuminator_ros.payload.checks.component_requirements import with_common
+from illuminator_ros.payload.checks.requirement import PayloadChecks, requirement
 from illuminator_ros.payload.checks.session import Session, Transaction
 from illuminator_ros.payload.checks.specifications import MESSAGES
 from payloads.winch import WinchStatus
@@ -72,8 +72,5 @@ async def release(winch: WinchSession) -> None:
         raise one.failure(f'{before} m, then {after} m')
 
 
-REQUIREMENTS: tuple[Requirement[WinchSession], ...] = (
-    component.heartbeat, component.heartbeat_autopilot, component.unknown_command,
-    *component.interval_requirements(WinchStatus), release, *component.ACKNOWLEDGEMENTS)
 CHECKS = PayloadChecks('winch', 'winch', WinchSession, 'HEARTBEAT with MAV_TYPE_WINCH',
-                       REQUIREMENTS)
+                       with_common((release,), WinchStatus))

@@ -236,17 +236,15 @@ async def yaw_lock(device: DeviceSession) -> str:
         return str(pose)
 
 
-REQUIREMENTS: tuple[Requirement[DeviceSession], ...] = (
-    component.heartbeat,
+OWN: tuple[Requirement[DeviceSession], ...] = (
     component.heartbeat_type(mavlink.MAV_TYPE_GIMBAL, 'GIMBAL', 'a gimbal'),
-    component.heartbeat_autopilot, component.address,
+    component.heartbeat_autopilot,
     component.status_stream(AttitudeStatus, GIMBAL, 'Gimbal Device Broadcast/Status Messages'),
     component.sent_on_request(
         'status-request', AttitudeStatus, MESSAGES, attitude.STATUS, optional=True),
     attitude.failures_at_rest, north_needs_heading,
     component.sent_on_request('information', INFORMATION, GIMBAL, 'Discovery of Gimbal Device'),
     *attitude.information(INFORMATION), device_id,
-    component.unknown_command, component.unknown_message, component.broadcast(INFORMATION),
     attitude.command_int(INFORMATION),
     reaches('setpoint', 'turns to an attitude that its manager commands', GIMBAL,
             'Control of a Gimbal Device', DeviceSession.point),
@@ -262,12 +260,11 @@ REQUIREMENTS: tuple[Requirement[DeviceSession], ...] = (
             _send_to_manager),
     ignores('other-target', 'ignores setpoints for other components and systems', ROUTING,
             'Routing Detail', 'setpoints for other addresses', _point_others),
-    *component.interval_requirements(AttitudeStatus),
-    component.heartbeat_rate,
     attitude.statuses('status-to-all', 'sends its attitude to all components (GM-20)', _not_to_all,
                       GIMBAL, 'Gimbal Device Broadcast/Status Messages'),
-    *attitude.STATUSES, *component.ACKNOWLEDGEMENTS, component.checksums,
+    *attitude.STATUSES,
 )
+REQUIREMENTS = component.with_common(OWN, AttitudeStatus, INFORMATION)
 CHECKS: PayloadChecks[DeviceSession] = PayloadChecks(
     payload='gimbal', device='gimbal', session=DeviceSession, requirements=REQUIREMENTS,
     evidence='HEARTBEAT with MAV_TYPE_GIMBAL, or GIMBAL_DEVICE_ATTITUDE_STATUS',

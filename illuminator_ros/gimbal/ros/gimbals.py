@@ -31,7 +31,7 @@ from ...payload.confirmed_command import Result
 from ...ros.command_sources import SOURCE_PARAMETERS, source_settings
 from ...ros.conversions import GEOID_SEPARATION
 from ...ros.device_nodes import DeviceNodes
-from ...ros.parameters import ChangeableParameters, ParameterSpec, Values
+from ...ros.parameters import by_name, ChangeableParameters, ParameterSpec, Values
 from ...ros.payload import Host, RosPayload, ServedPayload, ShutdownReport
 from ...ros.transforms import PUBLISH_TF, TransformPublisher
 
@@ -57,9 +57,8 @@ def settings(values: Values) -> GimbalSettings:
 
     :raises ParameterError: if the sources are wrong.
     """
-    return GimbalSettings(values['setpoint_timeout'], values['attitude_interval'],
-                          values['auto_take_control'], values['gimbal_device_id'],
-                          source_settings(values))
+    return by_name(GimbalSettings, values, device_id=values['gimbal_device_id'],
+                   sources=source_settings(values))
 
 
 class Gimbals(ServedPayload):

@@ -63,6 +63,7 @@ from ...ros.diagnostics_publisher import DiagnosticsSource, MakeReports
 from ...ros.node import Answer, Endpoint, NodeInterface, RequestService
 from ...ros.parameter_services import ParameterServices
 from ...ros.parameters import (
+    by_name,
     ChangeableParameters,
     DeviceParameters,
     given_parameters,
@@ -315,10 +316,9 @@ def _angles(values: Values) -> Vector:
 def _make_client(commands: CommandSender, values: Values) -> RedEdgeClient:
     if commands.address.component == mavlink.MAV_COMP_ID_CAMERA:
         raise ParameterError(f'component_id: {mavlink.MAV_COMP_ID_CAMERA} is the id of the camera')
-    return RedEdgeClient(commands, Settings(
-        PositionSource(values['position_source']), values['geoid_separation'],
-        MountFrame(values['mount_frame']), values['attitude_rate'], values['position_timeout'],
-        values['attitude_timeout'], values['send_gps_status'], values['heartbeat_timeout']))
+    return RedEdgeClient(commands, by_name(
+        Settings, values, position_source=PositionSource(values['position_source']),
+        mount_frame=MountFrame(values['mount_frame'])))
 
 
 REDEDGE = RosPayload(
