@@ -12,7 +12,6 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-
 """A search: a light on a gimbal shines in one direction after the other, then goes off."""
 
 import math
@@ -26,11 +25,13 @@ import rclpy
 from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, QoSProfile
 from rclpy.signals import SignalHandlerOptions
-from std_msgs.msg import Bool, Header
+from std_msgs.msg import Bool, Float32, Header
 from std_srvs.srv import SetBool, Trigger
 
-# Change these: the nodes, the directions (degrees down, degrees left), and s at each of them.
+# Change these: the nodes, the brightness, %, the directions (degrees down, degrees left), and s
+# at each of them.
 LIGHT, GIMBAL = '/illuminator', '/gimbal'
+BRIGHTNESS = 40.0
 PATTERN = [(20, 40), (20, 0), (20, -40), (40, -40), (40, 0), (40, 40)]
 DWELL = 2.0
 
@@ -44,6 +45,9 @@ class Search(Node):
         super().__init__('search_pattern')
         self.in_control, self.angles = False, Vector3Stamped()
         self.setpoint = self.create_publisher(Vector3Stamped, f'{GIMBAL}/cmd/angles', 10)
+        self.brightness = self.create_publisher(Float32, f'{LIGHT}/cmd/brightness', 10)
+        # Repeated, so that off_after_silence of the bridge ends the light with this program.
+        self.create_timer(0.5, lambda: self.brightness.publish(Float32(data=BRIGHTNESS)))
         self.create_subscription(Vector3Stamped, f'{GIMBAL}/angles', self.take_angles, 10)
         self.create_subscription(Bool, f'{GIMBAL}/in_control', self.take_control, STATE)
 

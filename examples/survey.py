@@ -12,7 +12,6 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-
 """A survey: an image each 10 m of flight, and a list of the places where they were taken."""
 
 import contextlib

@@ -60,13 +60,13 @@ LINK_VALUES = {
     'peers': 'peers with recent valid frames',
     'frames_received': 'frames with a valid checksum',
     'frames_sent': 'frames that were sent',
-    'frames_dropped': 'frames that were not sent, because the queue was full or the line slow',
+    'frames_dropped': 'frames that were not sent, because the queue was full or the link slow',
     **dict.fromkeys(('bytes_received', 'bytes_sent'), 'all bytes'),
     **dict.fromkeys(('bytes_received_per_s', 'bytes_sent_per_s'), 'recent average'),
     'crc_errors': 'frames with a wrong checksum',
     'frames_forwarded':
         'frames from other links that were sent, or wait to be sent, over this one',
-    'frames_not_forwarded': 'forwarded frames that the line replaced by newer ones or dropped',
+    'frames_not_forwarded': 'forwarded frames that the link replaced by newer ones or dropped',
     'not_forwarded': 'the most frequent messages of these, with their numbers',
     'copies_received': 'frames that had come over another link less than 5 s before; WARN names '
                        'both links',

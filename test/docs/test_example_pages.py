@@ -12,7 +12,6 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-
 """Each program of examples/ is shown whole in the page that teaches it."""
 
 from pathlib import Path

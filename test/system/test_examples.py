@@ -12,7 +12,6 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-
 """The programs of examples/ operate simulated devices through their nodes."""
 
 from __future__ import annotations
@@ -106,7 +105,7 @@ def test_the_search_looks_in_each_direction_with_the_light_on_and_releases_the_g
     port, light = free_port(), SimulatedIlluminator(IlluminatorProperties())
     gimbal = SimulatedManager(ManagerProperties())
     pattern = [(20, 30), (40, -10)]
-    with (node(own_ros, 'bridge', port, payloads='[illuminator, gimbal]'),
+    with (node(own_ros, 'bridge', port, payloads='[illuminator, gimbal]', off_after_silence=1.5),
           served(port, light, gimbal),
           ended(example(own_ros, 'search_pattern', tmp_path, PATTERN=f'{pattern}',
                         DWELL='0.5')) as program):

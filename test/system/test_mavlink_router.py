@@ -12,7 +12,6 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-
 """A light and an autopilot behind the real mavlink-router, with the configurations of the page."""
 
 from __future__ import annotations

@@ -12,7 +12,6 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-
 """The commands of doc/vehicles.md, with simulated devices and MAVSDK as the ground station."""
 
 from __future__ import annotations
