@@ -92,12 +92,11 @@ class _Stream:
     def _copy(self) -> None:
         lost = 0
         while data := os.read(self._source, WRITE_SIZE):
-            while not (has_room := self._room.poll(LOOK_INTERVAL * 1e3)):
+            while not self._room.poll(LOOK_INTERVAL * 1e3):
                 if self._unread() > self._limit:
-                    break
-            if not has_room:
-                lost += data.count(b'\n')
-                continue
+                    data += os.read(self._source, self._limit)
+                    lost += data.count(b'\n', 0, -WRITE_SIZE)
+                    data = data[-WRITE_SIZE:]
             if lost:
                 # The beginning of the first line is lost.
                 data = b'\n[%d lines were dropped while nothing read them]\n%s' % (

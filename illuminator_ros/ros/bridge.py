@@ -29,6 +29,7 @@ import time
 from typing import NamedTuple
 
 from rclpy.clock import Clock, ClockType
+from rclpy.duration import Duration
 from rclpy.exceptions import InvalidHandle
 from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
 from rclpy.node import Node
@@ -60,6 +61,7 @@ from ..payload.payload_type import PayloadType
 # s; SIGINT and SIGTERM end the process within 1 s, including these limits and the exit of ROS.
 OFF_LIMIT = 0.6
 STOP_LIMIT = 0.15
+ACKNOWLEDGEMENT_LIMIT = 0.05
 # s for which the interpreter runs one of several busy threads, at the end.
 SWITCH_INTERVAL = 0.0005
 # s between checks of the diagnostics, and from an event to the check that it causes.
@@ -179,9 +181,19 @@ class Bridge:
                 self._spin_once()
         for payload in self._served:
             payload.payload.close()
+        self._await_acknowledgements()
         # The first one last, since the others use its publisher of parameter events.
         for node in reversed(self.nodes):
             node.destroy_node()
+
+    def _await_acknowledgements(self) -> None:
+        """Let other processes receive the last messages, such as the removal of a marker."""
+        deadline = time.monotonic() + ACKNOWLEDGEMENT_LIMIT
+        for publisher in (one for node in self.nodes for one in node.publishers):
+            # After a shutdown of the context nothing can be sent.
+            with contextlib.suppress(RuntimeError):
+                publisher.wait_for_all_acked(
+                    Duration(seconds=max(deadline - time.monotonic(), 0.0)))
 
     def _spin_once(self) -> None:
         try:

@@ -32,6 +32,7 @@ def test_lines_that_do_not_fit_into_the_queue_are_dropped_and_counted() -> None:
         os.write(writing, LINE)
     with open(reading, 'rb') as reader:
         written = [reader.readline() for _ in range(2)]
+        assert select.select([], [writing], [], PATIENCE)[1]
         os.write(writing, b'a last line\n' * 2)
         while written[-1] != b'a last line\n':
             written.append(reader.readline())

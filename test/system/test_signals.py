@@ -192,7 +192,8 @@ def test_hanging_program_is_forced_to_end_within_a_second() -> None:
 
     assert program.end(signal.SIGTERM) == 0
     assert program.count('at last') == 1
-    assert bridge.OFF_LIMIT + bridge.STOP_LIMIT < termination.LIMIT < 1.0
+    assert (bridge.OFF_LIMIT + bridge.STOP_LIMIT + bridge.ACKNOWLEDGEMENT_LIMIT
+            < termination.LIMIT < 1.0)
 
 
 @pytest.mark.parametrize(
