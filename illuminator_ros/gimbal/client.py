@@ -20,7 +20,7 @@ from collections.abc import Collection, Mapping
 from dataclasses import dataclass, field
 import math
 
-from .events import GimbalEvent, GimbalForgotten, GimbalFound, GimbalKey
+from .events import GimbalEvent, GimbalKey
 from .gimbal import Gimbal, GimbalSettings
 from .messages import (
     GimbalDeviceInformation,
@@ -80,8 +80,7 @@ class GimbalClient(Payload):
     def __init__(self, commands: CommandSender, settings: GimbalSettings) -> None:
         self.events: Listeners[GimbalEvent] = Listeners()
         self.discovery = Discovery[GimbalKey, Gimbal](
-            found=lambda gimbal, now: self.events.emit(GimbalFound(gimbal.key)),
-            forgotten=lambda key: self.events.emit(GimbalForgotten(key)),
+            self.events.emit,
             limit=lambda key: MAX_GIMBALS + (key.device_id == self.settings.device_id))
         self.gimbals: Mapping[GimbalKey, Gimbal] = self.discovery.devices
         self.settings = settings

@@ -43,6 +43,7 @@ from ..mavlink.retries import GIMBAL_MESSAGE, Retries
 from ..payload.arbitration import Cause, HolderChanged
 from ..payload.command_sources import Sources, SourceSettings
 from ..payload.confirmed_command import Done, Result
+from ..payload.device_events import DeviceConnected, DeviceDisconnected, DeviceHeld
 from ..payload.device_property import answer, Caller, Desired, Outcome, Property
 from ..payload.liveness import Liveness
 from ..payload.messages import GeoPoint, GimbalDeviceAttitudeStatus
@@ -239,12 +240,13 @@ class Gimbal:
         if self._connected is bool(reason):
             self._connected = not reason
             if reason:
-                self._emit(events.GimbalLost(self.key, reason))
+                self._emit(DeviceDisconnected(self.key, reason))
             else:
                 self._link_problem = ''
                 self._control.take_due = self._settings.auto_take_control
                 self._device.connected()
-                self._emit(events.GimbalConnected(self.key, self._manager.address))
+                self._emit(DeviceConnected(
+                    self.key, f'manager {self._manager.address}'))
         control = self._manager.known_control(now)
         if control == self._control.known:
             return
@@ -472,7 +474,7 @@ class Gimbal:
             return
         if change.cause is not Cause.CLAIM:
             self._end_commands(f'held by {change.after or "no source"}', now)
-        self._emit(events.GimbalHeld(self.key, change))
+        self._emit(DeviceHeld(self.key, change))
 
     def _end_commands(self, message: str, now: float) -> None:
         self._setpoints.end(now)

@@ -21,7 +21,7 @@ import functools
 import itertools
 
 from .commands import SWITCHES
-from .events import LightEvent, LightForgotten, LightFound
+from .events import LightEvent
 from .light import Light, Settings
 from .messages import IlluminatorStatus
 from .model import Status
@@ -77,9 +77,8 @@ class IlluminatorClient(Payload):
         # Takes the results of the OFF at the end of the process.
         self._report_off: Callable[[Light, Result, float], None] | None = None
         self.discovery = Discovery[Address, Light](
-            found=self._found, forgotten=lambda one: self.events.emit(LightForgotten(one)),
-            dropped=lambda one, now: commands.end_all(now, CommandStatus.CANCELLED, one),
-            wanted=wanted)
+            self.events.emit, found=self._found, wanted=wanted,
+            dropped=lambda one, now: commands.end_all(now, CommandStatus.CANCELLED, one))
         self.lights: Mapping[Address, Light] = self.discovery.devices
         self.messages = (Heartbeat, IlluminatorStatus, ComponentInformationBasic, CommandAck,
                          *(self.mounts.messages if needs_mounts else ()))
@@ -103,7 +102,6 @@ class IlluminatorClient(Payload):
         return Light(address, self._commands, self.settings, emit)
 
     def _found(self, light: Light, now: float) -> None:
-        self.events.emit(LightFound(light.address))
         for event in light.snapshot(now).events():
             self.events.emit(event)
         light.announce(now)

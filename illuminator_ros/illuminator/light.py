@@ -34,6 +34,7 @@ from ..mavlink.messages import Address
 from ..payload.arbitration import Cause, HolderChanged
 from ..payload.command_sources import DEFAULT, SourceSettings
 from ..payload.confirmed_command import Done, FENCE, Result, Target
+from ..payload.device_events import DeviceConnected, DeviceDisconnected, DeviceHeld
 from ..payload.device_property import answer, Caller, Outcome
 from ..payload.identity import Identity
 from ..payload.liveness import Liveness
@@ -103,7 +104,7 @@ class Light:
         if self.liveness.hear(now):
             self._configuration.found(now)
             self._queries.begin(now)
-            self._emit(events.LightConnected(self.address))
+            self._emit(DeviceConnected(self.address))
             self._update(now)
 
     def announce(self, now: float) -> None:
@@ -164,7 +165,7 @@ class Light:
             self._order.lost()
             self._changing = ChangingStates()
             self._queries.end()
-            self._emit(events.LightLost(self.address, reason))
+            self._emit(DeviceDisconnected(self.address, reason))
             message = self.unreachable(now)
             self._switch.cancel(message, now)
             self._configuration.lost(message, now)
@@ -414,7 +415,7 @@ class Light:
         """Take a change of the source that holds the light."""
         if change is None:
             return
-        self._emit(events.LightHeld(self.address, change))
+        self._emit(DeviceHeld(self.address, change))
         if change.after is None:
             if self._settings.off_on_release and not self._is_known_off(now):
                 self._switch.require_off(f'on_release: {change.before} no longer holds it')

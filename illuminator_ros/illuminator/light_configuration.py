@@ -373,7 +373,7 @@ class LightConfiguration:
 
     @property
     def _address(self) -> Address:
-        return self.exceeded.address
+        return self.exceeded.key
 
     @property
     def strobe_range(self) -> StrobeRange:

@@ -26,6 +26,8 @@ from collections.abc import Callable, Hashable, Iterator
 import math
 from typing import Generic, Protocol, TypeVar
 
+from .device_events import DeviceEvent, DeviceForgotten, DeviceFound
+
 # Devices of one kind; one more is ignored, so that memory is bounded.
 MAX_DEVICES = 128
 # Candidates; one more replaces the oldest, if that has had CANDIDATE_TIME, s, to answer.
@@ -63,8 +65,9 @@ class Discovery(Generic[K, D]):
     """
     The devices of one kind on a link, by keys such as their addresses.
 
-    :param found: called when a device is announced.
-    :param forgotten: called when an announced device was dropped.
+    :param emit: takes :class:`DeviceFound` when a device is announced, and
+        :class:`DeviceForgotten` when it was dropped.
+    :param found: called when a device was announced.
     :param dropped: called when a device or a candidate was dropped.
     :param wanted: returns whether a device is of interest; others are ignored.
     :param limit: returns how many devices are announced at most, that one included.
@@ -75,8 +78,8 @@ class Discovery(Generic[K, D]):
     """
 
     def __init__(
-        self, *, found: Callable[[D, float], None] = lambda device, now: None,
-        forgotten: Callable[[K], None] = lambda key: None,
+        self, emit: Callable[[DeviceEvent[K]], None] = lambda event: None, *,
+        found: Callable[[D, float], None] = lambda device, now: None,
         dropped: Callable[[K, float], None] = lambda key, now: None,
         wanted: Callable[[K], bool] = lambda key: True,
         limit: Callable[[K], int] = lambda key: MAX_DEVICES,
@@ -85,8 +88,8 @@ class Discovery(Generic[K, D]):
         self.candidates: dict[K, D] = {}
         self.ignored: dict[K, None] = {}
         self.limit_reached = False
+        self._emit = emit
         self._found = found
-        self._forgotten = forgotten
         self._dropped = dropped
         self._wanted = wanted
         self._limit = limit
@@ -143,6 +146,7 @@ class Discovery(Generic[K, D]):
         if key in self.candidates and len(self.devices) < self._limit(key):
             del self._found_at[key]
             device = self.devices[key] = self.candidates.pop(key)
+            self._emit(DeviceFound(key))
             self._found(device, now)
 
     def _drop(self, key: K, now: float) -> None:
@@ -152,7 +156,7 @@ class Discovery(Generic[K, D]):
         self._dropped(key, now)
         if device is not None:
             self.limit_reached = False
-            self._forgotten(key)
+            self._emit(DeviceForgotten(key))
 
     def poll(self, now: float) -> None:
         """Poll the devices that have something to do, and forget silent ones."""

@@ -30,6 +30,7 @@ from ..mavlink.command_sender import CommandSender
 from ..mavlink.component import Payload
 from ..mavlink.dialect import mavlink
 from ..mavlink.messages import Address, Heartbeat, Message
+from ..payload.device_events import DeviceConnected, DeviceDisconnected, DeviceEvent
 from ..payload.listeners import Listeners
 from ..payload.liveness import Liveness
 from ..payload.messages import Attitude, GlobalPositionInt, SystemTime
@@ -44,28 +45,13 @@ RECENT_REPORTS = 8
 
 
 @dataclass(frozen=True)
-class CameraConnected:
-    """The camera's heartbeat is heard."""
-
-    address: Address
-
-
-@dataclass(frozen=True)
-class CameraLost:
-    """The camera's heartbeat has stopped, or the link is closed."""
-
-    address: Address
-    reason: str
-
-
-@dataclass(frozen=True)
 class ImageTaken:
     """The camera reported an image, which any component may have requested."""
 
     feedback: rededge.CameraFeedback
 
 
-CameraEvent = CameraConnected | CameraLost | ImageTaken
+CameraEvent = DeviceEvent[Address] | ImageTaken
 
 
 @dataclass(frozen=True)
@@ -176,14 +162,14 @@ class RedEdgeClient(Payload):
             return
         self._address = source
         if self._liveness.hear(now):
-            self.events.emit(CameraConnected(source))
+            self.events.emit(DeviceConnected(source))
 
     def _lose(self, reason: str, now: float) -> None:
         if self._liveness.lose(now):
             self._heartbeats.clear()
             self._captures.forget_count()
             self._reports.clear()
-            self.events.emit(CameraLost(self.target, reason))
+            self.events.emit(DeviceDisconnected(self.target, reason))
 
     def _loss(self, now: float) -> str:
         return self._liveness.loss(f'camera {self._address}', now) if self._address else ''

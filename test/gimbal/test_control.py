@@ -25,7 +25,6 @@ from illuminator_ros.gimbal.events import (
     AutomaticTakeFailed,
     ControlChanged,
     GimbalKey,
-    GimbalLost,
 )
 from illuminator_ros.gimbal.gimbal import Gimbal
 from illuminator_ros.gimbal.messages import (
@@ -38,6 +37,7 @@ from illuminator_ros.gimbal.setpoint_stream import REPEATS
 from illuminator_ros.mavlink import messages as mav
 from illuminator_ros.mavlink.dialect import mavlink, short_names
 from illuminator_ros.payload.confirmed_command import Done
+from illuminator_ros.payload.device_events import DeviceDisconnected
 from illuminator_ros.payload.messages import GeoPoint
 from illuminator_ros.payload.mount_attitude import STILL, YawFrame
 from illuminator_ros.payload.rotation import Quaternion
@@ -305,7 +305,7 @@ def test_control_is_known_of_a_manager_that_sends_its_status_on_request_only(bea
     rig = Rig(FakeManager(primary=OURS, streams=False, beat=beat)).run(60.0)
 
     assert [event.ours for event in rig.all_of(ControlChanged)] == [True]
-    assert rig.all_of(GimbalLost) == []
+    assert rig.all_of(DeviceDisconnected) == []
     assert status_requests(rig) <= 25
     rig.managers[0].primary = OTHER
     rig.run(3.2)

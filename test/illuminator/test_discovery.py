@@ -22,6 +22,7 @@ from illuminator_ros.illuminator import events
 from illuminator_ros.illuminator.light import Settings
 from illuminator_ros.mavlink import messages as mav
 from illuminator_ros.mavlink.dialect import mavlink
+from illuminator_ros.payload.device_events import DeviceConnected, DeviceForgotten, DeviceFound
 from illuminator_ros.payload.discovery import CANDIDATE_TIME, MAX_CANDIDATES, MAX_DEVICES
 import pytest
 from support.back_to_back import BRIDGE, Pair
@@ -64,7 +65,7 @@ def test_a_light_is_found_by_its_messages_at_any_address(
         client.receive(source, message, 0.0)
     assert list(client.lights) == [source]
     assert client.lights[source].connected
-    assert client.heard[:2] == [events.LightFound(source), events.LightConnected(source)]
+    assert client.heard[:2] == [DeviceFound(source), DeviceConnected(source)]
 
 
 @pytest.mark.parametrize('message', [
@@ -144,8 +145,8 @@ def test_silent_lights_that_were_never_commanded_give_their_places_to_others(
     client.run(70.0)
     client.receive(LIGHT, status_message(), 70.0)
     assert list(client.lights) == [FORGED[0], LIGHT]
-    forgotten = [event.address for event in client.heard
-                 if isinstance(event, events.LightForgotten)]
+    forgotten = [event.key for event in client.heard
+                 if isinstance(event, DeviceForgotten)]
     assert sorted(forgotten) == FORGED[1:MAX_DEVICES]
     assert [light.address for light in client.lights_by_address] == [LIGHT, FORGED[0]]
 

@@ -24,7 +24,6 @@ from illuminator_ros.illuminator.events import (
     AutomaticSwitch,
     DesiredStateFailed,
     LightEvent,
-    LightHeld,
     LightSwitched,
     SetpointFailed,
 )
@@ -38,6 +37,7 @@ from illuminator_ros.mavlink.dialect import mavlink
 from illuminator_ros.mavlink.messages import Address, CommandAck
 from illuminator_ros.payload.command_sources import SourceSettings
 from illuminator_ros.payload.confirmed_command import Result
+from illuminator_ros.payload.device_events import DeviceHeld
 import pytest
 from support.back_to_back import BRIDGE, Pair
 from support.fake_light import FakeLight
@@ -49,7 +49,7 @@ ENDING = 'the bridge is ending'
 # s that the bridge waits for the lights.
 LIMIT = 0.6
 # Events of changes that the bridge makes, or fails to make.
-ACTIONS = (AutomaticSwitch, DesiredStateFailed, LightHeld, LightSwitched, SetpointFailed)
+ACTIONS = (AutomaticSwitch, DesiredStateFailed, DeviceHeld, LightSwitched, SetpointFailed)
 SOURCES = ('safety', 'default', 'autonomy')
 LATE = Address(1, 250)
 

@@ -22,8 +22,7 @@ from illuminator_ros.illuminator.simulated import SimulatedIlluminator
 from illuminator_ros.illuminator.simulated_properties import IlluminatorProperties
 from illuminator_ros.mavlink.messages import Address
 from illuminator_ros.payload.simulated import SimulatedComponents
-from payloads.winch import SIMULATED, SimulatedWinch, WINCH
-from payloads.winch_checks import CHECKS
+from payloads.winch import CHECKS, SIMULATED, SimulatedWinch, WINCH
 import pytest
 from support.checks_run import ChecksRun
 from support.virtual_link import START

@@ -21,14 +21,10 @@ from typing import Any
 from illuminator_ros.mavlink.command_sender import CommandSender
 from illuminator_ros.mavlink.component import Component
 from illuminator_ros.mavlink.messages import Address, Heartbeat, heartbeat, Message
+from illuminator_ros.payload.device_events import DeviceConnected, DeviceDisconnected
 from illuminator_ros.payload.rotation import Quaternion
 from illuminator_ros.rededge import messages as rededge
-from illuminator_ros.rededge.client import (
-    CameraConnected,
-    CameraLost,
-    ImageTaken,
-    RedEdgeClient,
-)
+from illuminator_ros.rededge.client import ImageTaken, RedEdgeClient
 from illuminator_ros.rededge.input_states import Input, Settings, Stamp
 import pytest
 
@@ -118,14 +114,14 @@ def test_the_camera_is_known_by_its_component_id_alone_re_6_re_7() -> None:
     assert rig.events == []
 
     rig.hear(BEAT)
-    assert rig.events == [CameraConnected(NEW)]
+    assert rig.events == [DeviceConnected(NEW)]
 
 
 def test_a_camera_that_adopts_our_system_id_is_the_same_camera_re_8() -> None:
     rig = Rig()
     rig.hear(BEAT, source=ADOPTED)
     rig.run(3.4)
-    assert rig.events == [CameraConnected(NEW)]
+    assert rig.events == [DeviceConnected(NEW)]
     assert (rig.state.address, rig.state.conflict) == (ADOPTED, False)
     rig.capture()
     control = rig.all(rededge.DigicamControl)[-1]
@@ -148,23 +144,24 @@ def test_a_camera_with_our_system_id_is_kept_beside_those_of_other_vehicles() ->
 def test_a_camera_is_lost_after_3_5_s_and_found_again_re_9() -> None:
     rig = Rig()
     rig.run(3.4)
-    assert rig.events == [CameraConnected(NEW)]
+    assert rig.events == [DeviceConnected(NEW)]
     rig.run(0.2)
-    assert rig.events[1:] == [CameraLost(NEW, 'no heartbeat for 3.50 s')]
+    assert rig.events[1:] == [DeviceDisconnected(NEW, 'no heartbeat for 3.50 s')]
     rig.run(6.4)
     rig.capture()
     assert rig.results == [(False, f'camera {NEW} is lost: no heartbeat for 10.00 s')]
     assert rig.state.loss == rig.results[0][1]
     rig.hear(BEAT)
-    assert rig.events[2:] == [CameraConnected(NEW)]
+    assert rig.events[2:] == [DeviceConnected(NEW)]
 
     rig.component.components_lost([ADOPTED], rig.now, 'unplugged')
     assert rig.events[3:] == []
     rig.component.components_lost([NEW], rig.now, 'unplugged')
-    assert rig.events[3:] == [CameraLost(NEW, 'link lost: unplugged')]
+    assert rig.events[3:] == [DeviceDisconnected(NEW, 'link lost: unplugged')]
     rig.hear(BEAT)
     rig.component.link_closed(rig.now, 'unplugged')
-    assert rig.events[4:] == [CameraConnected(NEW), CameraLost(NEW, 'link lost: unplugged')]
+    assert rig.events[4:] == [
+        DeviceConnected(NEW), DeviceDisconnected(NEW, 'link lost: unplugged')]
 
 
 def test_two_components_with_the_camera_s_id_are_noticed() -> None:

@@ -19,6 +19,7 @@ from types import SimpleNamespace
 from typing import cast
 
 from illuminator_ros.mavlink.retries import RESOURCE
+from illuminator_ros.payload.device_events import DeviceForgotten
 from illuminator_ros.ros import node_manager, throttled_log
 from illuminator_ros.ros.device_nodes import DeviceNodes
 from illuminator_ros.ros.diagnostics_publisher import DiagnosticsSource
@@ -129,6 +130,9 @@ class Served:
         self.source = DiagnosticsSource(
             node.get_fully_qualified_name(), lambda now: lambda link: ())
 
+    def take(self, event: object) -> None:
+        """Publish nothing."""
+
     def release(self) -> None:
         """Serve no device."""
 
@@ -147,7 +151,7 @@ def test_device_found_again_while_its_node_is_made_has_one_node_and_one_diagnost
     def make(node: Node, log: NodeLog) -> Served:
         made.append(Served(node))
         if len(made) == 1:
-            nodes.forget(7)
+            nodes.take(DeviceForgotten(7))
             nodes.serve(7, 'further')
         return made[-1]
 

@@ -31,7 +31,7 @@ from .session import FORWARD, GIMBAL, GimbalSession, NAN, Pose, PROPOSAL, STEP, 
 from .. import messages as gimbal
 from ..axes import LEVEL
 from ...mavlink.dialect import mavlink
-from ...mavlink.messages import Address, CommandLong, Heartbeat, heartbeat, Message, target_of
+from ...mavlink.messages import Address, CommandLong, heartbeat, Message, target_of
 from ...payload.checks import component_requirements as component
 from ...payload.checks.outcomes import Failed, Skipped
 from ...payload.checks.requirement import Option, PayloadChecks, Requirement, requirement
@@ -59,6 +59,7 @@ class DeviceSession(GimbalSession):
     """
 
     messages = (*Session.messages, INFORMATION, AttitudeStatus)
+    mav_type = mavlink.MAV_TYPE_GIMBAL
     information = INFORMATION
     status = AttitudeStatus
 
@@ -71,7 +72,7 @@ class DeviceSession(GimbalSession):
         # Gimbal managers send these messages with a gimbal_device_id.
         return (isinstance(message, INFORMATION | AttitudeStatus)
                 and message.gimbal_device_id == 0
-                or isinstance(message, Heartbeat) and message.type == mavlink.MAV_TYPE_GIMBAL)
+                or super().is_device(message))
 
     @property
     def operator(self) -> Address:
