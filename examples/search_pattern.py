@@ -43,7 +43,7 @@ class Search(Node):
 
     def __init__(self) -> None:
         super().__init__('search_pattern')
-        self.in_control, self.angles = False, Vector3Stamped()
+        self.in_control, self.angles, self.is_stopped = False, Vector3Stamped(), False
         self.setpoint = self.create_publisher(Vector3Stamped, f'{GIMBAL}/cmd/angles', 10)
         self.brightness = self.create_publisher(Float32, f'{LIGHT}/cmd/brightness', 10)
         # Repeated, so that off_after_silence of the bridge ends the light with this program.
@@ -57,20 +57,28 @@ class Search(Node):
     def take_control(self, message: Bool) -> None:
         self.in_control = message.data
 
+    def stop(self, *signal_and_frame: object) -> None:
+        self.is_stopped = True
+
     def call(self, type_: Any, name: str, **request: bool) -> None:
         client = self.create_client(type_, name)
         if not client.wait_for_service(10.0):
             sys.exit(f'{name}: no such service')
-        answer = client.call_async(type_.Request(**request))
-        rclpy.spin_until_future_complete(self, answer, timeout_sec=10.0)
-        result = answer.result()
-        if result is None or not result.success:
+        # The answer to the first call of a client may be lost.
+        for _ in range(3):
+            answer = client.call_async(type_.Request(**request))
+            rclpy.spin_until_future_complete(self, answer, timeout_sec=4.0)
+            if result := answer.result():
+                break
+        if not result or not result.success:
             sys.exit(f'{name} failed: {result.message if result else "no answer"}')
 
     def spin_for(self, seconds: float) -> None:
         end = time.monotonic() + seconds
         while time.monotonic() < end:
             rclpy.spin_once(self, timeout_sec=0.1)
+            if self.is_stopped:
+                sys.exit()
             if not self.in_control:
                 sys.exit('another component has taken the gimbal')
 
@@ -90,19 +98,18 @@ class Search(Node):
 def main() -> None:
     # By default Ctrl-C ends ROS, and the light could not be switched off any more.
     rclpy.init(signal_handler_options=SignalHandlerOptions.NO)
-    signal.signal(signal.SIGTERM, signal.default_int_handler)
     search = Search()
+    for number in (signal.SIGINT, signal.SIGTERM):
+        signal.signal(number, search.stop)
     try:
         search.call(Trigger, f'{GIMBAL}/take_control')
         while not search.in_control:
-            rclpy.spin_once(search, timeout_sec=0.1)
+            rclpy.spin_once(search)
         search.look(*PATTERN[0])
         search.call(SetBool, f'{LIGHT}/enable', data=True)
         for direction in PATTERN:
             search.look(*direction)
             search.spin_for(DWELL)
-    except KeyboardInterrupt:
-        pass
     finally:
         search.call(SetBool, f'{LIGHT}/enable', data=False)
         search.call(Trigger, f'{GIMBAL}/release_control')

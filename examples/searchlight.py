@@ -37,7 +37,7 @@ class Searchlight(Node):
 
     def __init__(self) -> None:
         super().__init__('searchlight')
-        self.wanted, self.reported = BRIGHTNESS, math.inf
+        self.wanted, self.reported, self.is_stopped = BRIGHTNESS, math.inf, False
         self.enable = self.create_client(SetBool, f'{LIGHT}/enable')
         self.setpoint = self.create_publisher(Float32, f'{LIGHT}/cmd/brightness', 10)
         self.create_subscription(Float32, f'{LIGHT}/brightness', self.take_brightness, STATE)
@@ -54,11 +54,22 @@ class Searchlight(Node):
             if node == LIGHT and status.name.endswith(': lamp'):
                 self.wanted = DIMMED if status.level > DiagnosticStatus.OK else BRIGHTNESS
 
+    def stop(self, *signal_and_frame: object) -> None:
+        self.is_stopped = True
+
+    def turn(self) -> None:
+        rclpy.spin_once(self)
+        if self.is_stopped:
+            sys.exit()
+
     def switch(self, on: bool) -> None:
-        answer = self.enable.call_async(SetBool.Request(data=on))
-        rclpy.spin_until_future_complete(self, answer, timeout_sec=5.0)
-        result = answer.result()
-        if result is None or not result.success:
+        # The answer to the first call of a program may be lost.
+        for _ in range(3):
+            answer = self.enable.call_async(SetBool.Request(data=on))
+            rclpy.spin_until_future_complete(self, answer, timeout_sec=4.0)
+            if result := answer.result():
+                break
+        if not result or not result.success:
             reason = result.message if result else 'no answer'
             sys.exit(f'{"on" if on else "off"} failed: {reason}')
 
@@ -66,15 +77,15 @@ class Searchlight(Node):
 def main() -> None:
     # By default Ctrl-C ends ROS, and the light could not be switched off any more.
     rclpy.init(signal_handler_options=SignalHandlerOptions.NO)
-    signal.signal(signal.SIGTERM, signal.default_int_handler)
     light = Searchlight()
+    for number in (signal.SIGINT, signal.SIGTERM):
+        signal.signal(number, light.stop)
     try:
         while light.reported > BRIGHTNESS + 0.5:
-            rclpy.spin_once(light)
+            light.turn()
         light.switch(True)
-        rclpy.spin(light)
-    except KeyboardInterrupt:
-        pass
+        while True:
+            light.turn()
     finally:
         light.switch(False)
 

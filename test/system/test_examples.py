@@ -122,8 +122,11 @@ def points_to(gimbal: SimulatedManager, down: float, left: float) -> bool:
     return abs(pitch + down) < 2.5 and abs(yaw + left) < 2.5
 
 
-def test_the_search_ends_with_the_light_off_when_the_gimbal_is_taken(
-        own_ros: Ros, tmp_path: Path) -> None:
+@pytest.mark.parametrize(('number', 'outcome'), [
+    (0, (1, 'another component has taken the gimbal\n')), (signal.SIGINT, (0, '')),
+    (signal.SIGTERM, (0, ''))], ids=['the gimbal is taken', 'SIGINT', 'SIGTERM'])
+def test_the_search_ends_with_the_light_off_and_says_why(
+        own_ros: Ros, tmp_path: Path, number: int, outcome: tuple[int, str]) -> None:
     port, light = free_port(), SimulatedIlluminator(IlluminatorProperties())
     gimbal = SimulatedManager(ManagerProperties())
     with (node(own_ros, 'bridge', port, payloads='[illuminator, gimbal]'),
@@ -131,10 +134,13 @@ def test_the_search_ends_with_the_light_off_when_the_gimbal_is_taken(
           ended(example(own_ros, 'search_pattern', tmp_path, DWELL='60.0')) as program):
         eventually(lambda: light.enabled)
 
-        assert own_ros.call(Trigger, '/gimbal/release_control', Trigger.Request()).success
+        if number:
+            program.send(number)
+        else:
+            assert own_ros.call(Trigger, '/gimbal/release_control', Trigger.Request()).success
 
-        assert (program.wait(), light.enabled) == (1, False)
-        assert program.log == 'another component has taken the gimbal\n'
+        assert (program.wait(), program.log) == outcome
+        assert not light.enabled
 
 
 class Camera(SimulatedRedEdge):
