@@ -42,7 +42,7 @@ from ..payload.messages import GimbalDeviceAttitudeStatus
 
 # The most gimbals, so that memory is bounded. The gimbal with the configured id is kept, too.
 MAX_GIMBALS = 32
-# Components that may be managers. A further one replaces one that is silent for FORGET_AFTER.
+# Components that may be managers. A further component replaces a long silent one (FORGET_AFTER).
 MAX_COMPONENTS = 256
 # s of silence after which a component that is heard again may have restarted.
 RETURN_AFTER = 5.0

@@ -661,8 +661,8 @@ class Gimbal:
         if is_known:
             due = min(due, manager.control_deadline())
         if self._connected:
-            due = min(due, manager.liveness.next_deadline(), manager.status_query.due,
-                      self._device.liveness.next_deadline(), self._device.next_deadline())
+            due = min(due, manager.liveness.silent_at, manager.status_query.due,
+                      self._device.liveness.silent_at, self._device.next_deadline())
         return min(due, self._setpoints.next_deadline()) if self.in_control else due
 
     def snapshot(self, now: float) -> events.GimbalSnapshot:

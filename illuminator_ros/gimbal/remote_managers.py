@@ -200,7 +200,7 @@ class RemoteManager:
 
     def control_deadline(self) -> float:
         """Return when :meth:`known_control` returns None without another message, s."""
-        return min(self.liveness.next_deadline(), self.status_at + STATUS_LIMIT)
+        return min(self.liveness.silent_at, self.status_at + STATUS_LIMIT)
 
     def lack_of_status(self, now: float) -> str:
         """Return that its status is missing, for people."""

@@ -218,7 +218,7 @@ class Light:
 
     def unreachable(self, now: float) -> str:
         """Return why requests cannot reach the light, for people; '' if they can."""
-        return self.liveness.loss(f'light {self.address}', now)
+        return '' if self.connected else self.liveness.loss(f'light {self.address}', now)
 
     def snapshot(self, now: float) -> events.LightSnapshot:
         """Return the state, for any thread."""
@@ -516,7 +516,7 @@ class Light:
 
     def poll(self, now: float) -> None:
         """Do what is due."""
-        if now >= self.liveness.next_deadline():
+        if now >= self.liveness.silent_at:
             self.lose(self.liveness.silence(now), now)
         if now >= self._changing.until:
             self._changing = ChangingStates()
@@ -535,7 +535,7 @@ class Light:
             due = min(due, self._sources.next_deadline())
         if self.connected:
             due = min(due, self._switch.next_deadline(), self._configuration.next_deadline(),
-                      self._changing.until, self.liveness.next_deadline())
+                      self._changing.until, self.liveness.silent_at)
         return due
 
 

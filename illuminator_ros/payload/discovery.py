@@ -161,7 +161,7 @@ class Discovery(Generic[K, D]):
     def poll(self, now: float) -> None:
         """Poll the devices that have something to do, and forget silent ones."""
         for key, device in [*self.devices.items(), *self.candidates.items()]:
-            if now >= _forgotten_at(device):
+            if not device.was_commanded and now >= device.lost_at + FORGET_AFTER:
                 self._drop(key, now)
             elif now >= device.next_deadline():
                 device.poll(now)
@@ -171,9 +171,6 @@ class Discovery(Generic[K, D]):
         due = math.inf
         for devices in (self.devices, self.candidates):
             for device in devices.values():
-                due = min(due, device.next_deadline(), _forgotten_at(device))
+                due = min(due, device.next_deadline(), math.inf if device.was_commanded else
+                          device.lost_at + FORGET_AFTER)
         return due
-
-
-def _forgotten_at(device: Device) -> float:
-    return math.inf if device.was_commanded else device.lost_at + FORGET_AFTER

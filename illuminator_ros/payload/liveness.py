@@ -30,42 +30,39 @@ class Liveness:
     :ivar connected: whether it was heard, and :meth:`lose` was not called since.
     :ivar heard_at: the time of the last message; -inf before the first.
     :ivar lost_at: when the device was lost; infinity while it is connected.
+    :ivar silent_at: when a connected device is silent; infinity for others.
     """
 
     def __init__(self, timeout: float, link_failure: str = '') -> None:
         self.link_failure = link_failure
         self.connected = False
         self.heard_at = -math.inf
-        self.lost_at = math.inf
+        self.lost_at = self.silent_at = math.inf
         self._timeout = timeout
 
     def is_heard(self, now: float) -> bool:
         """Return whether it is connected and not silent."""
-        return self.connected and now < self.next_deadline()
+        return self.connected and now < self.silent_at
 
     def hear(self, now: float) -> bool:
         """Take a message; return whether the device is connected by it."""
         was_connected = self.connected
-        self.connected, self.heard_at, self.lost_at = True, now, math.inf
+        self.connected, self.heard_at = True, now
+        self.lost_at, self.silent_at = math.inf, now + self._timeout
         return not was_connected
 
     def lose(self, now: float) -> bool:
         """Note the loss; return whether the device was connected."""
         was_connected = self.connected
         if was_connected:
-            self.connected, self.lost_at = False, now
+            self.connected, self.lost_at, self.silent_at = False, now, math.inf
         return was_connected
-
-    def next_deadline(self) -> float:
-        """Return when a connected device is silent, infinity for others."""
-        return self.heard_at + self._timeout if self.connected else math.inf
 
     def silence(self, now: float) -> str:
         """Return for how long it was not heard, for people."""
         return f'no heartbeat for {format_seconds(now - self.heard_at)}'
 
     def loss(self, name: str, now: float) -> str:
-        """Return that it is lost and why, for people; '' if it is connected."""
+        """Return that a device of this name is lost and why, for people."""
         # Without a link no heartbeat can be heard, so the failure of the link is the reason.
-        return '' if self.connected else (
-            f'{name} is lost: {self.link_failure or self.silence(now)}')
+        return f'{name} is lost: {self.link_failure or self.silence(now)}'

@@ -172,7 +172,9 @@ class RedEdgeClient(Payload):
             self.events.emit(DeviceDisconnected(self.target, reason))
 
     def _loss(self, now: float) -> str:
-        return self._liveness.loss(f'camera {self._address}', now) if self._address else ''
+        if self._liveness.connected or self._address is None:
+            return ''
+        return self._liveness.loss(f'camera {self._address}', now)
 
     # Requests, and messages of the camera
 
@@ -215,7 +217,7 @@ class RedEdgeClient(Payload):
 
     def poll(self, now: float) -> None:
         """See :meth:`Payload.poll`."""
-        if now >= self._liveness.next_deadline():
+        if now >= self._liveness.silent_at:
             self._lose(self._liveness.silence(now), now)
         if not self._liveness.link_failure:
             self._pings.poll(now)
@@ -224,6 +226,6 @@ class RedEdgeClient(Payload):
 
     def next_deadline(self) -> float:
         """See :meth:`Payload.next_deadline`."""
-        due = min(self._liveness.next_deadline(), self._captures.next_deadline(),
+        due = min(self._liveness.silent_at, self._captures.next_deadline(),
                   self.feeder.orientation.next_deadline())
         return due if self._liveness.link_failure else min(due, self._pings.next_deadline())

@@ -32,14 +32,13 @@ def publish_event(
 
     :param kind: a noun for the device, such as ``light``.
     """
-    name = f'{kind} {event.key}'
     match event:
         case DeviceConnected(note=note):
-            log.info(f'{name} connected{note and ", "}{note}', 'connection')
+            log.info(f'{kind} {event.key} connected{note and ", "}{note}', 'connection')
             interface.publish('connected', True)
         case DeviceDisconnected(reason=reason):
-            log.warning(f'{name} lost: {reason}', 'connection')
+            log.warning(f'{kind} {event.key} lost: {reason}', 'connection')
             interface.publish('connected', False)
         case DeviceHeld(change=change):
-            log.info(f'{name} {describe(change)}', 'holder')
+            log.info(f'{kind} {event.key} {describe(change)}', 'holder')
             interface.publish('source', change.after or '')

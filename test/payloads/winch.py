@@ -107,13 +107,13 @@ class Winch:
             answer(outcome.callers, outcome.result, now)
 
     def poll(self, now: float) -> None:
-        if now >= self.liveness.next_deadline():
+        if now >= self.liveness.silent_at:
             self.liveness.lose(now)
         self._length.poll(now)
         self._answer(now)
 
     def next_deadline(self) -> float:
-        return min(self.liveness.next_deadline(), self._length.next_deadline())
+        return min(self.liveness.silent_at, self._length.next_deadline())
 
 
 class WinchClient(Payload):
