@@ -178,6 +178,7 @@ class Terms(NamedTuple):
     :param fence: the time before which frames of other commands may be under way.
     :param is_sole_cause: whether none of these can have caused a status that shows the change.
     :param insists: whether it goes on until a status shows the change: no refusal ends it.
+    :param is_awaited: whether a call waits for the result.
     :param is_last: whether the process ends: within the fence a status counts after
         :data:`ENOUGH_TRIES`.
     """
@@ -188,6 +189,7 @@ class Terms(NamedTuple):
     is_sole_cause: bool = False
     insists: bool = False
     is_last: bool = False
+    is_awaited: bool = False
 
 
 class ConfirmedCommand(Generic[S]):
@@ -283,9 +285,11 @@ class ConfirmedCommand(Generic[S]):
 
     def _answered(self, answer: CommandResult, now: float) -> None:
         if answer.status is CommandStatus.ANSWERED:
-            self._acknowledged += 1
-            # Within the fence it may be the answer to an earlier command.
-            if now < self.terms.fence or self._answer is not None and not self.terms.insists:
+            # Within the fence it may be the answer to an earlier command. It counts where no call
+            # waits for the result: one lost answer would otherwise slow down a stream for ever.
+            is_fenced = now < self.terms.fence
+            self._acknowledged += not (is_fenced and self.terms.is_awaited)
+            if is_fenced or self._answer is not None and not self.terms.insists:
                 return
             if self._answer is None:
                 self._ends_at = now + CONFIRMATION_TIMEOUT

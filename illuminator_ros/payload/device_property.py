@@ -172,7 +172,8 @@ class Property(Generic[S]):
         self._under_way = {value: end for value, end in self._under_way.items() if now < end}
         self.desired, self._callers, self.sent_at = desired, callers, now
         terms = Terms(asked_at, asked_at + desired.limit, self.fence,
-                      self._is_sole_cause(desired), desired.insists, desired.is_last)
+                      self._is_sole_cause(desired), desired.insists, desired.is_last,
+                      is_awaited=not all(one.is_stream for one in callers))
         self.command = ConfirmedCommand(
             self._target, desired.change, now, terms, gap=self._gap)
 

@@ -220,6 +220,19 @@ def test_the_fence_ends_1_5_s_after_the_last_frame_of_a_command_without_an_ackno
     assert took == pytest.approx(seconds, abs=ROUND_TRIP + 0.001)
 
 
+def test_acknowledgements_within_the_fence_do_not_count_as_those_of_the_command() -> None:
+    # They may answer the command before, and tries of this one are still under way.
+    bench = PropertyBench(0, None, None, None, None, ACCEPTED).report()
+    assert not bench.ended(3)[0]
+    bench.report(0)
+    assert bench.ended(4)[0]
+    last_sent = bench.tries[-1]
+
+    success, took = bench.ended(3)
+    assert success
+    assert took == pytest.approx(last_sent + FENCE - (bench.now - took), abs=ROUND_TRIP + 0.001)
+
+
 def test_values_from_before_the_fence_are_forgotten_after_it() -> None:
     bench = PropertyBench().report()
     bench.want(3)
