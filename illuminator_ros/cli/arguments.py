@@ -19,6 +19,7 @@ from __future__ import annotations
 import argparse
 from collections.abc import Callable, Sequence
 from pathlib import Path
+import shutil
 import sys
 from typing import NoReturn, TYPE_CHECKING, TypeVar
 
@@ -69,7 +70,12 @@ def invocation(name: str) -> str:
     """Return the command that starts a program in the way in which this process was started."""
     started = Path(sys.argv[0])
     if started.suffix == '.py':
-        return f'python3 -m illuminator_ros.{name}'
+        python = Path(sys.executable)
+        if python.is_relative_to(Path.cwd()):
+            python = python.relative_to(Path.cwd())
+        elif shutil.which('python3') == sys.executable:
+            python = Path('python3')
+        return f'{python} -m illuminator_ros.{name}'
     # colcon installs the executables of a package, which may be another one, in lib/PACKAGE.
     return (f'ros2 run {started.parent.name} {started.name}'
             if started.parent.parent.name == 'lib' else started.name)

@@ -33,7 +33,7 @@ from ..mavlink.dialect import mavlink
 from ..mavlink.messages import Address
 from ..payload.arbitration import Cause, HolderChanged
 from ..payload.command_sources import DEFAULT, SourceSettings
-from ..payload.confirmed_command import Done, FENCE, Result, Target
+from ..payload.confirmed_command import Done, Result, Target
 from ..payload.device_events import DeviceConnected, DeviceDisconnected, DeviceHeld
 from ..payload.device_property import answer, Caller, Outcome
 from ..payload.identity import Identity
@@ -348,21 +348,27 @@ class Light:
         elif is_off and not held:
             # An OFF ends the ON that is remembered, though it may fail.
             sources.forget_switch(source)
-        if is_off and not (held or self.connected):
-            self._send_unheard_off()
-            # Its answer does not explain a later ON.
-            self._switch.changes.fence_until(now + FENCE)
+        sent = is_off and not held and self._send_unheard_off()
+        if sent:
+            self._switch.changes.note_sent(OFF, now)
         if refusal := late or held or self.unreachable(now):
+            refusal += '; an OFF was sent once' if sent else ''
             caller.done(Result(False, refusal), now)
             return False
         if not caller.is_stream:
             self._begin_call(source, now)
         return True
 
-    def _send_unheard_off(self) -> None:
-        """Send an OFF once to a light that is lost: it may hear though it is not heard."""
-        if not self.liveness.link_failure:
+    def _send_unheard_off(self) -> bool:
+        """
+        Send an OFF once to a light that is lost: it may hear though it is not heard.
+
+        :return: whether it was sent.
+        """
+        is_sent = not (self.connected or self.liveness.link_failure)
+        if is_sent:
             self._commands.send_once(Command(self.address, OFF.command, OFF.params))
+        return is_sent
 
     def _begin_call(self, source: str, now: float) -> None:
         self._take_over(source, now)

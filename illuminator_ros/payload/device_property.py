@@ -196,6 +196,11 @@ class Property(Generic[S]):
         """Count nothing before a time: other commands that may set the property are under way."""
         self.fence = max(self.fence, fence)
 
+    def note_sent(self, change: Change[S], now: float) -> None:
+        """Note that a change was sent without a command that awaits its effect."""
+        self._unconfirmed, self.sent_at = change, now
+        self.fence_until(now + FENCE)
+
     def cancel(self, message: str, now: float, *, superseded: bool = False) -> None:
         """Give up the desired value, and send its command no more."""
         if self.command is not None:

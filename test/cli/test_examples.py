@@ -15,8 +15,10 @@
 """The examples in the help of simulator, conformance and discover."""
 
 from collections.abc import Callable
+from pathlib import Path
 import re
 import shlex
+import shutil
 import sys
 
 from illuminator_ros.cli.conformance import run as conformance
@@ -29,7 +31,16 @@ STARTED = [
     ('/opt/ws/install/lib/illuminator_ros/{}', 'ros2 run illuminator_ros {}'),
     ('/opt/ws/install/my_winch/lib/my_winch/{}', 'ros2 run my_winch {}'),
     ('/home/me/venv/bin/illuminator-{}', 'illuminator-{}'),
-    ('/home/me/src/illuminator_ros/{}.py', 'python3 -m illuminator_ros.{}')]
+    ('/home/me/src/illuminator_ros/{}.py', 'python3 -m illuminator_ros.{}'),
+    ('/home/me/venv/lib/illuminator_ros/{}.py', '.venv/bin/python -m illuminator_ros.{}')]
+
+
+@pytest.fixture(autouse=True)
+def interpreter(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Run by the interpreter that the command names."""
+    command = request.getfixturevalue('command')
+    python = '.venv/bin/python' if command.startswith('.venv') else shutil.which('python3')
+    monkeypatch.setattr(sys, 'executable', str(Path.cwd() / str(python)))
 
 
 def examples(text: str) -> list[str]:

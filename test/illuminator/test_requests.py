@@ -22,6 +22,7 @@ import re
 from typing import Any
 
 from illuminator_ros.illuminator.client import enable_all
+from illuminator_ros.illuminator.events import LATE_EFFECT, LightSwitched
 from illuminator_ros.illuminator.messages import STATUS_ID
 from illuminator_ros.illuminator.simulated_properties import IlluminatorProperties
 from illuminator_ros.mavlink import messages as mav
@@ -164,8 +165,24 @@ def test_requests_to_a_lost_light_fail_at_once_with_the_reason(
     assert len(faked.commands()) == sent
     # It may hear an OFF though it is not heard.
     answer = faked.ask_enable(False)
-    assert answer.result.message == f'light 1/243 is lost: {reason}'
+    assert answer.result.message == f'light 1/243 is lost: {reason}' + (
+        '' if is_closed else '; an OFF was sent once')
     assert [one.param1 for one in faked.commands()[sent:]] == [0.0] * (not is_closed)
+
+
+def test_an_off_that_was_sent_to_a_lost_light_is_no_switch_of_another_sender(
+    fake: FakeLight, faked: Pair,
+) -> None:
+    assert faked.enable(True).success
+    fake.silent = True
+    faked.run(10.0)
+    faked.ask_enable(False)
+    fake.silent = False
+    fake.fields['enable'] = 0
+    faked.run(3.0)
+
+    assert [one.origin for one in faked.recorder.others
+            if isinstance(one, LightSwitched)][1:] == [LATE_EFFECT]
 
 
 def test_after_a_stop_of_the_process_a_request_that_may_be_old_is_refused_but_not_an_off(
