@@ -176,3 +176,12 @@ def test_failure_is_one_line_with_status_1(own_ros: Ros, redirection: str, error
 
     assert (outcome.returncode, outcome.stdout, outcome.stderr) == (
         1, '', error.format(domain=own_ros.domain))
+
+
+@pytest.mark.parametrize('name', ['a b', '/bow', 'cmd', ''])
+def test_source_that_cannot_be_is_refused_in_one_line_with_status_2(name: str) -> None:
+    outcome = run(MONITOR, '--source', name)
+
+    assert (outcome.returncode, outcome.stdout, outcome.stderr) == (
+        2, '', f'monitor: argument --source: {name!r} is not a valid name of a source; '
+               'see monitor --help\n')

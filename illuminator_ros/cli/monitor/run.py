@@ -35,6 +35,7 @@ from .table import as_json, plain
 from .. import entry_point
 from ..arguments import option, Parser
 from ..termination import Termination
+from ...payload.command_sources import source_name
 from ...payload.payload_type import PayloadType
 from ...ros.monitor_view import Device, LOST, NOT_KNOWN
 
@@ -72,7 +73,7 @@ def address(text: str) -> tuple[str, int]:
 def parser() -> argparse.ArgumentParser:
     """Return the parser of the command line."""
     made = Parser('monitor', DESCRIPTION, EPILOG)
-    made.add_argument('--source', default='', metavar='NAME',
+    made.add_argument('--source', type=option(source_name), metavar='NAME',
                       help='source of commands to use for devices that have sources')
     made.add_argument('--web', type=option(address), nargs='?', const=address(DEFAULT_WEB),
                       metavar='HOST:PORT', help=f'serve a browser (default: {DEFAULT_WEB})')
@@ -110,7 +111,7 @@ def run(
         node = Node(f'illuminator_monitor_{uuid.uuid4().hex[:8]}', enable_rosout=False,
                     start_parameter_services=False)
     views = [one.load('view') for one in payloads.values() if one.view]
-    graph = Graph(node, views, options.source, may_request=not options.look)
+    graph = Graph(node, views, options.source or '', may_request=not options.look)
     is_terminal = os.environ.get('TERM', 'dumb') not in ('dumb', 'unknown') and all(
         stream is not None and stream.isatty() for stream in (sys.stdin, sys.stdout))
     try:
