@@ -18,7 +18,7 @@ from __future__ import annotations
 
 import math
 
-from illuminator_ros.ros.monitor_view import Column, Device, Key, measured, Request, Topic, View
+from illuminator_ros.ros.monitor_view import Device, Key, measured, Request, Topic, View
 from std_msgs.msg import Float32
 
 
@@ -37,6 +37,6 @@ def release(device: Device, typed: str) -> Request | str:
         f'release {metres:g} m', 'cmd/release', Float32, Float32(data=metres))
 
 
-VIEW = View('winch', {'line_length': Topic(Float32)}, ('line_length',), (
-    Column('LINE', 8, length),), lambda device: [('line', [f'{length(device)} released'])], (
-    Key(('p',), 'release line', 'release', release, 'length (m, negative winds in)'),))
+VIEW = View('winch', {'line_length': Topic(Float32)}, ('line_length',), lambda device: [
+    length(device)], lambda device: [('line', [f'{length(device)} released'])], (
+    Key(('p',), 'release line', release, 'length (m, negative winds in)'),))

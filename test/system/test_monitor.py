@@ -138,12 +138,12 @@ def test_bytes_that_are_not_utf_8_do_not_end_the_monitor(own_ros: Ros) -> None:
 
         screen.type(b'\xff\xe4 ')
 
-        def helped() -> bool:
+        def acts() -> bool:
             # Keys that come with such a byte are lost.
-            screen.type('h')
-            return 'this help' in screen.raw
+            screen.type('a')
+            return 'ALL OFF: 0 of 0' in screen.raw
 
-        eventually(helped)
+        eventually(acts)
 
 
 def test_without_a_terminal_monitor_prints_a_table(own_ros: Ros) -> None:
@@ -159,8 +159,8 @@ def test_without_a_terminal_monitor_prints_a_table(own_ros: Ros) -> None:
     [one] = json.loads(loaded.stdout)
     assert (one['name'], one['values']['brightness']) == ('/illuminator', 30.0)
     heading, row = outcome.stdout.splitlines()
-    assert heading.split()[:3] == ['LIGHT', 'STATE', 'BRIGHT']
-    assert row.split()[:4] == ['/illuminator', 'off', '30', '%']
+    assert heading.split() == ['DEVICE', 'STATE', 'LEVEL', 'REPORT']
+    assert row.split()[:5] == ['/illuminator', 'off', 'OK', '30', '%']
     assert (outcome.returncode, outcome.stderr) == (0, '')
     assert (failed.returncode, failed.stderr) == (
         1, 'monitor: standard output: No space left on device\n')

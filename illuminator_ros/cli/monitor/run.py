@@ -44,7 +44,7 @@ SETTLING = 1.0
 DEFAULT_WEB = '127.0.0.1:8000'
 DESCRIPTION = """\
 Shows the lights, gimbals and cameras of all bridges in a ROS graph, in a terminal or a browser,
-with keys and clicks to operate the selected one; ? lists them. If standard input or output is not
+with keys and clicks to operate the selected one. If standard input or output is not
 a terminal, it prints one table and ends.
 """
 EPILOG = """\
@@ -81,7 +81,7 @@ def parser() -> argparse.ArgumentParser:
                       help='admit a browser only by a one-time token: of the printed URLs, one is '
                            'to look only; every address except loopback needs it')
     made.add_argument('--look', action='store_true', help='show devices, and request nothing')
-    made.add_argument('--once', action='store_true', help='print one table and end')
+    made.add_argument('--once', action='store_true', help='print the list and end')
     made.add_argument('--json', action='store_true', help='print all values as JSON and end')
     made.add_argument('--wait', type=float, default=6.0, metavar='S',
                       help='longest search for devices before that table, s (default: 6)')
