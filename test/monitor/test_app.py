@@ -308,6 +308,19 @@ def test_what_is_wrong_above_the_first_visible_row_is_named() -> None:
     show(test, lost, *fine, size=(80, 24))
 
 
+def test_selected_row_stays_visible_when_the_list_gets_shorter() -> None:
+    async def test(screen: Screen) -> None:
+        await screen.press('end')
+        await screen.press('a')
+        for one in screen.graph.devices:
+            one.off = FAILED, 'no answer, trying again'
+        await screen.wait()
+        await screen.wait()
+        assert any(line.startswith(' /l11') for line in screen.lines)
+
+    show(test, *(light(f'/l{number:02}') for number in range(12)), size=(80, 24))
+
+
 def test_80_columns_and_24_rows_show_all_of_twelve_devices_and_the_level_of_the_selected() -> None:
     async def test(screen: Screen) -> None:
         await screen.press('end')
@@ -324,7 +337,7 @@ def test_arrows_move_a_gimbal_only_after_steering_has_begun() -> None:
         assert 'by 5 deg' not in screen.text
         await screen.press('m', 'up', 'left')
         assert 'left by 5 deg' in screen.text
-        await screen.press('escape', 'up', 'end', 'm', 'j')
+        await screen.press('escape', 'up', 'end', 'm', 't', 'j')
         assert screen.graph.asked == [
             ('/gimbal', 'pitch to 23.6 down'), ('/gimbal', 'yaw to 9.3 right')]
         await screen.press('up', 'm', 'up')
@@ -344,7 +357,8 @@ def test_place_is_typed_or_pasted_corrected_and_sent_with_enter() -> None:
     graph = show(test, gimbal())
     assert graph.asked == [('/gimbal', 'point at 47.3 8.5 480')]
     assert graph.devices[0].action is not None
-    assert graph.devices[0].action[2] == "'' is not latitude, longitude and altitude"
+    assert graph.devices[0].action[::2] == (
+        'point at a place', "'' is not latitude, longitude and altitude")
 
 
 def test_each_key_of_the_selected_device_has_a_button_with_its_meaning() -> None:

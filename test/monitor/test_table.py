@@ -111,9 +111,11 @@ def test_report_begins_with_what_is_new_and_ends_with_the_values() -> None:
     one.diagnoses['lamp'] = Diagnosis(1, 'dimmed because it is hot', {'off_in_s': '12.3'})
 
     assert text_of(one).startswith(
-        'on: done; is switched off by off_after_silence: no request for 30 s; off in 12 s '
-        '(o: keep on); dimmed because it is hot; 40 %  41.5 C')
-    one.now = one.heard_at = NOW + NEWS_LIFETIME
+        'on: done; off in 12 s (o: keep on); dimmed because it is hot; 40 %  41.5 C')
+    one.news = one.news[0], NOW + 1
+    assert text_of(one).startswith(
+        'on: done; is switched off by off_after_silence: no request for 30 s; off in 12 s')
+    one.now = one.heard_at = NOW + NEWS_LIFETIME + 1
     assert text_of(one).startswith('off in 12 s (o: keep on); dimmed because it is hot')
     one.values['connected'] = False
     assert text_of(one).startswith('was ON; dimmed')

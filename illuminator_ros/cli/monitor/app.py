@@ -82,13 +82,14 @@ class Question(NamedTuple):
     """
     A question to the operator.
 
+    :param label: of the key.
     :param answer: returns the request for the typed text, or why there is none, for people.
     :param deadline: when it is dropped, s.
     """
 
     text: str
+    label: str
     answer: Callable[[str], Request | str]
-    is_typed: bool
     deadline: float
 
 
@@ -221,7 +222,7 @@ class MonitorApp(App[None], inherit_bindings=False):
                 return is_asking if is_yes else self._mode != NORMAL
             case 'press', (kind, is_steering, _):
                 return view is not None and view.kind == kind and not is_asking and (
-                    self._mode == STEERING or not is_steering)
+                    is_steering is (self._mode == STEERING))
             case 'steer', _:
                 return view is not None and bool(view.steering) and self._mode == NORMAL
             case 'clear', _:
@@ -260,7 +261,7 @@ class MonitorApp(App[None], inherit_bindings=False):
         key = (view.steering if is_steering else view.keys)[number]
         make = functools.partial(key.request, self._selected)
         if key.prompt:
-            self._ask(key.prompt, make, is_typed=True)
+            self._ask(key.prompt, key.text, make, is_typed=True)
         else:
             self._request(key.text, make(''))
 
@@ -268,21 +269,22 @@ class MonitorApp(App[None], inherit_bindings=False):
         """Answer a question, or end to move a gimbal."""
         mode, self._mode = self._mode, NORMAL
         if is_yes and isinstance(mode, Question):
-            self._request(mode.text, mode.answer(self._typed.value), is_confirmed=True)
+            self._request(mode.label, mode.answer(self._typed.value), is_confirmed=True)
 
     def _request(self, label: str, made: Request | str, is_confirmed: bool = False) -> None:
         assert self._selected is not None
         if isinstance(made, str):
             self._selected.note(label, FAILED, made)
         elif made.question and not is_confirmed:
-            self._ask(made.question, lambda _: made)
+            self._ask(made.question, label, lambda _: made)
         else:
             self._selected.submit(made)
 
     def _ask(
-        self, text: str, answer: Callable[[str], Request | str], is_typed: bool = False,
+        self, text: str, label: str, answer: Callable[[str], Request | str],
+        is_typed: bool = False,
     ) -> None:
-        self._mode = Question(text, answer, is_typed, self._graph.clock() + QUESTION_LIFETIME)
+        self._mode = Question(text, label, answer, self._graph.clock() + QUESTION_LIFETIME)
         if is_typed:
             self._typed.value = ''
             self._typed.display = True
@@ -366,7 +368,8 @@ class MonitorApp(App[None], inherit_bindings=False):
                     self._table.update_cell_at(Coordinate(y, x), cell)
         self._devices = list(devices)
         self._table.styles.max_height = len(rows) + 1
-        if self._table.cursor_row != self._at:
+        if (self._shown.get('visible'), self._table.cursor_row) != (self._table.size, self._at):
+            self._shown['visible'] = self._table.size
             self._table.move_cursor(row=self._at)
 
     def _row(self, device: GraphDevice, width: int) -> list[Text]:

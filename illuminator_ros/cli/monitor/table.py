@@ -19,6 +19,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from itertools import groupby
 import json
+import math
 import re
 
 from ...ros import monitor_view as shared
@@ -41,14 +42,16 @@ def level(device: Device) -> list[Cell]:
 def report(device: Device) -> list[Cell]:
     """Return what the row of a device says: the newest first, then what is wrong, then values."""
     parts: list[list[Cell]] = []
+    at = -math.inf
     if device.action is not None:
         text, outcome, answer, at = device.action
         if outcome == shared.PENDING or device.now < at + shared.NEWS_LIFETIME:
             # The details have the answer; a row has what is wrong behind it.
             parts.append([f'{text}: ', outcome, f': {answer}' * (
                 bool(answer) and outcome != shared.DONE)])
-    news, at = device.news
-    if device.now < at + shared.NEWS_LIFETIME:
+    news, noted = device.news
+    # The line of that request itself would hide what is wrong.
+    if device.now < noted + shared.NEWS_LIFETIME and not (parts and noted < at + 1):
         # The row has the name.
         parts.append([re.sub(rf'^{device.view.kind} \d+/\d+:? ', '', news)])
     # The diagnosis of its link is last.
@@ -71,7 +74,7 @@ def details(device: Device) -> Iterable[shared.Line]:
         yield kind, [LEVELS[device.level_of(one)], f': {one.message}', '' if held is None else (
             f'; held by {device.diagnosed(kind, "holder")} for {shared.age(held)}')]
     if notice := device.view.notice(device):
-        yield 'soon', [notice]
+        yield 'note', [notice]
     yield from device.view.details(device)
     if device.now - device.heard_at > 2:
         yield 'silent', [f'nothing heard for {shared.age(device.now - device.heard_at)}']
