@@ -79,6 +79,15 @@ def test_state_is_a_word_and_not_only_a_colour() -> None:
     show(test, light(), gone, light('/lost', connected=False))
 
 
+def test_values_of_a_lost_light_are_dimmed_but_not_its_name_state_and_level() -> None:
+    async def test(screen: Screen) -> None:
+        name, state, level, report = screen.app.query_one(DataTable).get_row_at(0)
+        assert [any('dim' in str(span.style) for span in cell.spans)
+                for cell in (name, state, level, report)] == [False, False, False, True]
+
+    show(test, light(enabled=True, connected=False))
+
+
 def test_poll_before_the_screen_exists_is_shown_on_it() -> None:
     app = MonitorApp(cast(Graph, FakeGraph(light())))
     app.poll()

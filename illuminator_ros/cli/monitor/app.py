@@ -379,6 +379,6 @@ class MonitorApp(App[None], inherit_bindings=False):
             table.state, table.level, table.report))]
         for cell in row:
             cell.no_wrap, cell.overflow = True, 'crop'
-            if device.is_stale:
-                cell.stylize('dim')
+        if device.is_stale:
+            row[-1].stylize('dim')
         return row
