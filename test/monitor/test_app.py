@@ -330,6 +330,17 @@ def test_selected_row_stays_visible_when_the_list_gets_shorter() -> None:
     show(test, *(light(f'/l{number:02}') for number in range(12)), size=(80, 24))
 
 
+def test_selected_row_may_be_scrolled_out_of_the_list() -> None:
+    async def test(screen: Screen) -> None:
+        screen.app.query_one(DataTable).scroll_to(y=10, animate=False, immediate=True)
+        for _ in range(3):
+            await screen.wait()
+        assert 'above: /l00 off WARN' in screen.text
+        assert screen.app.query_one(DataTable).scroll_offset.y == 10
+
+    show(test, *(light(f'/l{number:02}') for number in range(40)), size=(80, 40))
+
+
 def test_80_columns_and_24_rows_show_all_of_twelve_devices_and_the_level_of_the_selected() -> None:
     async def test(screen: Screen) -> None:
         await screen.press('end')

@@ -28,6 +28,7 @@ from textual.app import App, ComposeResult
 from textual.binding import Binding, BindingType
 from textual.containers import Vertical
 from textual.coordinate import Coordinate
+from textual.geometry import Size
 from textual.layout import Layout
 from textual.layouts.grid import GridLayout
 from textual.theme import Theme
@@ -139,6 +140,8 @@ class MonitorApp(App[None], inherit_bindings=False):
         self._mode: str | Question = NORMAL
         self._devices: list[GraphDevice] = []
         self._shown: dict[str, object] = {}
+        # The size of the table with which the selected row was visible.
+        self._visible_with: Size | None = None
         self._table = DataTable[Text](id='devices', cursor_type='row')
         self._trend = Sparkline(id='trend')
         self._typed = Typed(id='typed', max_length=MAX_TYPED, compact=True)
@@ -359,8 +362,8 @@ class MonitorApp(App[None], inherit_bindings=False):
         if self._shown.get('table') != (width, len(rows)):
             self._shown['table'] = width, len(rows)
             self._table.clear(columns=True)
-            for title, size in {'DEVICE': width, **WIDTHS}.items():
-                self._table.add_column(title, width=size)
+            for title, columns in {'DEVICE': width, **WIDTHS}.items():
+                self._table.add_column(title, width=columns)
             self._table.add_rows(rows)
         for y, row in enumerate(rows):
             for x, cell in enumerate(row):
@@ -368,9 +371,11 @@ class MonitorApp(App[None], inherit_bindings=False):
                     self._table.update_cell_at(Coordinate(y, x), cell)
         self._devices = list(devices)
         self._table.styles.max_height = len(rows) + 1
-        if (self._shown.get('visible'), self._table.cursor_row) != (self._table.size, self._at):
-            self._shown['visible'] = self._table.size
+        # Where the list gets shorter the selected row stays visible, unless it was scrolled away.
+        top, size = self._table.scroll_offset.y, self._table.size
+        if self._table.cursor_row != self._at or self._visible_with not in (None, size):
             self._table.move_cursor(row=self._at)
+        self._visible_with = size if top <= self._at < top + size.height - 1 else None
 
     def _row(self, device: GraphDevice, width: int) -> list[Text]:
         # Names differ at their ends.
