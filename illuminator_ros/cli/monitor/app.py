@@ -75,7 +75,7 @@ COLOURS = {
     'dark': {},
     'sunlight': {'green': '#005f00', 'yellow': '#704000', 'red': '#a00000'},
     'night': dict.fromkeys(('green', 'yellow', 'red'), RED)}
-# The widths of the columns, as wide as any terminal at the end, and the space around each text.
+# Of the columns; the last is as wide as any terminal.
 WIDTHS = {'STATE': 6, 'LEVEL': 6, 'REPORT': 500}
 
 
@@ -209,6 +209,7 @@ class MonitorApp(App[None], inherit_bindings=False):
         row = event.style.meta.get('row', -1)
         if 0 <= row < len(self._devices):
             self._select(self._devices[row])
+            self.draw()
 
     async def run_action(self, *arguments: Any, **options: Any) -> bool:
         """See :meth:`App.run_action`; draw what it has changed."""
