@@ -372,6 +372,8 @@ def test_place_is_typed_or_pasted_corrected_and_sent_with_enter() -> None:
         screen.app.post_message(Paste(' 480'))
         await screen.settle()
         assert '47.3 8.5 480' in screen.text
+        # As below a question, which a second touch on the same place must not confirm.
+        assert 'escape back enter yes' in screen.text
         await screen.press('enter', 'p', '1', 'escape', 'p', 'enter')
 
     graph = show(test, gimbal())

@@ -101,6 +101,10 @@ class Typed(Input):
         """See :meth:`Input.check_consume_key`."""
         return key != 'a' and super().check_consume_key(key, character)
 
+    def check_action(self, action: str, parameters: tuple[object, ...]) -> bool:
+        """Leave "yes" to the application, whose button has a place of its own."""
+        return action != 'submit'
+
 
 class KeyButtons(Footer):
     """Buttons in rows, as many in each as there is space for their labels."""
