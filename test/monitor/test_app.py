@@ -469,7 +469,8 @@ def test_buttons_for_fingers_have_three_rows_and_whole_labels_on_a_phone() -> No
             for key in view.keys:
                 # Whole in one line, and not behind the end of the screen.
                 label = f'{key.keys[0]} {key.text}'
-                assert any(label in line for line in shown) is key.has_button
+                assert any(label in line for line in shown) is (
+                    key.has_button and not key.prompt)
             await screen.click('down next')
 
     show(test, light(), gimbal(), size=(55, 60), touch=True)

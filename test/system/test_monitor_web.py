@@ -122,8 +122,11 @@ def test_page_operates_a_light_in_ten_tabs_and_on_a_phone_for_the_bearer_of_the_
 
         browser.cdp('Emulation.setDeviceMetricsOverride', width=390, height=844,
                     deviceScaleFactor=1, mobile=True)
+        browser.cdp('Emulation.setTouchEmulationEnabled', enabled=True)
         browser.open(site)
         browser.wait_for('/illuminator')
+        # No keyboard covers the buttons.
+        assert browser.run('return document.querySelector("textarea").inputMode') == 'none'
         browser.click('on/off')
         browser.click('enter yes')
         browser.wait_for('1 light: 1 ON')

@@ -157,7 +157,8 @@ class MonitorApp(App[None], inherit_bindings=False):
         last = {name: place for place, key, _ in sorted(own, key=itemgetter(0))
                 for name in key.keys}
         for _, key, action in sorted(own, key=lambda one: last[one[1].keys[0]]):
-            self._bind(key.keys, key.text, ALL if key.has_button else SMALL, action)
+            self._bind(key.keys, key.text, ALL if key.has_button and not key.prompt else SMALL,
+                       action)
         for common in COMMON_KEYS:
             self._bind(*common)
 
