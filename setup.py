@@ -41,7 +41,7 @@ setup(
         ('share/ament_index/resource_index/packages', [f'resource/{package_name}']),
         (f'share/{package_name}', ['package.xml']),
         *((f'share/{package_name}/{folder}', files(folder))
-          for folder in ('config', 'config/sros2', 'launch')),
+          for folder in ('config', 'config/sros2', 'examples', 'launch')),
     ],
     python_requires='>=3.10',
     zip_safe=True,
@@ -52,7 +52,7 @@ setup(
     entry_points={
         'console_scripts': [
             *(f'{prefix}{name} = illuminator_ros.cli.{name}:main'
-              for name in ('bridge', 'conformance', 'monitor', 'simulator')),
+              for name in ('bridge', 'conformance', 'discover', 'monitor', 'simulator')),
             *(f'{prefix}{name} = illuminator_ros.cli.bridge:{name}'
               for name in ('gimbal', 'gimbal_manager', 'rededge')),
         ],

@@ -70,10 +70,10 @@ def _time_link_and_services() -> None:
     # Slow to import, and not before the bridge has blocked the signals of its threads.
     from illuminator_ros.mavlink import line, lines, link, link_thread
     from illuminator_ros.mavlink.transport import Peer
-    from illuminator_ros.ros import executor, node
+    from illuminator_ros.ros import deferred_service, node
     from std_srvs.srv import SetBool
 
-    class TimedService(executor.DeferredService):
+    class TimedService(deferred_service.DeferredService):
 
         def __init__(self, owner: Any, type_: Any, name: str, take: Any, *rest: Any) -> None:
             def timed(request: Any, respond: Any) -> None:

@@ -13,7 +13,7 @@
 # limitations under the License.
 
 """
-Draw the pictures of the documentation: the monitor, a beam, and the track of a flight.
+Draw the pictures of the documentation: the monitor, a beam, the track of a flight, and wirings.
 
 The monitor and the beam show simulated devices with their real nodes, the track is the one of
 ``demo/flight.py``.
@@ -72,6 +72,22 @@ KEYS = {'light': (['home', 'down'], ['space enter', '-', '-']),
 FLIGHT_SECONDS, FLIGHT_SPEED = 36.0, 10.0
 # Degrees that these keys turn the gimbal down.
 DOWN = 30.0
+# Boxes of the wirings.
+COMPUTER, AUTOPILOT, STATION, LIGHT, GIMBAL, CAMERA = (
+    'companion computer\nwith ROS, 1/193', 'autopilot\n1/1', 'ground station\n255/190',
+    'light\n1/243', 'gimbal\n1/154', 'MicaSense camera\n1/100')
+# By file name: the places of the boxes, and the wires between them.
+WIRINGS: dict[str, tuple[dict[str, tuple[float, float]], list[tuple[str, str, str]]]] = {
+    'wiring-companion': (
+        {STATION: (0, 2), AUTOPILOT: (0, 0), COMPUTER: (3, 1), LIGHT: (6, 2), GIMBAL: (6, 1),
+         CAMERA: (6, 0)},
+        [(STATION, COMPUTER, 'radio, UDP 14550'), (AUTOPILOT, COMPUTER, '/dev/ttyACM0'),
+         (LIGHT, COMPUTER, '/dev/ttyUSB0'), (GIMBAL, COMPUTER, '/dev/ttyUSB1'),
+         (CAMERA, COMPUTER, '/dev/ttyUSB2')]),
+    'wiring-autopilot': (
+        {STATION: (0, 1), COMPUTER: (0, 0), AUTOPILOT: (3, 0.5), GIMBAL: (6, 1), LIGHT: (6, 0)},
+        [(STATION, AUTOPILOT, 'radio, TELEM1'), (COMPUTER, AUTOPILOT, '/dev/ttyACM0, TELEM2'),
+         (GIMBAL, AUTOPILOT, 'a serial port'), (LIGHT, AUTOPILOT, 'a serial port')])}
 
 
 @contextlib.contextmanager
@@ -200,6 +216,25 @@ def draw_flight(folder: Path, directory: Path) -> None:
     _save(figure, folder / 'flight.svg')
 
 
+def draw_wiring(folder: Path) -> None:
+    """Draw which device has which line to which computer."""
+    for name, (boxes, wires) in WIRINGS.items():
+        figure, axes = pyplot.subplots(figsize=(9, 3))
+        for begin, end, label in wires:
+            (x, y), (to_x, to_y) = boxes[begin], boxes[end]
+            axes.plot([x, to_x], [y, to_y], color='#555555', zorder=1)
+            axes.text(0.58 * x + 0.42 * to_x, 0.58 * y + 0.42 * to_y, label, ha='center',
+                      va='center', zorder=2, fontsize='small',
+                      bbox={'facecolor': 'white', 'edgecolor': 'none'})
+        for text, place in boxes.items():
+            axes.text(*place, text, ha='center', va='center', zorder=3, bbox={
+                'boxstyle': 'round', 'facecolor': '#ffe9b3', 'edgecolor': '#555555'})
+        rows = [y for _, y in boxes.values()]
+        axes.set(xlim=(-0.9, 6.9), ylim=(min(rows) - 0.4, max(rows) + 0.4))
+        axes.set_axis_off()
+        _save(figure, folder / f'{name}.svg')
+
+
 def _save(figure: Any, path: Path) -> None:
     # The same picture has the same file.
     figure.savefig(path, metadata={'Date': None}, bbox_inches='tight')
@@ -223,6 +258,7 @@ def main() -> None:
     matplotlib.use('svg')
     matplotlib.rcParams['svg.hashsalt'] = 'illuminator_ros'
     with tempfile.TemporaryDirectory() as name:
+        draw_wiring(folder)
         rclpy.init()
         with devices(Path(name)):
             asyncio.run(draw_devices(folder))

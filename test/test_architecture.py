@@ -123,7 +123,7 @@ def test_one_module_uses_private_parts_of_rclpy() -> None:
 
 def test_modules_outside_the_ros_folders_do_not_import_ros() -> None:
     without_ros = [module for module in MODULES if folder(module)[-1:] not in (('ros',), ('cli',))
-                   or module.split('.')[2:3] in (['simulator'], ['conformance'])]
+                   or module.split('.')[2:3] in (['simulator'], ['conformance'], ['discover'])]
 
     assert {module: found for module in without_ros if (found := [
         *roots(imports(module)) & ROS,
@@ -208,6 +208,20 @@ def tracked() -> list[Path]:
                             check=False).stdout.split()
     return [ROOT / name for name in listed] or [
         *MODULES.values(), *(ROOT / 'test').rglob('*.py'), *(ROOT / 'doc').rglob('*.md')]
+
+
+def test_classes_have_at_most_15_fields() -> None:
+    """More show that a class has several subjects."""
+    fields = {
+        f'{module}.{cls.name}': {
+            node.attr for init in cls.body
+            if isinstance(init, ast.FunctionDef) and init.name == '__init__'
+            for node in ast.walk(init)
+            if isinstance(node, ast.Attribute) and isinstance(node.ctx, ast.Store)}
+        for module, path in MODULES.items() for cls in ast.walk(ast.parse(path.read_text()))
+        if isinstance(cls, ast.ClassDef)}
+
+    assert {name: len(names) for name, names in fields.items() if len(names) > 15} == {}
 
 
 def test_no_file_refers_to_documents_outside_the_repository() -> None:

@@ -20,9 +20,11 @@ from collections import Counter
 from collections.abc import Callable, Iterator, Mapping
 import functools
 import itertools
+from types import SimpleNamespace
 from typing import Any, NamedTuple
 from unittest.mock import Mock
 
+from illuminator_ros.cli.discover.port import Port
 from illuminator_ros.gimbal.manager_state import MAX_OTHER_DEVICES
 from illuminator_ros.illuminator.light import Settings
 from illuminator_ros.illuminator.mount_orientation import MAX_MOUNTS, MountOrientations
@@ -35,7 +37,6 @@ from illuminator_ros.mavlink import frame_writer
 from illuminator_ros.mavlink.command_receiver import MAX_RESULTS
 from illuminator_ros.mavlink.command_sender import CommandSender, MAX_TARGETS
 from illuminator_ros.mavlink.component import Component, Endpoint
-from illuminator_ros.mavlink.deadline_queue import SPARE
 from illuminator_ros.mavlink.duplicate_filter import MAX_FRAMES
 from illuminator_ros.mavlink.forward_queue import ForwardQueue, MAX_QUEUED
 from illuminator_ros.mavlink.forwarded_commands import MAX_COMMANDS
@@ -45,6 +46,7 @@ from illuminator_ros.mavlink.routing_table import MAX_ROUTES
 from illuminator_ros.mavlink.signing import MAX_STREAMS, ticks
 from illuminator_ros.mavlink.statistics import MAX_SOURCES
 from illuminator_ros.mavlink.transport.udp import MAX_PEERS
+from illuminator_ros.mavlink.url import MemoryUrl
 from illuminator_ros.payload import simulated
 from illuminator_ros.payload.device_property import MAX_CALLERS
 from illuminator_ros.payload.discovery import MAX_CANDIDATES, MAX_DEVICES, MAX_IGNORED
@@ -59,7 +61,7 @@ from support.entries import stores
 from support.fake_light import status_message
 from support.frames import frame_of, LIGHT, only
 from support.gimbal_manager import ManagerRig
-from support.network import Leaf, Network, Router
+from support.network import FakeSelector, Leaf, Network, Router
 from support.signers import checker, signed_frame
 from support.simulated_link import SimulatedLink
 
@@ -185,13 +187,27 @@ def simulator(message: Message) -> object:
                   *(frame_of(message, 0, source) for source in senders()))
 
 
+def discovered() -> object:
+    channel = Network().port('port')
+    port = Port(MemoryUrl('port'), 'port', 10.0, lambda: 0.0)
+    port.listen(FakeSelector(), lambda url: channel)
+    for source in senders():
+        channel.take(('127.0.0.1', 14550), frame_of(heartbeat(6), 0, source))
+    return port
+
+
 def ros_requests(limit: int) -> object:
     pytest.importorskip('rclpy')
     from illuminator_ros.ros.link_call import LinkCalls
-    calls = LinkCalls(Mock(), Mock(), limit)
+
+    class BusyLink(list[object]):
+        call = list.append
+
+    link: Any = BusyLink()
+    calls = LinkCalls(link, Mock(), limit)
     for _ in range(COUNT):
         calls.ask(lambda now, answer: None, Mock(), str)
-    return calls
+    return SimpleNamespace(link=list(link))
 
 
 def monitored() -> object:
@@ -239,19 +255,18 @@ LINK = {
     'Receiver.streams': MAX_DECODERS, 'Traffic.sources': MAX_SOURCES}
 SENT = {
     'LoopbackFilter.sent': frame_writer.MAX_FRAMES, 'CommandSender.round_trips': MAX_TARGETS,
-    'CommandSender.unanswering': MAX_TARGETS, 'CommandSender.pending': FOUND,
-    # Two requests to each, remembered for 5 s.
-    **dict.fromkeys(('DeadlineQueue.heap', 'DeadlineQueue.entered'), 2 * FOUND + SPARE),
-    'DeadlineQueue.deadlines': FOUND}
+    'CommandSender.unanswering': MAX_TARGETS, 'CommandSender.pending': FOUND}
 STAMPS = {'LoopbackFilter.stamps': frame_writer.MAX_STAMPS}
+HEARTBEATS = {'Client.heartbeats': MAX_SOURCES}
+OTHERS = {'Component.heartbeats': MAX_SOURCES}
 LIGHTS = {'IlluminatorClient.lights': MAX_DEVICES}
 ROWS = {
     'heartbeats of lights': Row(
         functools.partial(bridge, heartbeat(44), pause=0.1),
         {'Discovery.candidates': MAX_CANDIDATES, 'Discovery.found_at': MAX_CANDIDATES},
-        {**LINK, **SENT}),
+        {**LINK, **SENT, **HEARTBEATS}),
     'heartbeats of other components': Row(
-        functools.partial(bridge, heartbeat(2)), LINK, SENT),
+        functools.partial(bridge, heartbeat(2)), {**LINK, **HEARTBEATS}, SENT),
     'statuses': Row(functools.partial(bridge, status_message(100)), {**LINK, **LIGHTS}, SENT),
     'lights that are not the target': Row(
         functools.partial(bridge, status_message(100), wanted=lambda one: False),
@@ -274,14 +289,15 @@ ROWS = {
         waiting_frames, {'ForwardQueue.held[]': MAX_QUEUED // len(frame_of(heartbeat(6)))}),
     'commands of players': Row(
         functools.partial(players, COMMAND), {'CommandReceiver.executed': MAX_RESULTS}),
-    'heartbeats of players': Row(functools.partial(players, heartbeat(6)), {}),
+    'heartbeats of players': Row(functools.partial(players, heartbeat(6)), OTHERS),
     'gimbal devices': Row(
         functools.partial(players, ATTITUDE), {'StateTracker.other_devices': MAX_OTHER_DEVICES}),
     'mounts': Row(
         functools.partial(mounts, ATTITUDE), {'MountOrientations.mounts': MAX_MOUNTS}),
     'vehicles with mounts': Row(
         functools.partial(mounts, Attitude(*[0] * 7)), {'MountOrientations.vehicles': MAX_MOUNTS}),
-    'heartbeats of cameras': Row(functools.partial(camera, heartbeat(30)), LINK, SENT),
+    'heartbeats of cameras': Row(
+        functools.partial(camera, heartbeat(30)), {**LINK, **OTHERS}, SENT),
     'feedback of cameras': Row(
         functools.partial(camera, FEEDBACK), LINK, SENT),
     'peers of the simulator': Row(
@@ -290,10 +306,11 @@ ROWS = {
     'delayed answers of the simulator': Row(
         functools.partial(simulator, CommandLong(*LIGHT, 405, 0, 1, 0, 0, 0, 0, 0, 0)),
         {**LINK, 'SimulatedComponents.peers': simulated.MAX_PEERS,
-         'DeadlineQueue.deadlines': simulated.MAX_DELAYED},
-        {**SENT, **dict.fromkeys(('DeadlineQueue.heap', 'DeadlineQueue.entered'),
-                                 2 * simulated.MAX_DELAYED + SPARE)}),
-    'requests of ROS': Row(functools.partial(ros_requests, 64), {'LinkCalls.waiting': 64}),
+         'SimulatedComponent.delayed': simulated.MAX_DELAYED}, SENT),
+    'components of discover': Row(
+        discovered, {'Port.components': MAX_SOURCES, 'Traffic.sources': MAX_SOURCES},
+        {'RoutingTable.routes': MAX_ROUTES}),
+    'requests of ROS': Row(functools.partial(ros_requests, 64), {'SimpleNamespace.link': 64}),
     'devices of the monitor': Row(monitored, {'Graph.devices': 256}),
     'kinds of log lines': Row(log_lines, {'NodeLog.kinds': 256}),
 }

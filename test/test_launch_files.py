@@ -23,6 +23,7 @@ from illuminator_ros.cli import bridge
 from illuminator_ros.cli.simulator.options import parser
 from illuminator_ros.illuminator.ros.parameters import LIGHT_PARAMETERS
 from illuminator_ros.illuminator.simulated_properties import PROFILES
+from illuminator_ros.rededge.input_states import Input
 from illuminator_ros.ros.parameters import LINK_PARAMETERS
 import pytest
 import yaml
@@ -150,6 +151,27 @@ def test_command_of_the_user_may_have_arguments(launch: ET.Element) -> None:
         assert ('shell' in executable.attrib) is executable.attrib['cmd'].startswith('$(var ')
 
 
+@EVERY
+def test_each_node_is_restarted_where_respawn_is_true(launch: ET.Element) -> None:
+    [respawn] = [one for one in launch.findall('arg') if one.attrib['name'] == 'respawn']
+
+    assert respawn.attrib['default'] == 'false'
+    assert [choice.attrib['value'] for choice in respawn.findall('choice')] == ['true', 'false']
+    assert {(node.attrib['respawn'], node.attrib['respawn_delay'])
+            for node in launch.iter('node')} <= {('$(var respawn)', '2.0')}
+
+
+def test_each_input_of_the_camera_may_be_any_topic() -> None:
+    launch = FILES['rededge.launch.xml']
+    # By default a topic keeps its name.
+    given = {argument.attrib['name'] for argument in launch.findall('arg')
+             if argument.attrib.get('default', '') == f'~/{argument.attrib["name"]}'}
+    remapped = {remap.attrib['from']: remap.attrib['to'] for remap in launch.iter('set_remap')}
+
+    assert given == {one.value for one in Input}
+    assert remapped == {f'~/{name}': f'$(var {name})' for name in given}
+
+
 def test_parameter_of_the_bridge_exists_with_that_type() -> None:
     known = {spec.name: spec for spec in (*LINK_PARAMETERS, *LIGHT_PARAMETERS)}
     given = [param.attrib for param in FILES['bridge.launch.xml'].iterfind('node/param')]
@@ -186,7 +208,7 @@ def test_joystick_launch_file_remaps_each_topic_of_its_configuration() -> None:
 
 
 def test_page_names_each_installed_file() -> None:
-    named = set(re.findall(r'\$SHARE/config/([\w/.]+)', PAGE))
+    named = set(re.findall(r'\$SHARE/config/([\w/.@]+)', PAGE))
     assert named == {str(path.relative_to(ROOT / 'config'))
                      for path in (ROOT / 'config').rglob('*') if path.is_file()}
     assert set(re.findall(r'ros2 launch illuminator_ros (\S+)', PAGE)) == set(FILES)

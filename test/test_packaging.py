@@ -176,8 +176,8 @@ def test_pip_installs_executables_with_names_that_hide_no_other_program(
 
     assert {path.name for path in (tmp_path / 'prefix' / 'bin').iterdir()} == {
         f'illuminator-{name}' for name in (
-            'bridge', 'conformance', 'gimbal', 'gimbal_manager', 'monitor', 'rededge',
-            'simulator')}
+            'bridge', 'conformance', 'discover', 'gimbal', 'gimbal_manager', 'monitor',
+            'rededge', 'simulator')}
 
 
 @pytest.fixture

@@ -36,6 +36,7 @@ from illuminator_ros.illuminator.checks.requirements import REQUIREMENTS
 from illuminator_ros.illuminator.simulated import COMMANDS as LIGHT_COMMANDS
 from illuminator_ros.illuminator.simulated import SIMULATED
 from illuminator_ros.illuminator.simulated_properties import FAULTS, PROFILES
+from illuminator_ros.mavlink.retries import POLICIES
 from illuminator_ros.payload.checks.requirement import Requirement
 from illuminator_ros.payload.faults import FaultTable
 from illuminator_ros.payload.simulated import SimulatedType
@@ -97,12 +98,15 @@ def tool_tables() -> Tables:
         ('conformance', 'requirement on a gimbal manager'): requirements(
             manager.REQUIREMENTS, 'moves'),
         ('conformance', 'requirement on a camera'): requirements(CAMERA_REQUIREMENTS, 'images'),
-        ('rededge', 'message'): [
+        ('details', 'message'): [
             [cls.msgname, f'`{name}`', field.source, field.unit,
              '' if field.scale is None else f'{field.scale:g}',
              f'{field.low:.10g} to {field.high:.10g}',
              '' if field.unknown is None else str(field.unknown)]
             for cls, fields in FIELDS.items() for name, field in fields.items()],
+        ('links', 'tried again'): [
+            [one.subject, f'{one.first:g}', f'{one.longest:g}', f'{one.tries or ""}']
+            for one in POLICIES],
         ('ros', 'argument of `bridge.launch.xml`'): launch_arguments('bridge.launch.xml'),
         ('simulator', 'command'): [
             *([f'`{one.usage}`', one.help] for one in LIGHT_COMMANDS),

@@ -42,7 +42,7 @@ PACKAGE = 'illuminator_ros'
 # Names that stand for a package of the reader.
 PLACEHOLDERS = ('my_robot', 'my_winch', 'winch')
 # Verbs that come with packages of their own.
-VERBS = {'bag': 'ros2bag', 'security': 'sros2'}
+VERBS = {'security': 'sros2'}
 PACKAGES_OF_LAUNCH_FILES = {'joystick.launch.xml': 'joy'}
 # s that a program runs before it is ended, that it may take to end, and that a command may take.
 RUNNING_TIME, END_LIMIT, COMMAND_LIMIT = 5.0, 5.0, 20.0
@@ -181,7 +181,7 @@ def ends(command: Command) -> bool:
     words = shlex.split(command.text)
     if words[1] == 'topic':
         return '--once' in words or '-1' in words
-    return words[1] not in ('run', 'launch', 'bag') or bool(
+    return words[1] not in ('run', 'launch') or bool(
         {'--once', '--show-args'} & {*words})
 
 

@@ -37,7 +37,7 @@ from ..traffic import COMMON, frames, Line
 OURS, RECV_MATCH, BARE = 'bridge', 'recv_match', 'bare receive loop'
 # Frames a second (0: as many as the receiver takes) -> frames in a block.
 RATES = {5000: 2500, 0: 6000}
-TARGETS = {'UDP': 1 / 4, 'TCP': 1 / 8, 'serial': 1 / 8}
+TARGETS = {'UDP': 1 / 4, 'TCP': 1 / 7, 'serial': 1 / 8}
 
 
 def foreign(bench: Bench) -> Iterator[Row]:

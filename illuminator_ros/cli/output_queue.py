@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Writing to stdout and stderr through a queue: a reader that stops reading blocks no thread."""
+"""Writing to stdout and stderr through a pipe: a reader that stops reading blocks no thread."""
 
 from __future__ import annotations
 
@@ -20,23 +20,26 @@ import contextlib
 import fcntl
 import os
 import select
+import struct
+import termios
 import threading
 import time
 
-# Bytes of the queue, and of the pipe, which holds output until the threads run.
-QUEUE_SIZE = 1 << 20
+# Bytes of the pipe, the most for an unprivileged process.
+PIPE_SIZE = 1 << 20
 # Bytes of a write.
 WRITE_SIZE = 4096
+# s between looks at the pipe while the reader does not read.
+LOOK_INTERVAL = 0.1
 
 
 class OutputQueue:
     """
     A queue between descriptors of this process and their readers.
 
-    Each descriptor leads to a pipe that never blocks, also for C code that holds the
-    interpreter's lock. One thread takes the output from the pipe, and another writes it as fast as
-    the reader takes it. Lines that do not fit into the queue are dropped; their number is written
-    once there is room.
+    Each descriptor leads to a pipe that a thread empties, so that a write never blocks: C code of
+    the middleware writes while it holds the interpreter's lock. While the reader does not read and
+    half of the pipe is full, lines are dropped; their number is written afterwards.
 
     :param descriptors: such as 1 and 2; closed ones are ignored.
     """
@@ -55,14 +58,14 @@ class OutputQueue:
             with contextlib.suppress(OSError):
                 stream.cut_off()
         for stream in self._streams:
-            stream.writer.join(max(until - time.monotonic(), 0.0))
+            stream.thread.join(max(until - time.monotonic(), 0.0))
 
 
 class _Stream:
     """
     One descriptor.
 
-    :ivar writer: the thread that writes to the reader.
+    :ivar thread: writes to the reader.
     """
 
     def __init__(self, descriptor: int) -> None:
@@ -70,18 +73,14 @@ class _Stream:
         # Above 2: one of the first three may have been closed.
         self._target = fcntl.fcntl(descriptor, fcntl.F_DUPFD_CLOEXEC, 3)
         self._source, into = os.pipe()
-        # The largest size for an unprivileged process.
         with contextlib.suppress(OSError):
-            fcntl.fcntl(into, fcntl.F_SETPIPE_SZ, QUEUE_SIZE)
+            fcntl.fcntl(into, fcntl.F_SETPIPE_SZ, PIPE_SIZE)
+        self._limit = fcntl.fcntl(into, fcntl.F_GETPIPE_SZ) // 2
         os.set_blocking(into, False)
-        self._changed = threading.Condition()
-        self._queue = bytearray()
-        self._at_end = False
-        self._lost = 0
-        self._dropping = False
-        self.writer = threading.Thread(target=self._write, name='output', daemon=True)
-        self.writer.start()
-        threading.Thread(target=self._read, name='output', daemon=True).start()
+        self._room = select.poll()
+        self._room.register(self._target, select.POLLOUT)
+        self.thread = threading.Thread(target=self._copy, name='output', daemon=True)
+        self.thread.start()
         os.dup2(into, descriptor)
         os.close(into)
 
@@ -90,52 +89,38 @@ class _Stream:
         with open(os.devnull, 'wb') as nowhere:
             os.dup2(nowhere.fileno(), self._descriptor)
 
-    def _read(self) -> None:
-        while data := os.read(self._source, 1 << 16):
-            with self._changed:
-                for line in data.splitlines(keepends=True):
-                    self._add(line)
-                self._changed.notify()
-        with self._changed:
-            self._at_end = True
-            self._changed.notify()
-
-    def _add(self, line: bytes) -> None:
-        if self._dropping and len(self._queue) < QUEUE_SIZE // 2:
-            self._dropping = False
-            note = f'[{self._lost} lines were dropped while nothing read them]\n'.encode()
-            self._queue += note if self._queue.endswith(b'\n') else b'\n' + note
-            self._lost = 0
-        self._dropping |= len(self._queue) + len(line) > QUEUE_SIZE
-        if not self._dropping:
-            self._queue += line
-        elif line.endswith(b'\n'):
-            self._lost += 1
-
-    def _write(self) -> None:
-        while data := self._next():
+    def _copy(self) -> None:
+        lost = 0
+        while data := os.read(self._source, WRITE_SIZE):
+            while not self._room.poll(LOOK_INTERVAL * 1e3):
+                if self._unread() > self._limit:
+                    data += os.read(self._source, self._limit)
+                    lost += data.count(b'\n', 0, -WRITE_SIZE)
+                    data = data[-WRITE_SIZE:]
+            if lost:
+                # The beginning of the first line is lost.
+                data = b'\n[%d lines were dropped while nothing read them]\n%s' % (
+                    lost, data.partition(b'\n')[2])
+                lost = 0
             try:
                 while data:
-                    data = data[self._send(data):]
+                    data = data[self._write(data):]
             except OSError:
                 # The reader is gone: writing to the descriptor fails from now on, as without a
                 # queue.
                 os.dup2(self._target, self._descriptor)
                 return
 
-    def _next(self) -> bytes:
-        """Wait for output, and return it; nothing at the end."""
-        with self._changed:
-            self._changed.wait_for(lambda: self._queue or self._at_end)
-            data = bytes(self._queue[:WRITE_SIZE])
-            del self._queue[:WRITE_SIZE]
-            return data
+    def _unread(self) -> int:
+        """Return the bytes in the pipe."""
+        (count,) = struct.unpack('i', fcntl.ioctl(self._source, termios.FIONREAD, bytes(4)))
+        return int(count)
 
-    def _send(self, data: bytes) -> int:
+    def _write(self, data: bytes) -> int:
         """Write some of the output, and return how much."""
         try:
             return os.write(self._target, data)
         except BlockingIOError:
             # Another process has made the file non-blocking.
-            select.select([], [self._target], [])
+            self._room.poll()
             return 0

@@ -20,7 +20,7 @@ from collections.abc import Collection, Mapping
 from dataclasses import dataclass, field
 import math
 
-from .events import GimbalEvent, GimbalForgotten, GimbalFound, GimbalKey
+from .events import GimbalEvent, GimbalKey
 from .gimbal import Gimbal, GimbalSettings
 from .messages import (
     GimbalDeviceInformation,
@@ -31,21 +31,19 @@ from .messages import (
     rates_of,
     REMOVE_SENDER,
 )
-from .remote_managers import Repetition
 from ..mavlink.command_sender import Command, CommandSender
 from ..mavlink.component import Payload
-from ..mavlink.deadline_queue import DeadlineQueue
 from ..mavlink.dialect import mavlink
 from ..mavlink.messages import Address, Heartbeat, Message
+from ..mavlink.retries import GIMBAL_MESSAGE, Retries
+from ..payload.discovery import Discovery, FORGET_AFTER
 from ..payload.listeners import Listeners
 from ..payload.messages import GimbalDeviceAttitudeStatus
 
 # The most gimbals, so that memory is bounded. The gimbal with the configured id is kept, too.
 MAX_GIMBALS = 32
-# Components that may be managers. A further component replaces a long silent one.
+# Components that may be managers. A further component replaces a long silent one (FORGET_AFTER).
 MAX_COMPONENTS = 256
-# s of silence after which a component or a gimbal that was never commanded is forgotten.
-FORGET_AFTER = 60.0
 # s of silence after which a component that is heard again may have restarted.
 RETURN_AFTER = 5.0
 # s between requests to different components, so that a slow line is not filled.
@@ -57,7 +55,7 @@ UNLIKELY_DELAY = 1.0
 @dataclass
 class _Component:
     heard_at: float
-    query: Repetition = field(default_factory=Repetition)
+    query: Retries = field(default_factory=lambda: Retries(GIMBAL_MESSAGE))
     # Whether it has announced a gimbal with the id 0.
     lacks_id: bool = False
 
@@ -71,8 +69,8 @@ class GimbalClient(Payload):
 
     :param commands: the command sender of the component that carries this payload.
     :ivar events: the events of all gimbals.
+    :ivar discovery: the gimbals that were announced.
     :ivar gimbals: in the order in which they were found.
-    :ivar limit_reached: whether there are more than :data:`MAX_GIMBALS`.
     """
 
     messages = (Heartbeat, GimbalManagerInformation, GimbalManagerStatus, GimbalDeviceInformation,
@@ -81,31 +79,31 @@ class GimbalClient(Payload):
 
     def __init__(self, commands: CommandSender, settings: GimbalSettings) -> None:
         self.events: Listeners[GimbalEvent] = Listeners()
-        self.limit_reached = False
-        self._gimbals: dict[GimbalKey, Gimbal] = {}
-        self.gimbals: Mapping[GimbalKey, Gimbal] = self._gimbals
+        self.discovery = Discovery[GimbalKey, Gimbal](
+            self.events.emit,
+            limit=lambda key: MAX_GIMBALS + (key.device_id == self.settings.device_id))
+        self.gimbals: Mapping[GimbalKey, Gimbal] = self.discovery.devices
         self.settings = settings
         self._commands = commands
         self._components: dict[Address, _Component] = {}
-        self._queries: DeadlineQueue[Address] = DeadlineQueue()
         self._next_query = -math.inf
 
     def change_settings(self, settings: GimbalSettings, now: float) -> None:
         """Take other settings, see :meth:`Gimbal.change_settings`."""
         self.settings = settings
-        for gimbal in self._gimbals.values():
+        for gimbal in self.gimbals.values():
             gimbal.change_settings(settings, now)
 
     # Link
 
     def link_closed(self, now: float, reason: str) -> None:
         """See :meth:`Payload.link_closed`."""
-        for gimbal in self._gimbals.values():
+        for gimbal in self.gimbals.values():
             gimbal.components_lost(gimbal.addresses, now, reason)
 
     def components_lost(self, lost: Collection[Address], now: float, reason: str) -> None:
         """See :meth:`Payload.components_lost`."""
-        for gimbal in self._gimbals.values():
+        for gimbal in self.gimbals.values():
             gimbal.components_lost(lost, now, reason)
 
     def receive(self, source: Address, message: Message, now: float) -> None:
@@ -115,28 +113,27 @@ class GimbalClient(Payload):
                 gimbal.take_attitude(message, now)
         elif isinstance(message, Heartbeat):
             self._hear(source, message, now)
-            for gimbal in self._gimbals.values():
+            for gimbal in self.gimbals.values():
                 gimbal.heard(source, now, message.autopilot)
         elif isinstance(message, GimbalManagerStatus):
-            if gimbal := self._managed(source, message.gimbal_device_id):
+            if gimbal := self._managed(source, message.gimbal_device_id, now):
                 gimbal.take_status(source, message, now)
                 if gimbal.lacks_information_of(source):
                     self._reopen(source, now)
         elif isinstance(message, GimbalManagerInformation):
-            if gimbal := self._managed(source, message.gimbal_device_id):
+            if gimbal := self._managed(source, message.gimbal_device_id, now):
                 gimbal.take_information(source, message, now)
                 component = self._components.get(source)
                 if component is not None and not any(
-                        one.lacks_information_of(source) for one in self._gimbals.values()):
-                    component.query.finish()
-                    self._queries.set(source, math.inf)
+                        one.lacks_information_of(source) for one in self.gimbals.values()):
+                    component.query.stop()
         elif (isinstance(message, GimbalDeviceInformation)
                 and (gimbal := self._sender(source, message.gimbal_device_id, now))):
             gimbal.take_device_information(message)
 
     # Gimbals
 
-    def _managed(self, manager: Address, device_id: int) -> Gimbal | None:
+    def _managed(self, manager: Address, device_id: int, now: float) -> Gimbal | None:
         """Return the gimbal that a manager announces, None if there are too many."""
         if component := self._components.get(manager):
             component.lacks_id = not device_id
@@ -145,15 +142,8 @@ class GimbalClient(Payload):
             return None
         key = (GimbalKey(manager, device_id) if device_id in NON_MAVLINK_IDS else
                GimbalKey(Address(manager.system, device_id)))
-        gimbal = self._gimbals.get(key)
-        if gimbal is None:
-            if len(self._gimbals) >= MAX_GIMBALS + (device_id == self.settings.device_id):
-                self.limit_reached = True
-                return None
-            gimbal = self._gimbals[key] = Gimbal(
-                key, manager, self._commands, self.settings, self.events.emit)
-            self.events.emit(GimbalFound(key))
-        return gimbal
+        return self.discovery.hear(key, now, lambda key: Gimbal(
+            key, manager, self._commands, self.settings, self.events.emit), proved=True)
 
     def _sender(self, source: Address, number: int, now: float) -> Gimbal | None:
         """
@@ -164,9 +154,9 @@ class GimbalClient(Payload):
         """
         if number == source.component and number not in NON_MAVLINK_IDS:
             number = 0
-        found = self._gimbals.get(GimbalKey(source, number))
+        found = self.gimbals.get(GimbalKey(source, number))
         if found is None and not number:
-            own = [one for key, one in self._gimbals.items() if key.address == source]
+            own = [one for key, one in self.gimbals.items() if key.address == source]
             found = own[0] if len(own) == 1 else None
             if len(own) > 1:
                 for one in own:
@@ -191,45 +181,41 @@ class GimbalClient(Payload):
     def _hear(self, source: Address, heartbeat: Heartbeat, now: float) -> None:
         if component := self._components.get(source):
             if now >= component.heard_at + RETURN_AFTER:
-                component.query = Repetition()
-                self._queries.set(source, now)
+                component.query = Retries(GIMBAL_MESSAGE)
             component.heard_at = now
-        elif self._component(source, now):
+        elif component := self._component(source, now):
             likely = (heartbeat.autopilot != mavlink.MAV_AUTOPILOT_INVALID
                       or heartbeat.type == mavlink.MAV_TYPE_GIMBAL)
-            self._queries.set(source, now if likely else now + UNLIKELY_DELAY)
+            component.query = Retries(
+                GIMBAL_MESSAGE, now if likely else now + UNLIKELY_DELAY)
 
     def _forget_component(self, now: float) -> bool:
         address, component = min(self._components.items(), key=lambda item: item[1].heard_at)
         if now < component.heard_at + FORGET_AFTER:
             return False
         del self._components[address]
-        self._queries.set(address, math.inf)
         return True
 
     def _reopen(self, manager: Address, now: float) -> None:
         """Request the information of a manager that has sent a status but no information."""
         component = self._component(manager, now)
-        if component is None:
-            return
-        if component.query.due == math.inf:
-            component.query = Repetition()
-        if component.query.due == -math.inf:
-            self._queries.set(manager, now)
+        if component is not None and component.query.due == math.inf:
+            component.query = Retries(GIMBAL_MESSAGE, now)
 
     def _request_information(self, now: float) -> None:
-        due = self._queries.due(now)
-        if not due or now < self._next_query:
+        if now < self._query_due():
             return
-        address = due[0]
-        component = self._components[address]
-        component.query.take(now)
-        self._queries.set(address, component.query.due)
+        address, component = min(self._components.items(), key=lambda item: item[1].query.due)
+        component.query.note_try(now)
         self._next_query = now + REQUEST_SPACING
         if now < component.heard_at + FORGET_AFTER:
             message_id = float(GimbalManagerInformation.id)
             self._commands.start(
                 Command(address, mavlink.MAV_CMD_REQUEST_MESSAGE, (message_id,)), now)
+
+    def _query_due(self) -> float:
+        return max(self._next_query, min(
+            (one.query.due for one in self._components.values()), default=math.inf))
 
     # The end
 
@@ -243,7 +229,7 @@ class GimbalClient(Payload):
 
     def close(self, now: float) -> None:
         """See :meth:`Payload.close`."""
-        for gimbal in self._gimbals.values():
+        for gimbal in self.gimbals.values():
             gimbal.close(now)
 
     # Time
@@ -251,20 +237,8 @@ class GimbalClient(Payload):
     def poll(self, now: float) -> None:
         """See :meth:`Payload.poll`."""
         self._request_information(now)
-        for key, gimbal in list(self._gimbals.items()):
-            if now >= _forgotten_at(gimbal):
-                del self._gimbals[key]
-                self.limit_reached = False
-                self.events.emit(GimbalForgotten(key))
-            elif now >= gimbal.next_deadline():
-                gimbal.poll(now)
+        self.discovery.poll(now)
 
     def next_deadline(self) -> float:
         """See :meth:`Payload.next_deadline`."""
-        return min((max(self._next_query, self._queries.next_deadline()),
-                    *(min(gimbal.next_deadline(), _forgotten_at(gimbal))
-                      for gimbal in self._gimbals.values())))
-
-
-def _forgotten_at(gimbal: Gimbal) -> float:
-    return math.inf if gimbal.was_commanded else gimbal.silent_since + FORGET_AFTER
+        return min(self._query_due(), self.discovery.next_deadline())

@@ -16,10 +16,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 import math
-from typing import Generic, NamedTuple, TypeVar
+from typing import NamedTuple
 
 from .axes import LEVEL
 from .messages import GimbalManagerStatus, REMOVE_SENDER, UNCHANGED
@@ -28,8 +27,7 @@ from ..mavlink.dialect import flag_names, mavlink
 from ..mavlink.messages import Address
 from ..payload.messages import GeoPoint, GimbalDeviceAttitudeStatus
 from ..payload.mount_attitude import YawFrame
-
-S = TypeVar('S')
+from ..payload.plain_change import PlainChange
 
 
 @dataclass(frozen=True)
@@ -70,31 +68,7 @@ def setpoint_flags(frame: YawFrame) -> int:
     return LEVEL | frame.flag | lock
 
 
-@dataclass(frozen=True)
-class GimbalChange(Generic[S]):
-    """
-    A change of a gimbal, and its command: a :class:`~..payload.confirmed_command.Change`.
-
-    :param status_name: of the status that shows the change, '' if none does.
-    """
-
-    command: int
-    params: tuple[float, ...]
-    goal: str
-    position: Position | None = None
-    status_name: str = ''
-    shown_by: Callable[[S], bool | None] = lambda status: None
-    actual: Callable[[S], str] = lambda status: ''
-    note: str = ''
-    is_idempotent: bool = True
-    is_repeated: bool = False
-
-    def evidence(self, status: S) -> str:
-        """See :class:`~..payload.confirmed_command.Change`."""
-        return f'confirmed by {self.status_name}'
-
-
-def configure(us: Address, device_id: int, *, take: bool) -> GimbalChange[GimbalManagerStatus]:
+def configure(us: Address, device_id: int, *, take: bool) -> PlainChange[GimbalManagerStatus]:
     """Return the change that takes primary control, or releases all control of this component."""
     def is_shown(status: GimbalManagerStatus) -> bool:
         control = Control.of(status)
@@ -102,7 +76,7 @@ def configure(us: Address, device_id: int, *, take: bool) -> GimbalChange[Gimbal
 
     # The address instead of SENDER, which PX4 reads as the autopilot.
     players = (*us, UNCHANGED, UNCHANGED) if take else (REMOVE_SENDER,) * 4
-    return GimbalChange(
+    return PlainChange(
         mavlink.MAV_CMD_DO_GIMBAL_MANAGER_CONFIGURE, (*players, 0, 0, device_id),
         'control taken' if take else 'control released',
         status_name=GimbalManagerStatus.msgname, shown_by=is_shown,
@@ -124,14 +98,14 @@ class Flag(NamedTuple):
     needed: int
     is_set: bool = True
 
-    def change(self, device_id: int) -> GimbalChange[GimbalDeviceAttitudeStatus]:
+    def change(self, device_id: int) -> PlainChange[GimbalDeviceAttitudeStatus]:
         """
         Return the change by a flag of a pose.
 
         Such a flag takes precedence over the angles and rates (GIMBAL_DEVICE_FLAGS), so they are
         NaN, "unset" (MAV_CMD_DO_GIMBAL_MANAGER_PITCHYAW). Without it PX4 would turn to 0.
         """
-        return GimbalChange(
+        return PlainChange(
             mavlink.MAV_CMD_DO_GIMBAL_MANAGER_PITCHYAW,
             (*(math.nan,) * 4, setpoint_flags(YawFrame.VEHICLE) | self.flag, 0, device_id),
             self.goal,
@@ -152,17 +126,17 @@ YAW_LOCKS = {
                 0, is_set=False)}
 
 
-def point(device_id: int, place: GeoPoint | None) -> GimbalChange[None]:
+def point(device_id: int, place: GeoPoint | None) -> PlainChange[None]:
     """
     Return the change that points the gimbal at a place, or at none.
 
     :param place: with its altitude above mean sea level.
     """
     if place is None:
-        return GimbalChange(
+        return PlainChange(
             mavlink.MAV_CMD_DO_SET_ROI_NONE, (float(device_id),), 'point at no place')
     latitude, longitude, altitude = place
-    return GimbalChange(
+    return PlainChange(
         mavlink.MAV_CMD_DO_SET_ROI_LOCATION, (float(device_id),),
         f'point at {latitude:.7g}, {longitude:.7g}, {altitude:.4g} m',
         Position(MAV_FRAME_GLOBAL, *place))

@@ -17,14 +17,14 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import NamedTuple, TypeAlias
 
 from .axes import Ranges
 from .commands import Control
 from .messages import GimbalDeviceInformation
 from ..mavlink.dialect import raw
 from ..mavlink.messages import Address
-from ..payload.arbitration import HolderChanged
+from ..payload.device_events import DeviceEvent
 from ..payload.identity import text
 from ..payload.mount_attitude import MountAttitude
 
@@ -73,35 +73,7 @@ def _version(number: int) -> str:
     return '.'.join(str(number >> shift & 0xFF) for shift in (0, 8, 16)) if number else ''
 
 
-@dataclass(frozen=True)
-class GimbalEvent:
-    """An event of a gimbal."""
-
-    key: GimbalKey
-
-
-@dataclass(frozen=True)
-class GimbalFound(GimbalEvent):
-    """A manager has announced the gimbal."""
-
-
-@dataclass(frozen=True)
-class GimbalForgotten(GimbalEvent):
-    """A gimbal that stayed silent was dropped, so that another one can take its place."""
-
-
-@dataclass(frozen=True)
-class GimbalConnected(GimbalEvent):
-    """The manager and the device are heard, for the first time or again."""
-
-    manager: Address
-
-
-@dataclass(frozen=True)
-class GimbalLost(GimbalEvent):
-    """The manager or the device is no longer heard."""
-
-    reason: str
+GimbalEvent: TypeAlias = DeviceEvent[GimbalKey]
 
 
 @dataclass(frozen=True)
@@ -132,13 +104,6 @@ class ControlChanged(GimbalEvent):
     after: Control | None
     ours: bool
     was_lost: bool
-
-
-@dataclass(frozen=True)
-class GimbalHeld(GimbalEvent):
-    """Another source of commands holds the gimbal."""
-
-    change: HolderChanged[str]
 
 
 @dataclass(frozen=True)

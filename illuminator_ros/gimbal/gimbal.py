@@ -30,7 +30,6 @@ from .remote_managers import (
     is_late,
     RemoteManager,
     RemoteManagers,
-    Repetition,
     silence,
     SILENCE_LIMIT,
     STOP_LIMIT,
@@ -40,10 +39,13 @@ from .yaw_lock import YawLock
 from ..mavlink.command_sender import CommandResult, CommandSender
 from ..mavlink.dialect import mavlink, short_names
 from ..mavlink.messages import Address
-from ..payload.arbitration import HolderChanged
+from ..mavlink.retries import GIMBAL_MESSAGE, Retries
+from ..payload.arbitration import Cause, HolderChanged
 from ..payload.command_sources import Sources, SourceSettings
 from ..payload.confirmed_command import Done, Result
+from ..payload.device_events import DeviceConnected, DeviceDisconnected, DeviceHeld
 from ..payload.device_property import answer, Caller, Desired, Outcome, Property
+from ..payload.liveness import Liveness
 from ..payload.messages import GeoPoint, GimbalDeviceAttitudeStatus
 from ..payload.mount_attitude import Components, MountAttitude, YawFrame
 from ..payload.rotation import Quaternion, Vector
@@ -76,12 +78,14 @@ class _Device:
     The reports of the device of a gimbal; times are s.
 
     :param interval: between its attitudes; 0 for its own.
-    :ivar without_id_at: when an attitude came that may be that of another gimbal.
+    :ivar without_id: of attitudes that may be those of another gimbal.
     :ivar problem: why the last status has no attitude, '' if it has one.
     """
 
     def __init__(self, address: Address, interval: float) -> None:
-        self.heard_at = self.attitude_at = self.without_id_at = -math.inf
+        self.liveness = Liveness(SILENCE_LIMIT)
+        self.without_id = Liveness(SILENCE_LIMIT)
+        self.attitude_at = -math.inf
         self._status_time = 0
         self.attitude: MountAttitude | None = None
         self.problem = ''
@@ -94,17 +98,18 @@ class _Device:
 
     def connected(self) -> None:
         """Request everything from now on: the device may have restarted."""
-        self._identity_query = Repetition()
-        self._interval_query = Repetition(-math.inf if self._interval else math.inf)
+        self._identity_query = Retries(GIMBAL_MESSAGE)
+        self._interval_query = Retries(
+            GIMBAL_MESSAGE, -math.inf if self._interval else math.inf)
 
     def take_information(self, message: gimbal.GimbalDeviceInformation) -> None:
         """Take its identity and its ranges."""
         self.identity, self.ranges = events.DeviceIdentity.of(message), known_ranges(message)
-        self._identity_query.finish()
+        self._identity_query.stop()
 
     def take_status(self, status: GimbalDeviceAttitudeStatus, now: float) -> bool:
         """Take its attitude and its flags; return whether the status counts: late ones do not."""
-        self.heard_at = now
+        self.liveness.hear(now)
         if is_late(status.time_boot_ms, self._status_time):
             return False
         self._status_time, self.attitude_at = status.time_boot_ms, now
@@ -117,9 +122,9 @@ class _Device:
 
     def poll(self, manager: RemoteManager, now: float) -> None:
         """Request what it does not send by itself."""
-        if self._identity_query.take(now):
+        if self._identity_query.begin_try(now):
             manager.request(gimbal.GimbalDeviceInformation.id, now, to=self._address)
-        if self._interval_query.take(now):
+        if self._interval_query.begin_try(now):
             manager.send(
                 mavlink.MAV_CMD_SET_MESSAGE_INTERVAL,
                 (float(GimbalDeviceAttitudeStatus.id), self._interval * 1e6), now,
@@ -131,7 +136,7 @@ class _Device:
 
     def _interval_answered(self, result: CommandResult, now: float) -> None:
         if result.result is not None:
-            self._interval_query.finish()
+            self._interval_query.stop()
 
 
 class Gimbal:
@@ -178,29 +183,30 @@ class Gimbal:
             self._yaw_lock.cancel(reason, now)
         self._managers.components_lost(lost, now, reason)
         if self.key.address in lost:
-            self._device.heard_at = min(self._device.heard_at, now - SILENCE_LIMIT)
+            self._device.liveness.lose(now)
         self._check(now)
         self._settle(now)
 
     @property
-    def silent_since(self) -> float:
+    def lost_at(self) -> float:
         """Return when a manager last announced the gimbal or its device was last heard, s."""
-        return max(self._managers.announced_at, self._device.heard_at)
+        return max(self._managers.announced_at, self._device.liveness.heard_at)
 
     def heard(self, address: Address, now: float, autopilot: int) -> None:
         """Take the heartbeat of a component, which may be the device or one of its managers."""
         manager = self._managers.get(address)
         is_device = address == self.key.address and not self.key.number
         if manager is not None:
-            manager.heard_at, manager.autopilot = now, autopilot
+            manager.liveness.hear(now)
+            manager.autopilot = autopilot
         if is_device:
-            self._device.heard_at = now
+            self._device.liveness.hear(now)
         if manager is not None or is_device:
             self._check(now)
 
     def heard_without_id(self, now: float) -> None:
         """Note a message of its device or of another gimbal of the same address."""
-        self._device.without_id_at = now
+        self._device.without_id.hear(now)
 
     @property
     def addresses(self) -> set[Address]:
@@ -215,15 +221,17 @@ class Gimbal:
     def unreachable(self, now: float) -> str:
         """Return why the gimbal is not connected, for people; '' if it is."""
         manager = self._manager
-        if not manager.is_heard(now):
+        if not manager.liveness.is_heard(now):
             return self._link_problem or silence(
-                f'manager {manager.address}', manager.heard_at, now)
-        if now < self._device.heard_at + SILENCE_LIMIT:
+                f'manager {manager.address}', manager.liveness.heard_at, now)
+        device = self._device
+        if device.liveness.is_heard(now):
             return ''
-        if now < self._device.without_id_at + SILENCE_LIMIT:
+        if device.without_id.is_heard(now):
             return (f'{self.key.address} has several gimbals and sends attitudes without '
                     'gimbal_device_id, so they cannot be told apart')
-        return self._link_problem or silence(f'device {self.key}', self._device.heard_at, now)
+        return self._link_problem or silence(
+            f'device {self.key}', device.liveness.heard_at, now)
 
     def _check(self, now: float) -> None:
         """Choose the manager, and report changes of connection and control."""
@@ -232,12 +240,13 @@ class Gimbal:
         if self._connected is bool(reason):
             self._connected = not reason
             if reason:
-                self._emit(events.GimbalLost(self.key, reason))
+                self._emit(DeviceDisconnected(self.key, reason))
             else:
                 self._link_problem = ''
                 self._control.take_due = self._settings.auto_take_control
                 self._device.connected()
-                self._emit(events.GimbalConnected(self.key, self._manager.address))
+                self._emit(DeviceConnected(
+                    self.key, f'manager {self._manager.address}'))
         control = self._manager.known_control(now)
         if control == self._control.known:
             return
@@ -246,9 +255,11 @@ class Gimbal:
             self._yaw_lock.cancel(self.unavailable(now), now)
         if control is None:
             # The manager that had shown this component in control takes the zero.
-            last = self._manager.control if self._manager.is_heard(now) else None
-            self._setpoints.control_unknown(now, can_send=(
-                last is not None and last.primary == self._commands.address))
+            last = self._manager.control
+            self._setpoints.control_unknown(
+                now, is_heard=self._manager.liveness.is_heard(now), can_send=(
+                    not self._link_problem and last is not None
+                    and last.primary == self._commands.address))
         elif not self.in_control:
             self._setpoints.control_lost()
         elif is_first:
@@ -314,7 +325,7 @@ class Gimbal:
 
     def _absence(self, now: float) -> str:
         """Return that the manager is lost, for people; '' if it is heard."""
-        if self._manager.is_heard(now):
+        if self._manager.liveness.is_heard(now):
             return ''
         return f'gimbal {self.key} is not connected: {self.unreachable(now)}'
 
@@ -338,7 +349,7 @@ class Gimbal:
         self._cancel_moves('superseded by a release of control', now, superseded=True)
         may_turn = setpoints.may_turn
         setpoints.end(now)
-        if may_turn and manager.is_heard(now):
+        if may_turn and manager.liveness.is_heard(now):
             # No command stops a gimbal everywhere: PX4 reads unset angles as 0.
             setpoints.stop(now)
             manager.release_due = now + STOP_LIMIT
@@ -389,13 +400,15 @@ class Gimbal:
         self, result: Result, manager: RemoteManager, wish: str, now: float,
     ) -> Result:
         """Add the manager, the wish and the control to a refusal."""
-        primary = self._control.known and self._control.known.primary
+        known = self._control.known
+        primary = known and known.primary
         if primary and not self.in_control and result.permanent:
             advice = f'{primary} has control and must release it first'
         else:
             who = 'this node' if self.in_control else primary or 'no component'
             advice = self.unreachable(now) or (
-                f'{who} has control: the log of the manager may have the reason')
+                f'{who} has control: the log of the manager may have the reason'
+                if known is not None else manager.lack_of_status(now))
         reason = result.message.removeprefix('refused: ')
         return result._replace(
             message=f'manager {manager.address} refused "{wish}": {reason}; {advice}')
@@ -412,21 +425,20 @@ class Gimbal:
         self._setpoints.change_timeout(settings.setpoint_timeout, now)
         if settings.sources:
             self._sources.set_lease(settings.sources.timeout)
-            self._change_holder(self._sources.poll(now), now)
+            self._take_holder(self._sources.poll(now), now)
 
     # Sources
 
     def claim(self, source: str, now: float) -> str:
         """Claim the gimbal for a stream; return any refusal of its source, '' for none."""
-        self._change_holder(self._sources.poll(now), now)
+        self._take_holder(self._sources.poll(now), now)
         self._take_over(source, now)
-        if change := self._sources.claim(source, now):
-            self._emit(events.GimbalHeld(self.key, change))
+        self._take_holder(self._sources.claim(source, now), now)
         return self._sources.refusal(source)
 
     def begin_call(self, source: str, now: float) -> str:
         """Begin a call; return why its source may not command the gimbal, '' if it may."""
-        self._change_holder(self._sources.poll(now), now)
+        self._take_holder(self._sources.poll(now), now)
         if refusal := self._sources.refusal(source):
             return refusal
         self._take_over(source, now)
@@ -435,8 +447,7 @@ class Gimbal:
 
     def end_call(self, source: str, now: float, *, success: bool) -> None:
         """End a call, which claims the gimbal if it has succeeded."""
-        if change := self._sources.end_call(source, now, success=success):
-            self._emit(events.GimbalHeld(self.key, change))
+        self._take_holder(self._sources.end_call(source, now, success=success), now)
 
     def refusal(self, source: str) -> str:
         """Return why a source may not command the gimbal, for people; '' if it may."""
@@ -448,22 +459,22 @@ class Gimbal:
 
         :return: the source that holds it now, '' if none does.
         """
-        self._change_holder(self._sources.poll(now), now)
-        self._change_holder(self._sources.release(source, now), now)
+        self._take_holder(self._sources.poll(now), now)
+        self._take_holder(self._sources.release(source, now), now)
         return self._sources.holder or ''
 
     def _take_over(self, source: str, now: float) -> None:
         """End the setpoint and the requests of another source, unless it is a higher one."""
-        sources = self._sources
-        if sources.are_ranked and sources.commander != source and not sources.refusal(source):
+        if self._sources.takes_over(source):
             self._end_commands(f'held by {source}', now)
 
-    def _change_holder(self, change: HolderChanged[str] | None, now: float) -> None:
-        """End the setpoint and the requests of the previous source."""
+    def _take_holder(self, change: HolderChanged[str] | None, now: float) -> None:
+        """Take a change of the source that holds the gimbal."""
         if change is None:
             return
-        self._end_commands(f'held by {change.after or "no source"}', now)
-        self._emit(events.GimbalHeld(self.key, change))
+        if change.cause is not Cause.CLAIM:
+            self._end_commands(f'held by {change.after or "no source"}', now)
+        self._emit(DeviceHeld(self.key, change))
 
     def _end_commands(self, message: str, now: float) -> None:
         self._setpoints.end(now)
@@ -618,7 +629,7 @@ class Gimbal:
     def poll(self, now: float) -> None:
         """Do everything that is due."""
         self._check(now)
-        self._change_holder(self._sources.poll(now), now)
+        self._take_holder(self._sources.poll(now), now)
         manager, control = self._manager, self._control
         manager.poll(now)
         self._yaw_lock.poll(now)
@@ -631,7 +642,7 @@ class Gimbal:
             control.take_due = False
             if control.known.primary is None:
                 self._request_control(True, now, self._taken_automatically)
-        if manager.status_query.take(now):
+        if manager.status_query.begin_try(now):
             manager.request(gimbal.GimbalManagerStatus.id, now)
         self._device.poll(manager, now)
 
@@ -650,9 +661,8 @@ class Gimbal:
         if is_known:
             due = min(due, manager.control_deadline())
         if self._connected:
-            due = min(due, manager.heard_at + SILENCE_LIMIT,
-                      self._device.heard_at + SILENCE_LIMIT, self._device.next_deadline(),
-                      manager.status_query.due)
+            due = min(due, manager.liveness.silent_at, manager.status_query.due,
+                      self._device.liveness.silent_at, self._device.next_deadline())
         return min(due, self._setpoints.next_deadline()) if self.in_control else due
 
     def snapshot(self, now: float) -> events.GimbalSnapshot:

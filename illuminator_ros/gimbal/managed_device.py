@@ -25,15 +25,15 @@ from .messages import GimbalDeviceInformation, rates_of
 from .vehicle_state import VehicleState
 from ..mavlink.command_sender import Command, CommandResult, CommandSender
 from ..mavlink.dialect import mavlink
+from ..mavlink.retries import DEVICE_INFORMATION
 from ..payload.messages import GimbalDeviceAttitudeStatus
 from ..payload.mount_attitude import heading_of, rotation_of, STILL, yaw_frame, YawFrame
 from ..payload.rotation import Vector
 
 # Requests for GIMBAL_DEVICE_INFORMATION without the message after which the manager announces the
-# gimbal without it; s between these requests, and between later ones; and the longest time of one,
-# which a device may prolong with progress, and command_timeout too.
+# gimbal without it; and the longest time of one, s, which a device may prolong with progress, and
+# command_timeout too.
 INFORMATION_REQUESTS = 3
-INFORMATION_DELAY, INFORMATION_INTERVAL = 0.5, 5.0
 INFORMATION_TIMEOUT = 2.0
 # s after which the attitude of a device is out of date.
 ATTITUDE_AGE = 1.0
@@ -100,9 +100,7 @@ class ManagedDevice:
     def _answered(self, result: CommandResult, now: float) -> None:
         if self.information is None and self._tracker.state is not ManagerState.NO_DEVICE:
             self._requests += 1
-            self.request_due = now + (
-                INFORMATION_DELAY if self._requests < INFORMATION_REQUESTS
-                else INFORMATION_INTERVAL)
+            self.request_due = now + DEVICE_INFORMATION.wait(self._requests)
 
     # Reports
 

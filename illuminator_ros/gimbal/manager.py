@@ -43,15 +43,12 @@ from ..mavlink.messages import Address, AnyCommand, Params, params_of
 from ..payload.listeners import Listeners
 from ..payload.messages import Attitude, GimbalDeviceAttitudeStatus, GlobalPositionInt
 from ..payload.mount_attitude import AXES
-from ..payload.rotation import Quaternion
 
 # s between GIMBAL_MANAGER_STATUS, and between those that are sent because control has changed.
 STATUS_INTERVAL = 0.2
 CHANGE_INTERVAL = 0.1
 # s without an attitude of a device without MAVLink after which its setpoint is reported.
 MEASURED_AGE = 1.0
-# s within which two different heartbeats of one address show two senders.
-IDENTITY_TIME = 3.0
 
 
 @dataclass(frozen=True)
@@ -74,8 +71,6 @@ class ManagerSettings:
 class GimbalManager(Payload):
     """
     The manager of one gimbal: messages and commands of players, and reports to them.
-
-    It has 16 fields: its parts, and the times of its reports.
 
     :param commands: sends everything, from the manager's address.
     :param draw: returns a random number, 0..1.
@@ -117,12 +112,10 @@ class GimbalManager(Payload):
         self._is_awaited = False
         self._measured_at = self._changed_at = -math.inf
         self._status_due = math.inf
-        # The last heartbeat of each player in control, and its time.
-        self._identities: dict[Address, tuple[tuple[int, int], float]] = {}
         self._handlers: dict[int, Callable[[Address, AnyCommand, float], None]] = {
             mavlink.MAV_CMD_DO_GIMBAL_MANAGER_PITCHYAW: self._pitch_yaw,
             mavlink.MAV_CMD_DO_SET_ROI_LOCATION: self._set_roi,
-            mavlink.MAV_CMD_DO_SET_ROI_NONE: self._clear_roi}
+            mavlink.MAV_CMD_DO_SET_ROI_NONE: self._set_roi}
 
     # The payload
 
@@ -147,8 +140,8 @@ class GimbalManager(Payload):
         if isinstance(message, AnySetpoint):
             self.take_setpoint(source, message, now)
         elif isinstance(message, mav.Heartbeat):
-            self.control.heard(source, now)
-            self._compare_identity(source, message, now)
+            if self.control.heard(source, message, now):
+                self.events.emit(AddressShared(source))
             if message.type == mavlink.MAV_TYPE_GIMBAL:
                 self.tracker.hear_device(source, now)
         elif isinstance(message, GimbalDeviceAttitudeStatus | gimbal.GimbalDeviceInformation):
@@ -187,7 +180,8 @@ class GimbalManager(Payload):
                 self._is_awaited = False
                 self._report(information)
             if not self.tracker.has_mavlink and now >= self._measured_at + MEASURED_AGE:
-                self._report_commanded(now)
+                # The setpoint of a device that reports no attitude is its attitude.
+                self._take_attitude(self._setpoints.as_status(now), now)
         if now >= self._setpoints.due:
             self._setpoints.poll(now)
         self._setpoints.rate_stop.poll(now)
@@ -249,14 +243,6 @@ class GimbalManager(Payload):
             self._report(replaced(
                 status, flags=status.flags | flags, gimbal_device_id=self.tracker.device_id,
                 failure_flags=status.failure_flags | limits))
-
-    def _report_commanded(self, now: float) -> None:
-        """Report the setpoint as the attitude of a device that reports no attitude."""
-        sent, heading = self._setpoints.sent, self.vehicle.heading(now)
-        self._take_attitude(GimbalDeviceAttitudeStatus(
-            0, 0, mav.time_boot_ms(now), mavlink.GIMBAL_DEVICE_FLAGS_YAW_IN_VEHICLE_FRAME,
-            sent and sent.attitude or Quaternion(), math.nan, math.nan, math.nan, 0,
-            math.nan if heading is None else heading, math.nan), now)
 
     def vehicle_changed(self, now: float) -> None:
         """Send the vehicle's state to the device, unless an autopilot does."""
@@ -376,25 +362,11 @@ class GimbalManager(Payload):
 
     def _set_roi(self, source: Address, command: AnyCommand, now: float) -> None:
         self._check_control(source)
-        place, is_relative = read_roi(command)
-        self._setpoints.point(place, now, is_relative=is_relative)
-
-    def _clear_roi(self, source: Address, command: AnyCommand, now: float) -> None:
-        self._check_control(source)
-        self._setpoints.end_place(now)
-
-    def _compare_identity(self, source: Address, message: mav.Heartbeat, now: float) -> None:
-        """Report that two senders use the address of a player in control."""
-        holders = [self.control.holder(role) for role in Role]
-        self._identities = {
-            one: identity for one, identity in self._identities.items() if one in holders}
-        if source not in holders:
-            return
-        identity = message.type, message.autopilot
-        before, at = self._identities.get(source, (identity, now))
-        self._identities[source] = identity, now
-        if before != identity and now < at + IDENTITY_TIME:
-            self.events.emit(AddressShared(source))
+        if command.command == mavlink.MAV_CMD_DO_SET_ROI_NONE:
+            self._setpoints.end_place(now)
+        else:
+            place, is_relative = read_roi(command)
+            self._setpoints.point(place, now, is_relative=is_relative)
 
     # Reports
 

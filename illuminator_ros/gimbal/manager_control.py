@@ -21,8 +21,11 @@ from dataclasses import dataclass
 from enum import Enum
 
 from .messages import NO_PLAYER, REMOVE_SENDER, SENDER, UNCHANGED
-from ..mavlink.messages import Address
+from ..mavlink.messages import Address, Heartbeat
 from ..payload.arbitration import Arbiter, Cause, Policy
+
+# s within which two different heartbeats of one address show two senders.
+IDENTITY_TIME = 3.0
 
 
 class Role(Enum):
@@ -85,6 +88,8 @@ class ControlArbiter:
             settings.policy, rank, lease=settings.lease, overruling=settings.overruling)
             for _ in Role)
         self._arbiters = {Role.PRIMARY: self.primary, Role.SECONDARY: self.secondary}
+        # The last heartbeat of each player in control, and its time.
+        self._identities: dict[Address, tuple[tuple[int, int], float]] = {}
 
     def holder(self, role: Role) -> Address | None:
         """Return the player that has a role, None if none has."""
@@ -112,10 +117,19 @@ class ControlArbiter:
         return [change for role, player in wanted.items()
                 if (change := self._give(role, source, player, now))]
 
-    def heard(self, player: Address, now: float) -> None:
-        """Note a heartbeat of a player."""
+    def heard(self, player: Address, message: Heartbeat, now: float) -> bool:
+        """Note a heartbeat of a player; return whether two senders use its address in control."""
         for arbiter in self._arbiters.values():
             arbiter.renew(player, now)
+        holders = [self.holder(role) for role in Role]
+        self._identities = {
+            one: identity for one, identity in self._identities.items() if one in holders}
+        if player not in holders:
+            return False
+        identity = message.type, message.autopilot
+        before, at = self._identities.get(player, (identity, now))
+        self._identities[player] = identity, now
+        return before != identity and now < at + IDENTITY_TIME
 
     def poll(self, now: float) -> list[RoleHolderChanged]:
         """Take the roles from players whose lease has ended."""

@@ -21,14 +21,13 @@ import math
 
 from .axes import TURNING
 from .messages import rates_of
+from ..mavlink.retries import Retries, ZERO_RATE
 from ..payload.messages import GimbalDeviceAttitudeStatus
 from ..payload.mount_attitude import MountAttitude
 
 # s; the least time between two attitudes that show whether a device turns, since one may be a copy
 # of the other; and from a zero to the first attitude that counts. Many devices send one in 0.1 s.
 ATTITUDE_SPACING = 0.09
-# s between zeros, and for which they are repeated.
-STOP_INTERVAL, STOP_LIMIT = 0.1, 1.0
 
 
 class TurningDetector:
@@ -76,15 +75,19 @@ class RateStop:
     has the device, or the link was lost. No I/O; times are s.
 
     :param ended: called with whether an attitude has shown that, before the time was over.
-    :ivar due: when :meth:`poll` is due, infinity while nothing is sent.
     """
 
     def __init__(self, ended: Callable[[bool], None]) -> None:
-        self.due = math.inf
+        self._retries = Retries(ZERO_RATE, math.inf)
         self._ended = ended
         self._send: Callable[[], None] = lambda: None
         self._begun = -math.inf
         self._detector = TurningDetector()
+
+    @property
+    def due(self) -> float:
+        """Return when :meth:`poll` is due, infinity while nothing is sent, s."""
+        return self._retries.due
 
     @property
     def is_running(self) -> bool:
@@ -98,7 +101,9 @@ class RateStop:
         :param was_sent: whether it has just been sent for the first time.
         """
         self._send, self._begun = send, now
-        self.due = now + STOP_INTERVAL if was_sent else now
+        self._retries = Retries(ZERO_RATE, now)
+        if was_sent:
+            self._retries.note_try(now)
         self._detector.reset()
         self.poll(now)
 
@@ -117,14 +122,14 @@ class RateStop:
 
     def poll(self, now: float) -> None:
         """Send the zero, or end, if that is due."""
-        if not self.due <= now:
+        if now < self.due:
             return
-        if now >= self._begun + STOP_LIMIT:
+        if self._retries.is_spent:
             self._end(False)
         else:
-            self.due = now + STOP_INTERVAL
+            self._retries.note_try(now)
             self._send()
 
     def _end(self, stands: bool) -> None:
-        self.due = math.inf
+        self._retries.stop()
         self._ended(stands)

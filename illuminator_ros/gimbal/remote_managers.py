@@ -17,7 +17,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Collection, Iterator
-from dataclasses import dataclass
 import math
 from typing import Any
 
@@ -33,16 +32,19 @@ from ..mavlink.command_sender import (
 )
 from ..mavlink.dialect import mavlink
 from ..mavlink.messages import Address
+from ..mavlink.retries import GIMBAL_MESSAGE, Retries
 from ..payload.confirmed_command import Result, Target
 from ..payload.device_property import Caller, Desired, Outcome, Property
+from ..payload.liveness import Liveness
 from ..payload.messages import GimbalDeviceAttitudeStatus
 from ..payload.mount_attitude import yaw_frame, YawFrame
 
 # s of silence after which a manager or a device is lost.
 SILENCE_LIMIT = 3.0
 # s since the last GIMBAL_MANAGER_STATUS after which it is requested (ArduPilot does not stream it,
-# PX4 does every 2 s), and after which control is unknown.
-STATUS_REQUEST_DELAY, STATUS_LIMIT = 3.0, 6.0
+# PX4 does every 2 s), before a manager with a heartbeat each 5 s is lost; and after which control
+# is unknown.
+STATUS_REQUEST_DELAY, STATUS_LIMIT = 2.5, 6.0
 # s for which a release of control waits until the attitude shows that the gimbal stands.
 STOP_LIMIT = 0.45
 # ms by which a status may be older than the one before it; with a longer step back, its sender has
@@ -50,26 +52,6 @@ STOP_LIMIT = 0.45
 LATE_LIMIT = 1000
 # The most managers of one gimbal; further ones are ignored.
 MAX_MANAGERS = 4
-
-
-@dataclass
-class Repetition:
-    """The times of the requests for a message, at growing intervals until it comes; s."""
-
-    due: float = -math.inf
-    _interval: float = 1.0
-
-    def take(self, now: float) -> bool:
-        """Return whether the message must be requested now."""
-        if now < self.due:
-            return False
-        self.due = now + self._interval
-        self._interval = min(2 * self._interval, 60.0)
-        return True
-
-    def finish(self) -> None:
-        """End the requests: the message has come."""
-        self.due = math.inf
 
 
 def is_late(time_boot_ms: int, newest: int) -> bool:
@@ -100,11 +82,12 @@ class RemoteManager:
 
     def __init__(self, address: Address, commands: CommandSender, key: events.GimbalKey) -> None:
         self.address = address
-        self.heard_at = self.status_at = -math.inf
+        self.liveness = Liveness(SILENCE_LIMIT)
+        self.status_at = -math.inf
         self.autopilot: int | None = None
         self.information: GimbalManagerInformation | None = None
         self.control: Control | None = None
-        self.status_query = Repetition()
+        self.status_query = Retries(GIMBAL_MESSAGE)
         self._status_time = 0
         self.release_due = -math.inf
         self._commands = commands
@@ -210,18 +193,14 @@ class RemoteManager:
         """Whether it refuses components without control, as far as it is known."""
         return self.autopilot != mavlink.MAV_AUTOPILOT_ARDUPILOTMEGA
 
-    def is_heard(self, now: float) -> bool:
-        """Return whether it is not lost."""
-        return now < self.heard_at + SILENCE_LIMIT
-
     def known_control(self, now: float) -> Control | None:
         """Return the components in control, None if they are not known."""
-        is_known = self.is_heard(now) and now < self.status_at + STATUS_LIMIT
+        is_known = self.liveness.is_heard(now) and now < self.status_at + STATUS_LIMIT
         return self.control if is_known else None
 
     def control_deadline(self) -> float:
         """Return when :meth:`known_control` returns None without another message, s."""
-        return min(self.heard_at + SILENCE_LIMIT, self.status_at + STATUS_LIMIT)
+        return min(self.liveness.silent_at, self.status_at + STATUS_LIMIT)
 
     def lack_of_status(self, now: float) -> str:
         """Return that its status is missing, for people."""
@@ -235,7 +214,7 @@ class RemoteManager:
             return False
         self._status_time = status.time_boot_ms
         self.status_at, self.control = now, Control.of(status)
-        self.status_query = Repetition(now + STATUS_REQUEST_DELAY)
+        self.status_query = Retries(GIMBAL_MESSAGE, now + STATUS_REQUEST_DELAY)
         return True
 
     def confirm_control(self, status: GimbalManagerStatus, now: float) -> None:
@@ -303,12 +282,12 @@ class RemoteManagers:
         if address not in self.all and len(self.all) < MAX_MANAGERS:
             self.all[address] = RemoteManager(address, self._commands, self._key)
         if manager := self.all.get(address):
-            manager.heard_at = now
+            manager.liveness.hear(now)
         return manager
 
     def choose(self, now: float) -> None:
         """Use another manager if the used one is lost, and report further ones."""
-        heard = [one for one in self.all.values() if one.is_heard(now)]
+        heard = [one for one in self.all.values() if one.liveness.is_heard(now)]
         if not heard:
             return
         if self.used not in heard:
@@ -323,7 +302,7 @@ class RemoteManagers:
     def components_lost(self, lost: Collection[Address], now: float, reason: str) -> None:
         """Lose some managers at once."""
         for manager in [one for one in self.all.values() if one.address in lost]:
-            manager.heard_at = min(manager.heard_at, now - SILENCE_LIMIT)
+            manager.liveness.lose(now)
             manager.cancel(reason, now)
 
     def close(self, message: str, now: float) -> None:

@@ -42,9 +42,10 @@ from .rate_stop import RateStop
 from .vehicle_state import VehicleState
 from ..mavlink.command_sender import CommandSender
 from ..mavlink.dialect import mavlink, short_names
-from ..payload.messages import GeoPoint
+from ..mavlink.messages import time_boot_ms
+from ..payload.messages import GeoPoint, GimbalDeviceAttitudeStatus
 from ..payload.mount_attitude import AXES, STILL, UNSET_QUATERNION, YawFrame
-from ..payload.rotation import Vector
+from ..payload.rotation import Quaternion, Vector
 
 # s between repetitions of a constant setpoint, at most 1 s by the specification; and between
 # setpoints that follow a place, the vehicle or a rate.
@@ -207,6 +208,14 @@ class SetpointMixer:
         self._send(now)
 
     # The path to the device
+
+    def as_status(self, now: float) -> GimbalDeviceAttitudeStatus:
+        """Return the setpoint as the attitude of a device that reports none."""
+        sent, heading = self.sent, self._vehicle.heading(now)
+        return GimbalDeviceAttitudeStatus(
+            0, 0, time_boot_ms(now), mavlink.GIMBAL_DEVICE_FLAGS_YAW_IN_VEHICLE_FRAME,
+            sent and sent.attitude or Quaternion(), math.nan, math.nan, math.nan, 0,
+            math.nan if heading is None else heading, math.nan)
 
     def _start(self, request: Setpoint, now: float) -> Vector:
         """Return the angles that a request changes; :raises Refused: if they are unknown."""

@@ -242,13 +242,19 @@ class SetpointStream:
         """Send a zero once this component has control, if the device then turns."""
         self._last = _Setpoint(Kind.ZERO, due=[-math.inf] * len(REPEATS))
 
-    def control_unknown(self, now: float, *, can_send: bool) -> None:
-        """Repeat no attitude, and end a rate with a zero, now or when control is known again."""
+    def control_unknown(self, now: float, *, can_send: bool, is_heard: bool) -> None:
+        """
+        Repeat no attitude, and end a rate with a zero, now or when control is known again.
+
+        A manager that is not heard gets both: it may hear the first one.
+        """
         last = self._last
         if last is not None and last.may_have_rate:
             last.kind, last.due = Kind.RATE, [now]
             if can_send:
                 self.set_rates(STILL, now)
+                if not is_heard:
+                    self._last = last
         elif last is not None:
             last.due.clear()
 

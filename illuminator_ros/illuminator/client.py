@@ -21,12 +21,12 @@ import functools
 import itertools
 
 from .commands import SWITCHES
-from .events import LightEvent, LightForgotten, LightFound
+from .events import LightEvent
 from .light import Light, Settings
 from .messages import IlluminatorStatus
 from .model import Status
 from .mount_orientation import MountOrientations
-from ..mavlink.command_sender import Command, CommandSender
+from ..mavlink.command_sender import Command, CommandSender, CommandStatus
 from ..mavlink.component import Payload
 from ..mavlink.dialect import mavlink
 from ..mavlink.messages import (
@@ -76,8 +76,9 @@ class IlluminatorClient(Payload):
         self.events: Listeners[LightEvent] = Listeners()
         # Takes the results of the OFF at the end of the process.
         self._report_off: Callable[[Light, Result, float], None] | None = None
-        self.discovery = Discovery(
-            self._make, commands, found=self._found, forgotten=self._forgotten, wanted=wanted)
+        self.discovery = Discovery[Address, Light](
+            self.events.emit, found=self._found, wanted=wanted,
+            dropped=lambda one, now: commands.end_all(now, CommandStatus.CANCELLED, one))
         self.lights: Mapping[Address, Light] = self.discovery.devices
         self.messages = (Heartbeat, IlluminatorStatus, ComponentInformationBasic, CommandAck,
                          *(self.mounts.messages if needs_mounts else ()))
@@ -101,13 +102,10 @@ class IlluminatorClient(Payload):
         return Light(address, self._commands, self.settings, emit)
 
     def _found(self, light: Light, now: float) -> None:
-        self.events.emit(LightFound(light.address))
         for event in light.snapshot(now).events():
             self.events.emit(event)
+        light.announce(now)
         self._switch_off_finally(light, now)
-
-    def _forgotten(self, light: Light) -> None:
-        self.events.emit(LightForgotten(light.address))
 
     def link_opened(self, now: float) -> None:
         """See :meth:`Payload.link_opened`."""
@@ -132,10 +130,10 @@ class IlluminatorClient(Payload):
     def receive(self, source: Address, message: Message, now: float) -> None:
         """See :meth:`Payload.receive`."""
         if isinstance(message, IlluminatorStatus):
-            if light := self.discovery.hear(source, now, proved=True):
+            if light := self.discovery.hear(source, now, self._make, proved=True):
                 light.take_status(Status.from_message(message), now)
         elif isinstance(message, Heartbeat) and message.type == mavlink.MAV_TYPE_ILLUMINATOR:
-            if light := self.discovery.hear(source, now, proved=False):
+            if light := self.discovery.hear(source, now, self._make, proved=False):
                 light.heard(now)
         elif isinstance(message, self.mounts.messages):
             if self.mounts.take(source, message, now):

@@ -57,13 +57,19 @@ class Switch(NamedTuple):
         """See :class:`~..payload.confirmed_command.Change`."""
         return 'on' if self.on else 'off'
 
-    def shown_by(self, status: Status) -> bool:
+    def shown_by(self, status: Status) -> bool | None:
         """See :class:`~..payload.confirmed_command.Change`."""
+        if not self.on and status.is_off_by_heat:
+            return None
         return status.enabled is self.on
 
     def evidence(self, status: Status) -> str:
         """See :class:`~..payload.confirmed_command.Change`."""
-        return _despite_heat(status) if self.on else CONFIRMED
+        if self.on:
+            return _despite_heat(status)
+        if status.is_off_by_heat:
+            return f'accepted (ILLUMINATOR_STATUS shows {self.actual(status)})'
+        return CONFIRMED
 
     def actual(self, status: Status) -> str:
         """See :class:`~..payload.confirmed_command.Change`."""

@@ -19,11 +19,12 @@ from __future__ import annotations
 from dataclasses import dataclass
 from enum import Enum
 import math
-from typing import NamedTuple
+from typing import NamedTuple, TypeAlias
 
 from .model import Configuration, FIELDS, Status
 from ..mavlink.messages import Address
 from ..payload.arbitration import Cause, HolderChanged
+from ..payload.device_events import DeviceConnected, DeviceEvent, DeviceHeld
 from ..payload.identity import Identity
 
 
@@ -43,37 +44,7 @@ A_REQUEST, OTHER_SENDER = 'a request', 'another sender'
 LATE_EFFECT = 'a late effect of our request'
 
 
-@dataclass(frozen=True)
-class LightEvent:
-    """
-    An event of the light at an address.
-
-    :param address: where the light is.
-    """
-
-    address: Address
-
-
-@dataclass(frozen=True)
-class LightFound(LightEvent):
-    """A light was heard for the first time."""
-
-
-@dataclass(frozen=True)
-class LightForgotten(LightEvent):
-    """A light that stayed silent was dropped, so that another one can take its place."""
-
-
-@dataclass(frozen=True)
-class LightConnected(LightEvent):
-    """A light is heard, for the first time or again."""
-
-
-@dataclass(frozen=True)
-class LightLost(LightEvent):
-    """A light is not heard any more."""
-
-    reason: str
+LightEvent: TypeAlias = DeviceEvent[Address]
 
 
 @dataclass(frozen=True)
@@ -177,13 +148,6 @@ class LimitExceeded(LightEvent):
 
 
 @dataclass(frozen=True)
-class LightHeld(LightEvent):
-    """The source of commands that holds a light has changed."""
-
-    change: HolderChanged[str]
-
-
-@dataclass(frozen=True)
 class DesiredStateFailed(LightEvent):
     """The light has not accepted the values that its new holder had requested before."""
 
@@ -258,7 +222,7 @@ class LightSnapshot(NamedTuple):
 
     def events(self) -> list[LightEvent]:
         """Return the events that lead to this state, for a listener that subscribes late."""
-        events: list[LightEvent] = [LightConnected(self.address)] if self.connected else []
+        events: list[LightEvent] = [DeviceConnected(self.address)] if self.connected else []
         if self.identity:
             events.append(LightIdentified(self.address, self.identity))
         if self.status:
@@ -270,6 +234,6 @@ class LightSnapshot(NamedTuple):
             events.append(ConfigurationChanged(
                 self.address, self.configuration, list(FIELDS), ChangeCause.FIRST_STATUS))
         if self.holder:
-            events.append(LightHeld(
+            events.append(DeviceHeld(
                 self.address, HolderChanged(None, self.holder, Cause.CLAIM)))
         return events

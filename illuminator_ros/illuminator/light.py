@@ -28,14 +28,16 @@ from .messages import STATUS_ID
 from .model import Changes, SafetyLimits, Status, StrobeRange
 from .status_order import ChangingStates, Order, StatusOrder
 from .switch import OFF, ON, Silence, Switch
-from ..mavlink.command_sender import CommandSender, format_seconds
+from ..mavlink.command_sender import Command, CommandSender
 from ..mavlink.dialect import mavlink
 from ..mavlink.messages import Address
 from ..payload.arbitration import Cause, HolderChanged
 from ..payload.command_sources import DEFAULT, SourceSettings
-from ..payload.confirmed_command import Done, Result, Target
+from ..payload.confirmed_command import Done, FENCE, Result, Target
+from ..payload.device_events import DeviceConnected, DeviceDisconnected, DeviceHeld
 from ..payload.device_property import answer, Caller, Outcome
 from ..payload.identity import Identity
+from ..payload.liveness import Liveness
 
 
 @dataclass(frozen=True)
@@ -72,8 +74,6 @@ class Light:
     desired now and answers the callers whose requests have ended.
 
     :param emit: takes the events.
-    :ivar heard_at: the time of its last message; -inf before the first.
-    :ivar lost_at: when it was lost; infinity while it is heard.
     :ivar was_commanded: whether a user has ever sent it a command.
     """
 
@@ -82,8 +82,7 @@ class Light:
         emit: Callable[[events.LightEvent], None],
     ) -> None:
         self.address = address
-        self.heard_at = -math.inf
-        self.lost_at = math.inf
+        self.liveness = Liveness(settings.heartbeat_timeout)
         self.was_commanded = False
         self._commands = commands
         self._settings = settings
@@ -97,19 +96,20 @@ class Light:
         self._order = StatusOrder()
         self._changing = ChangingStates()
         self._measures_temperature = False
-        self._link_failure = ''
 
     # Reception
 
     def heard(self, now: float) -> None:
         """Take a heartbeat, or anything else that shows that the light is alive."""
-        was_connected, self.heard_at = self.connected, now
-        if not was_connected:
-            self.lost_at = math.inf
+        if self.liveness.hear(now):
             self._configuration.found(now)
             self._queries.begin(now)
-            self._emit(events.LightConnected(self.address))
+            self._emit(DeviceConnected(self.address))
             self._update(now)
+
+    def announce(self, now: float) -> None:
+        """Note that it has proved to be a light."""
+        self._queries.announce(now, is_heard=self.connected)
 
     def take_status(self, status: Status, now: float) -> None:
         """Take an ILLUMINATOR_STATUS, unless it is older than the one before."""
@@ -161,12 +161,11 @@ class Light:
 
     def lose(self, reason: str, now: float) -> None:
         """Note that the light is not heard any more."""
-        if self.connected:
-            self.lost_at = now
+        if self.liveness.lose(now):
             self._order.lost()
             self._changing = ChangingStates()
             self._queries.end()
-            self._emit(events.LightLost(self.address, reason))
+            self._emit(DeviceDisconnected(self.address, reason))
             message = self.unreachable(now)
             self._switch.cancel(message, now)
             self._configuration.lost(message, now)
@@ -174,11 +173,11 @@ class Light:
 
     def link_opened(self, now: float) -> None:
         """Note that the light can be reached."""
-        self._link_failure = ''
+        self.liveness.link_failure = ''
 
     def link_closed(self, now: float, reason: str) -> None:
         """Note that the light cannot be reached."""
-        self._link_failure = f'the link is not open: {reason}'
+        self.liveness.link_failure = f'the link is not open: {reason}'
         self.lose('the link was lost', now)
 
     # Values
@@ -186,7 +185,12 @@ class Light:
     @property
     def connected(self) -> bool:
         """Whether it is heard."""
-        return self.lost_at == math.inf != -self.heard_at
+        return self.liveness.connected
+
+    @property
+    def lost_at(self) -> float:
+        """When it was lost, s; infinity while it is heard."""
+        return self.liveness.lost_at
 
     @property
     def status(self) -> Status | None:
@@ -214,22 +218,18 @@ class Light:
 
     def unreachable(self, now: float) -> str:
         """Return why requests cannot reach the light, for people; '' if they can."""
-        if self.connected:
-            return ''
-        # Without a link no heartbeat can be heard, so the failure of the link is the reason.
-        reason = self._link_failure or f'no heartbeat for {format_seconds(now - self.heard_at)}'
-        return f'light {self.address} is lost: {reason}'
+        return '' if self.connected else self.liveness.loss(f'light {self.address}', now)
 
     def snapshot(self, now: float) -> events.LightSnapshot:
         """Return the state, for any thread."""
         configuration, queries = self._configuration, self._queries
         return events.LightSnapshot(
-            self.address, self.connected, self.heard_at, self.status, self._order.newest_at,
-            self._settings.status_interval, self.restarts, self._temperature,
-            configuration.agreed, configuration.discrepancy, configuration.exceeded,
-            queries.identity, queries.identity_is_settled(now), self._changing.are_changing,
-            self.unreachable(now), self._sources.shown_holder, self._sources.since,
-            self._switch.off_at)
+            self.address, self.connected, self.liveness.heard_at, self.status,
+            self._order.newest_at, self._settings.status_interval, self.restarts,
+            self._temperature, configuration.agreed, configuration.discrepancy,
+            configuration.exceeded, queries.identity, queries.identity_is_settled(now),
+            self._changing.are_changing, self.unreachable(now), self._sources.shown_holder,
+            self._sources.since, self._switch.off_at)
 
     def change_settings(self, settings: Settings, now: float) -> None:
         """
@@ -336,29 +336,40 @@ class Light:
 
         :return: whether it may be sent now; if not, it is answered with the reason.
         """
-        closed, sources, source = self._commands.refusal, self._sources, caller.source
-        refusal = closed
-        if not refusal:
-            self._take_holder(sources.poll(now), now)
-            self.was_commanded = True
-            refusal = sources.refusal(source)
-            if desired.enabled is not False and (late := self._commands.lateness(now)):
-                refusal = late
-            elif caller.is_stream:
-                self._take_stream(source, desired, now)
-            elif not refusal and desired.enabled is False:
-                # An OFF ends the ON that is remembered, though it may fail.
-                sources.forget_switch(source)
-            refusal = refusal or self.unreachable(now)
-        if refusal:
-            caller.done(Result(False, refusal, superseded=bool(closed)), now)
-        elif not caller.is_stream:
-            self._take_over(source, now)
-            # Calls that overlap, of which none succeeds, must not hold off the silence for ever.
-            if not sources.are_calling:
-                self._switch.silence.called_at = now
-            sources.begin_call(source)
-        return not refusal
+        sources, source, is_off = self._sources, caller.source, desired.enabled is False
+        if closed := self._commands.refusal:
+            caller.done(Result(False, closed, superseded=True), now)
+            return False
+        self._take_holder(sources.poll(now), now)
+        self.was_commanded = True
+        late, held = '' if is_off else self._commands.lateness(now), sources.refusal(source)
+        if caller.is_stream and not late:
+            self._take_stream(source, desired, now)
+        elif is_off and not held:
+            # An OFF ends the ON that is remembered, though it may fail.
+            sources.forget_switch(source)
+        if is_off and not (held or self.connected):
+            self._send_unheard_off()
+            # Its answer does not explain a later ON.
+            self._switch.changes.fence_until(now + FENCE)
+        if refusal := late or held or self.unreachable(now):
+            caller.done(Result(False, refusal), now)
+            return False
+        if not caller.is_stream:
+            self._begin_call(source, now)
+        return True
+
+    def _send_unheard_off(self) -> None:
+        """Send an OFF once to a light that is lost: it may hear though it is not heard."""
+        if not self.liveness.link_failure:
+            self._commands.send_once(Command(self.address, OFF.command, OFF.params))
+
+    def _begin_call(self, source: str, now: float) -> None:
+        self._take_over(source, now)
+        # Calls that overlap, of which none succeeds, must not hold off the silence for ever.
+        if not self._sources.are_calling:
+            self._switch.silence.called_at = now
+        self._sources.begin_call(source)
 
     def _take_stream(self, source: str, desired: DesiredState, now: float) -> None:
         """Take a request of a stream, which counts at once."""
@@ -372,8 +383,7 @@ class Light:
 
     def _take_over(self, source: str, now: float) -> None:
         """End the requests of another source, unless it is a higher one."""
-        sources = self._sources
-        if sources.are_ranked and sources.commander != source and not sources.refusal(source):
+        if self._sources.takes_over(source):
             self._end_requests(f'held by {source}', now)
 
     def _end_requests(self, message: str, now: float) -> None:
@@ -405,7 +415,7 @@ class Light:
         """Take a change of the source that holds the light."""
         if change is None:
             return
-        self._emit(events.LightHeld(self.address, change))
+        self._emit(DeviceHeld(self.address, change))
         if change.after is None:
             if self._settings.off_on_release and not self._is_known_off(now):
                 self._switch.require_off(f'on_release: {change.before} no longer holds it')
@@ -493,24 +503,25 @@ class Light:
 
         :param report: called with a failure that is not permanent when the first OFF is sent and
             when one has failed, and with a success when the light shows it. The failure of a light
-            that is not heard is permanent until it is heard.
+            without an open link is permanent.
         """
         self._switch.switch_off_finally(now, report)
         if not self.connected:
-            report(Result(False, self.unreachable(now), permanent=True), now)
+            self._send_unheard_off()
+            report(Result(False, self.unreachable(now),
+                          permanent=bool(self.liveness.link_failure)), now)
         self._update(now)
 
     # Time
 
     def poll(self, now: float) -> None:
         """Do what is due."""
-        # Compute the same sum as next_deadline(); the difference is rounded differently.
-        if self.connected and now >= self.heard_at + self._settings.heartbeat_timeout:
-            self.lose(f'no heartbeat for {format_seconds(now - self.heard_at)}', now)
+        if now >= self.liveness.silent_at:
+            self.lose(self.liveness.silence(now), now)
         if now >= self._changing.until:
             self._changing = ChangingStates()
             self._emit(events.StatesChanging(self.address, False))
-        self._queries.poll(now, self.heard_at if self.connected else math.inf)
+        self._queries.poll(now, self.liveness.heard_at if self.connected else math.inf)
         self._take_holder(self._sources.poll(now), now)
         self._switch.changes.poll(now)
         self._configuration.changes.poll(now)
@@ -518,12 +529,13 @@ class Light:
 
     def next_deadline(self) -> float:
         """Return when :meth:`poll` has something to do."""
-        due = self._queries.next_deadline(self.heard_at if self.connected else math.inf)
+        due = self._queries.next_deadline(
+            self.liveness.heard_at if self.connected else math.inf)
         if self._sources.are_ranked:
             due = min(due, self._sources.next_deadline())
         if self.connected:
             due = min(due, self._switch.next_deadline(), self._configuration.next_deadline(),
-                      self._changing.until, self.heard_at + self._settings.heartbeat_timeout)
+                      self._changing.until, self.liveness.silent_at)
         return due
 
 

@@ -22,7 +22,7 @@ are required (restored after a restart, overrides, limits), and the agreed ones 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from enum import Enum
 import math
 
@@ -41,6 +41,7 @@ from .model import (
     unexpected_differences,
 )
 from ..mavlink.messages import Address
+from ..mavlink.retries import REQUIRED, Retries
 from ..payload.confirmed_command import Change, Result, Target
 from ..payload.device_property import Caller, Desired, Outcome, Property
 
@@ -49,9 +50,6 @@ from ..payload.device_property import Caller, Desired, Outcome, Property
 CONFIGURE_LIMIT = 0.85
 # s to wait for the first status before a complete set of overrides is sent without one.
 FIRST_STATUS_TIMEOUT = 3.0
-# s from a try of required values to the next one: the first wait, doubled each time up to the
-# longest.
-FIRST_RETRY, LONGEST_RETRY = 2.0, 60.0
 # s; a light that exceeds a limit is brought back within it once in this time.
 LIMIT_INTERVAL = 10.0
 # s after a command of ours in which a change of another value counts as implied by it.
@@ -74,15 +72,13 @@ class Required:
     The values that must be sent though no request asks for them. Times are s.
 
     :param fields: the value of each field, and its reason.
-    :param due: when they are sent next.
-    :param wait: from then to the next try.
+    :param retries: when they are sent next.
     :param is_tried: whether they were sent.
     :param failure: why they are not confirmed, '' if that is not known.
     """
 
     fields: dict[str, tuple[float, Reason]]
-    due: float = math.inf
-    wait: float = FIRST_RETRY
+    retries: Retries = field(default_factory=lambda: Retries(REQUIRED, math.inf))
     is_tried: bool = False
     failure: str = ''
 
@@ -96,13 +92,13 @@ class Required:
         for name in names:
             self.fields.pop(name, None)
         if not self.fields:
-            self.due, self.wait, self.is_tried, self.failure = math.inf, FIRST_RETRY, False, ''
+            self.retries, self.is_tried, self.failure = Retries(REQUIRED, math.inf), False, ''
 
     def merged(self, values: Changes, reason: Reason, due: float) -> Required:
         """Return these and other values; only restored ones do not replace those that wait."""
         newer = {name: (value, reason) for name, value in values.items()}
         return Required({**newer, **self.fields} if reason is Reason.RESTORED
-                        else {**self.fields, **newer}, due)
+                        else {**self.fields, **newer}, Retries(REQUIRED, due))
 
 
 NO_FAILURE = ('', None, None)
@@ -155,7 +151,7 @@ class LightConfiguration:
         :raises InvalidValue: if the light must not get it.
         """
         values = self._sendable()
-        if values and now >= self._required.due:
+        if values and now >= self._required.retries.due:
             return Desired(self._change({}), _REQUIRED)
         if self._setpoint is not None and not (self._is_dark or self._must_wait):
             return Desired(self._change({'brightness': self._setpoint}), _SETPOINT,
@@ -222,8 +218,8 @@ class LightConfiguration:
 
     def _not_sent(self, reason: str, now: float) -> None:
         """Note that the goal cannot be sent before the first status."""
-        if self._required.values and now >= self._required.due:
-            self._required.due = math.inf
+        if self._required.values and now >= self._required.retries.due:
+            self._required.retries.due = math.inf
             self._required.failure = f'{", ".join(self._required.values)} not sent: {reason}'
             self._restored(False, self._required.failure)
         elif self._setpoint is not None:
@@ -332,7 +328,7 @@ class LightConfiguration:
     def found(self, now: float) -> None:
         """Note that the light is heard again: required values are due."""
         if self._required.fields:
-            self._required.due, self._required.wait = self._first_due(now), FIRST_RETRY
+            self._required.retries = Retries(REQUIRED, self._first_due(now))
 
     def cancel(self, message: str, now: float) -> None:
         """End all requests; required values stay."""
@@ -377,7 +373,7 @@ class LightConfiguration:
 
     @property
     def _address(self) -> Address:
-        return self.exceeded.address
+        return self.exceeded.key
 
     @property
     def strobe_range(self) -> StrobeRange:
@@ -459,7 +455,7 @@ class LightConfiguration:
         if self.agreed is None:
             self._adopt(reported, events.ChangeCause.FIRST_STATUS)
             if self._required.fields:
-                self._required.due = min(self._required.due, now)
+                self._required.retries.due = min(self._required.retries.due, now)
         self._drop_shown(status, reported)
         if can_follow:
             self._follow(status, reported, now, late=late, switched_at=switched_at)
@@ -584,8 +580,7 @@ class LightConfiguration:
     def _required_ended(self, result: Result, now: float) -> None:
         """Take the result of a command that no request has asked for."""
         required = self._required
-        required.due = now + required.wait
-        required.wait = min(2 * required.wait, LONGEST_RETRY)
+        required.retries.note_try(now)
         if result.success:
             self._restored(True, result.message)
         elif result.permanent:
@@ -606,7 +601,7 @@ class LightConfiguration:
         """Return when ``changes.poll`` or :meth:`update` has something to do."""
         due = self.changes.next_deadline()
         if self.changes.desired is None and self._sendable():
-            due = min(due, self._required.due)
+            due = min(due, self._required.retries.due)
         return due
 
 

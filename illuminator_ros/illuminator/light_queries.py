@@ -30,15 +30,12 @@ from ..mavlink.command_sender import (
 )
 from ..mavlink.dialect import mavlink
 from ..mavlink.messages import ComponentInformationBasic
+from ..mavlink.retries import MESSAGE
 from ..payload.confirmed_command import Done, Result, Target
 from ..payload.identity import Identity
 
 # s without a status after which the light is asked for one, and between the requests.
 STATUS_TIMEOUT = 2.5
-# s from the acknowledgement of a request to the message.
-MESSAGE_TIMEOUT = 0.5
-# How often a message is requested if it is acknowledged and does not come: it may be lost.
-MAX_QUESTIONS = 3
 # s from the first request until the identity counts as unknown.
 SETTLING_TIME = 2.0
 STATUS, IDENTITY = IlluminatorStatus.msgname, ComponentInformationBasic.msgname
@@ -92,7 +89,7 @@ class MessageQuery:
             # A newer request has replaced it.
             return
         if self._questions and result.accepted:
-            self.message_until = now + MESSAGE_TIMEOUT
+            self.message_until = now + MESSAGE.first
         elif self._questions:
             self.finish(result.describe_failure(), now)
 
@@ -109,7 +106,7 @@ class MessageQuery:
         """Ask again for a message that does not come, or give up."""
         if now < self.message_until:
             return
-        if self._questions < MAX_QUESTIONS:
+        if self._questions < (MESSAGE.tries or 1):
             self._send(now)
         else:
             self.finish('acknowledged, but not sent', now)
@@ -133,23 +130,39 @@ class LightQueries:
         # within the heartbeat timeout.
         self._longest_silence = min(STATUS_TIMEOUT, heartbeat_timeout / 1.2)
         self._status_request = request_message(target.address, STATUS_ID)
+        self._is_announced = False
         self._asked_at = -math.inf
         self._due = math.inf
         self._status = MessageQuery(target, STATUS_ID)
         self._identity = MessageQuery(target, ComponentInformationBasic.id)
 
     def begin(self, now: float) -> None:
-        """Request interval, status and identity: the light is heard, or has restarted."""
-        if self._interval > 0:
-            self._target.commands.start(Command(
-                self._target.address, mavlink.MAV_CMD_SET_MESSAGE_INTERVAL,
-                (float(STATUS_ID), self._interval * 1e6)), now)
+        """
+        Request the status: the light is heard, or has restarted.
+
+        One that is announced is also asked for interval and identity: the address of a candidate
+        may be forged, and costs few commands.
+        """
+        if self._is_announced:
+            self._request_interval_and_identity(now)
         self._due = now + STATUS_TIMEOUT
         # A request that was sent to the silent light would be resent only later.
         if self._status.is_asking:
             self._status.ask_again(now)
         else:
             self._target.commands.start(self._status_request, now)
+
+    def announce(self, now: float, *, is_heard: bool) -> None:
+        """Note that the light has proved that it is one."""
+        self._is_announced = True
+        if is_heard:
+            self._request_interval_and_identity(now)
+
+    def _request_interval_and_identity(self, now: float) -> None:
+        if self._interval > 0:
+            self._target.commands.start(Command(
+                self._target.address, mavlink.MAV_CMD_SET_MESSAGE_INTERVAL,
+                (float(STATUS_ID), self._interval * 1e6)), now)
         self._identity.ask(now)
 
     def request_status(self, now: float) -> None:

@@ -326,6 +326,12 @@ class Status:
         return bool(self.error_flags & DIMMING_FLAGS)
 
     @property
+    def is_off_by_heat(self) -> bool:
+        """Whether heat keeps the light off, so that it may light up once it has cooled down."""
+        return self.enabled is False and bool(
+            self.error_flags & mavlink.ILLUMINATOR_ERROR_FLAGS_OVER_TEMPERATURE_SHUTDOWN)
+
+    @property
     def is_dark(self) -> bool:
         """Whether it is off with a brightness of 0, so that a brightness may switch it on."""
         return self.enabled is False and self.brightness == 0.0

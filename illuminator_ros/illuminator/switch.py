@@ -24,8 +24,8 @@ from . import events
 from .commands import SWITCHES
 from .model import Mode, Status
 from ..mavlink.command_sender import format_seconds
-from ..mavlink.dialect import mavlink
-from ..payload.confirmed_command import Done, REPEAT_INTERVAL, Result, Target
+from ..mavlink.retries import UNCONFIRMED
+from ..payload.confirmed_command import Done, Result, Target
 from ..payload.device_property import Caller, Desired, Outcome, Property
 
 ON, OFF = SWITCHES[True], SWITCHES[False]
@@ -60,7 +60,8 @@ class Switch:
     :param emit: takes the events.
     :param off_after_silence: s without a request after which a light that is on is switched off;
         0 for never.
-    :ivar enabled: as reported, None if unknown.
+    :ivar enabled: as reported, None if unknown; while heat keeps the light off, as before, since
+        it may light up once it has cooled down.
     :ivar silence: of all who may request something.
     :ivar changes: the property of the light; :meth:`take_outcomes` returns its outcomes.
     """
@@ -85,7 +86,8 @@ class Switch:
         # The state and the failure that were reported last.
         self._told: bool | None = None
         self._told_failure = ''
-        self._was_hot = False
+        # Heat has switched it off, and it has not been on since.
+        self._is_off_by_heat = False
 
     # The desired value
 
@@ -194,23 +196,26 @@ class Switch:
         :param may_be_ours: whether a configuration of ours may have switched the light.
         :param is_told: whether a change that no command under way has made is reported.
         """
-        before, self.enabled = self.enabled, status.enabled
-        is_late = self._is_late(now)
-        if self.enabled and is_told and not self.changes.is_busy and (
-                before is None or not (before or is_late or may_be_ours or self._was_hot)):
-            # Another sender has switched it on, or it was on when it was found.
-            self.silence.requested_at = now
+        before, was_off_by_heat = self.enabled, self._is_off_by_heat
+        self._take_enabled(status)
+        origin = (events.LATE_EFFECT if self._is_late(now) else
+                  events.A_REQUEST if may_be_ours else events.OTHER_SENDER)
         if self.enabled is False and not self.changes.is_busy:
             self._required = None
+        elif self.enabled and is_told and not (self.changes.is_busy or was_off_by_heat) and (
+                before is None or not before and origin == events.OTHER_SENDER):
+            # Another sender has switched it on, or it was on when it was found.
+            self.silence.requested_at = now
         self.changes.reported(status, now)
-        self._was_hot = bool(
-            status.error_flags & mavlink.ILLUMINATOR_ERROR_FLAGS_OVER_TEMPERATURE_SHUTDOWN)
-        if not self.changes.outcomes and not self.changes.is_busy:
-            origin = (events.LATE_EFFECT if is_late else
-                      events.A_REQUEST if may_be_ours else events.OTHER_SENDER)
-            is_told = is_told and not (
-                self._told is None or status.is_dimmed or status.mode is Mode.EXTERNAL_SYNC)
-            self._tell(origin if is_told else '')
+        if not (self.changes.outcomes or self.changes.is_busy):
+            shows_switch = not (status.is_dimmed or status.mode is Mode.EXTERNAL_SYNC)
+            self._tell(origin if is_told and shows_switch and self._told is not None else '')
+
+    def _take_enabled(self, status: Status) -> None:
+        self._is_off_by_heat = status.is_off_by_heat or (
+            self._is_off_by_heat and not status.enabled)
+        if not self._is_off_by_heat:
+            self.enabled = status.enabled
 
     def _is_late(self, now: float) -> bool:
         """Return whether a command of ours that ended unconfirmed asked for this state."""
@@ -226,7 +231,8 @@ class Switch:
 
     def restarted(self, status: Status, now: float) -> None:
         """Take the first status after a restart, which confirms nothing."""
-        self.enabled = status.enabled
+        self.enabled, self._is_off_by_heat = None, False
+        self._take_enabled(status)
         self._tell('')
         self.changes.restarted(status, now)
 
@@ -242,11 +248,14 @@ class Switch:
                 self.enabled = on
                 self._required = None
                 self._is_finally_off = not on
-                self._off_due = now + REPEAT_INTERVAL if not on else -math.inf
+                self._off_due = now + UNCONFIRMED.first if not on else -math.inf
                 detail = next((one.detail for one in outcome.callers if one.detail), '')
                 self._tell(detail or desired.reason or events.A_REQUEST)
                 if self._report is not None and not on:
                     self._report(result, now)
+            elif on and self._is_off_by_heat:
+                # It may light up once it has cooled down.
+                self.enabled = None
             elif self._is_late(now):
                 self._tell(events.LATE_EFFECT)
             yield outcome

@@ -33,13 +33,10 @@ from typing import NamedTuple, TypeVar
 from . import messages
 from .dialect import mavlink
 from .messages import Address, Message
+from .retries import COMMAND, REJECTED
 
-# s; each wait for an acknowledgement is twice as long as the one before, up to this.
-LONGEST_WAIT = 1.0
 # s between two reports of progress. The specification does not define it; MAVSDK also uses 3 s.
 PROGRESS_TIMEOUT = 3.0
-# s between tries of a command that was temporarily rejected: the first, doubling up to the last.
-REJECTED_BACKOFF = (0.1, 0.8)
 # s after a stop of the process in which requests may have waited as long.
 OLD_REQUEST_TIME = 1.0
 # s between the tries of a command while the process ends, which has less than a second.
@@ -277,8 +274,7 @@ class CommandSender:
     Sends commands to any number of components, in parallel across them.
 
     :param address: our own address, which acknowledgements are matched against.
-    :param timeout: s, > 0: the wait for the acknowledgement of the first try; each further wait is
-        twice as long, up to :data:`LONGEST_WAIT`.
+    :param timeout: s, > 0: the wait for the acknowledgement of the first try.
     :param retries: resends after the first try, >= 0.
     :ivar outgoing: messages to send, each with the address that sends it.
     :ivar unanswering: the targets whose last command got no acknowledgement, at most
@@ -288,8 +284,8 @@ class CommandSender:
     """
 
     address: Address
-    timeout: float = 0.25
-    retries: int = 3
+    timeout: float = COMMAND.first
+    retries: int = (COMMAND.tries or 1) - 1
     outgoing: deque[tuple[Address, Message]] = field(default_factory=deque)
     counters: CommandCounters = field(default_factory=CommandCounters)
     unanswering: dict[Address, None] = field(default_factory=dict)
@@ -422,9 +418,8 @@ class CommandSender:
             pending.progress = ack.progress if ack.progress <= 100 else None
             pending.due = now + PROGRESS_TIMEOUT
         elif state is CommandState.BACKOFF:
-            first, last = REJECTED_BACKOFF
-            pending.due = now + min(first * 2 ** min(pending.rejected, 8), last)
             pending.rejected += 1
+            pending.due = now + REJECTED.wait(pending.rejected)
             if pending.due >= min(pending.first_sent + self._patience, pending.deadline):
                 self._end(pending, CommandStatus.ANSWERED, now)
                 return
@@ -446,7 +441,7 @@ class CommandSender:
         """Return the wait for an acknowledgement after so many resends, s."""
         if self._may_send is not None:
             return min(self.timeout, CLOSING_TIMEOUT)
-        return max(self.timeout, min(self.timeout * (1 << min(max(resends, 0), 16)), LONGEST_WAIT))
+        return COMMAND._replace(first=self.timeout).wait(max(resends, 0) + 1)
 
     def poll(self, now: float) -> None:
         """Resend or end what is due."""

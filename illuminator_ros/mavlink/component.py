@@ -36,6 +36,7 @@ from .messages import (
     heartbeat,
     Message,
 )
+from .statistics import MAX_SOURCES
 
 # s between heartbeats (heartbeat protocol).
 HEARTBEAT_INTERVAL = 1.0
@@ -178,6 +179,7 @@ class Component(Endpoint):
     :param commands: sends for all payloads, so that an acknowledgement has one receiver.
     :param payloads: receive each message from another address, and the link's state.
     :param mav_type: MAV_TYPE of the heartbeat.
+    :ivar heartbeats: the last one of each other component.
     """
 
     def __init__(
@@ -187,6 +189,7 @@ class Component(Endpoint):
         self.outgoing = commands.outgoing
         self.commands = commands
         self.address = commands.address
+        self.heartbeats: dict[Address, Heartbeat] = {}
         self._payloads = tuple(payloads)
         # HEARTBEAT and COMMAND_ACK show an address conflict even where no payload needs them. Each
         # command to this component is acknowledged, so that its sender need not wait for a
@@ -264,6 +267,9 @@ class Component(Endpoint):
         if isinstance(message, AnyCommand):
             self._take_command(source, message, now)
             return
+        if isinstance(message, Heartbeat) and (
+                source in self.heartbeats or len(self.heartbeats) < MAX_SOURCES):
+            self.heartbeats[source] = message
         for payload in self._receivers.get(type(message), ()):
             payload.receive(source, message, now)
 

@@ -22,11 +22,10 @@ import random
 import threading
 import time
 
+from .retries import CONNECTION
 from .transport import Channel, open_channel
 from .url import Url
 
-# s between tries: the first, doubling up to the last.
-FIRST_PAUSE, LAST_PAUSE = 0.05, 0.5
 # s between the beginnings of two tries, at most: a try may itself take almost as long, and the
 # link must be open within 1 s of the other side.
 LONGEST_PERIOD = 0.9
@@ -65,9 +64,8 @@ class Backoff:
         """
         if not self._failures:
             return 0.0
-        longest = min(FIRST_PAUSE * 2.0 ** min(self._failures - 1, 16), LAST_PAUSE)
-        pause = longest * (0.5 + 0.5 * self._jitter())
-        return min(pause, max(LONGEST_PERIOD - spent, FIRST_PAUSE))
+        pause = CONNECTION.wait(self._failures) * (0.5 + 0.5 * self._jitter())
+        return min(pause, max(LONGEST_PERIOD - spent, CONNECTION.first))
 
 
 class Connector:

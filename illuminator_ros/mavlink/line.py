@@ -32,6 +32,7 @@ from .link_state import LinkInput, LinkSnapshot, LinkState, LinkStatus
 from .link_thread import FaultLog
 from .messages import Address
 from .receiver import ReceivedFrame, Receiver
+from .retries import RESOURCE
 from .transport import Channel, Peer
 from .url import Url
 
@@ -42,8 +43,6 @@ PROOF_TIME = 1.0
 # nothing to us until it has heard us.
 SILENCE = 1.5
 ANNOUNCE_INTERVAL = 0.25
-# s until a thread that could not be started is tried again.
-THREAD_RETRY_INTERVAL = 0.25
 
 # Each frame in a line, at DEBUG, with the ``address`` of the other component.
 _frame_log = logging.getLogger('illuminator_ros')
@@ -256,13 +255,13 @@ class Line:
             self._connect_at = math.inf
         except RuntimeError as error:
             self.status.failed(str(error))
-            self._connect_at = now + THREAD_RETRY_INTERVAL
+            self._connect_at = now + RESOURCE.first
 
     def _connector_reports(self, outcome: Channel | str | None, now: float) -> None:
         if isinstance(outcome, str):
             self.status.failed(outcome)
         elif outcome is None:
-            self._connect_at = now + THREAD_RETRY_INTERVAL
+            self._connect_at = now + RESOURCE.first
         else:
             self.opened(outcome, now)
 

@@ -16,7 +16,6 @@
 
 from __future__ import annotations
 
-from collections import deque
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 import logging
 import math
@@ -30,7 +29,7 @@ from .frame import MAX_ID_V1
 from .frame_writer import FrameWriter
 from .line import ANNOUNCE_INTERVAL, Line, LineUser, SILENCE
 from .link_state import LinkSnapshot
-from .link_thread import FaultLog
+from .link_thread import FaultLog, TurnQueue
 from .messages import Address
 from .receiver import ReceivedFrame, Receiver
 from .routing_table import grouped, Router
@@ -75,11 +74,9 @@ class Lines(LineUser):
         self._classes = {cls.id: cls for cls in endpoint.messages}
         self._faults = faults
         self._clock = clock
-        self._call_first = call_first
-        self._is_turn_over = is_turn_over
-        # Messages that wait for the next turn, of one read, and their lines.
-        self._received: deque[tuple[Line, ReceivedFrame]] = deque()
-        self._is_behind = False
+        # Messages, of one read, and their lines.
+        self._received: TurnQueue[tuple[Line, ReceivedFrame]] = TurnQueue(
+            self._take_received, call_first, is_turn_over)
         self._version = mavlink_version
         self._duplicates = DuplicateFilter() if len(urls) > 1 else None
         self.forwarded_commands = ForwardedCommands()
@@ -171,7 +168,7 @@ class Lines(LineUser):
 
     def lost(self, heard: Sequence[Address], reason: str, now: float) -> None:
         """See :meth:`LineUser.lost`."""
-        self._received = deque(one for one in self._received if one[0].is_open)
+        self._received.keep(lambda one: one[0].is_open)
         if not any(line.is_open for line in self._lines):
             self._heard_at = -math.inf
             self._sender.clear()
@@ -215,38 +212,24 @@ class Lines(LineUser):
         self._heard_at = now
         if self._duplicates is not None:
             self._faults.call(self._forward, line, peer, frames, now)
-        self._received += ((line, one) for one in frames if one[0].message_id in self._classes)
-        if not self._is_behind and not self._must_wait():
-            self._take_received(now)
+        self._received.add(
+            ((line, one) for one in frames if one[0].message_id in self._classes), now)
 
     @property
     def is_behind(self) -> bool:
         """See :meth:`LineUser.is_behind`."""
-        return self._is_behind
+        return self._received.is_behind
 
-    def _take_received(self, now: float) -> None:
-        """Take messages while the turn lasts; the next turn takes the rest before other calls."""
-        self._is_behind = False
-        while self._received:
-            _, (frame, sender) = self._received.popleft()
-            cls = self._classes[frame.message_id]
-            if self._endpoint.inspect is not None:
-                self._faults.call(self._endpoint.inspect, frame, cls)
-            message = decode(cls, frame.payload, sender)
-            if _frame_log.isEnabledFor(logging.DEBUG):
-                _frame_log.debug('received from %s: %s', frame.source, line_of(message),
-                                 extra={'address': frame.source})
-            self._faults.call(self._endpoint.receive, frame.source, message, now)
-            if self._must_wait():
-                return
-
-    def _must_wait(self) -> bool:
-        """Return whether messages wait for the next turn, and have it take them."""
-        if not self._received or not self._is_turn_over():
-            return False
-        self._is_behind = True
-        self._call_first(self._take_received)
-        return True
+    def _take_received(self, received: tuple[Line, ReceivedFrame], now: float) -> None:
+        frame, sender = received[1]
+        cls = self._classes[frame.message_id]
+        if self._endpoint.inspect is not None:
+            self._faults.call(self._endpoint.inspect, frame, cls)
+        message = decode(cls, frame.payload, sender)
+        if _frame_log.isEnabledFor(logging.DEBUG):
+            _frame_log.debug('received from %s: %s', frame.source, line_of(message),
+                             extra={'address': frame.source})
+        self._faults.call(self._endpoint.receive, frame.source, message, now)
 
     def _forward(
         self, line: Line, peer: Peer, frames: Sequence[ReceivedFrame], now: float,

@@ -17,15 +17,19 @@
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 import contextlib
 import logging
 import math
+import random
 import select
 import selectors
 import socket
 import threading
 import time
+from typing import Generic, TypeVar
+
+T = TypeVar('T')
 
 # s; the longest wait.
 MAX_WAIT = 10.0
@@ -134,6 +138,94 @@ class StallDetector:
         return stall if stall > STALL_TIME else 0.0
 
 
+class TurnQueue(Generic[T]):
+    """
+    Entries that the thread of a link handles while its turn lasts, the rest in its next turn.
+
+    :param handle: handles an entry, given the time, s.
+    :param call_first: has a function called in the next turn, before the calls that wait.
+    :param is_turn_over: returns whether this turn must handle no more entries.
+    :ivar is_behind: whether the next turn goes on.
+    """
+
+    def __init__(
+        self, handle: Callable[[T, float], None],
+        call_first: Callable[[Callable[[float], None]], None], is_turn_over: Callable[[], bool],
+    ) -> None:
+        self.is_behind = False
+        self._handle = handle
+        self._call_first = call_first
+        self._is_turn_over = is_turn_over
+        self._entries: deque[T] = deque()
+
+    def add(self, entries: Iterable[T], now: float) -> None:
+        """Handle entries, after those that wait."""
+        self._entries += entries
+        if not (self.is_behind or self._must_wait()):
+            self._work(now)
+
+    def keep(self, is_kept: Callable[[T], bool]) -> None:
+        """Drop the other entries that wait."""
+        self._entries = deque(filter(is_kept, self._entries))
+
+    def _work(self, now: float) -> None:
+        self.is_behind = False
+        while self._entries:
+            self._handle(self._entries.popleft(), now)
+            if self._must_wait():
+                return
+
+    def _must_wait(self) -> bool:
+        """Return whether entries wait for the next turn, and have it handle them."""
+        if not self._entries or not self._is_turn_over():
+            return False
+        self.is_behind = True
+        self._call_first(self._work)
+        return True
+
+
+class CallQueue:
+    """The calls of other threads, which wait while :data:`MAX_CALLS` wait."""
+
+    def __init__(self) -> None:
+        self._calls: deque[Callable[[float], None]] = deque()
+        # Set while few calls wait.
+        self._room = threading.Event()
+        self._room.set()
+
+    def __len__(self) -> int:
+        return len(self._calls)
+
+    def add(self, function: Callable[[float], None], *, waits: bool) -> None:
+        """
+        Add a call; from any thread.
+
+        :param waits: whether to wait for room before.
+        """
+        if waits:
+            self._room.wait(ROOM_TIMEOUT)
+        self._calls.append(function)
+        if len(self._calls) >= MAX_CALLS:
+            # The thread wakes after this, and sets it again.
+            self._room.clear()
+
+    def add_first(self, function: Callable[[float], None]) -> None:
+        """Add a call before those that wait."""
+        self._calls.appendleft(function)
+
+    def run(self, call: Callable[[Callable[[float], None]], bool]) -> None:
+        """
+        Make the calls that wait.
+
+        :param call: makes one; returns whether to make no more now.
+        """
+        for _ in range(len(self._calls)):
+            if call(self._calls.popleft()):
+                break
+        if len(self._calls) < MAX_CALLS:
+            self._room.set()
+
+
 class LinkThread:
     """
     Waits for descriptors, calls and deadlines, and handles each in this thread.
@@ -169,10 +261,7 @@ class LinkThread:
         self._detector = StallDetector(monotonic)
         # When the turn begins no more messages and calls, s.
         self._turn_ends = math.inf
-        self._calls: deque[Callable[[float], None]] = deque()
-        # Set while few calls wait.
-        self._room = threading.Event()
-        self._room.set()
+        self._calls = CallQueue()
         self._waker = Waker()
         self.selector.register(
             self._waker, selectors.EVENT_READ, lambda waker, events: waker.clear())
@@ -219,17 +308,13 @@ class LinkThread:
 
         Another thread waits first while :data:`MAX_CALLS` calls wait.
         """
-        if threading.current_thread() is not self._thread and self._thread.is_alive():
-            self._room.wait(ROOM_TIMEOUT)
-        self._calls.append(function)
-        if len(self._calls) >= MAX_CALLS:
-            # The thread wakes after this, and sets it again.
-            self._room.clear()
+        self._calls.add(function, waits=(
+            threading.current_thread() is not self._thread and self._thread.is_alive()))
         self._waker.wake()
 
     def call_first(self, function: Callable[[float], None]) -> None:
         """Have ``function(now)`` called in this thread, before the calls that wait."""
-        self._calls.appendleft(function)
+        self._calls.add_first(function)
         self._waker.wake()
 
     # In this thread
@@ -253,18 +338,20 @@ class LinkThread:
         self._turn_ends = self._clock() + TURN_TIME
         if stall := self._detector.waited(min(max(wait, 0.0), MAX_WAIT)):
             self._faults.call(self._stalled, stall)
-        for key, events in ready:
+        # A selector returns them in the same order each time: by chance each is the first one, so
+        # that none of them waits for ever for others that are always ready.
+        first = random.randrange(len(ready)) if len(ready) > 1 else 0
+        for key, events in ready[first:] + ready[:first]:
             key.data(key.fileobj, events)
-        self._run_calls()
-        self._due = self._work()
-
-    def _run_calls(self) -> None:
-        for _ in range(len(self._calls)):
-            self._faults.call(self._calls.popleft(), self._clock())
             if self.is_turn_over():
                 break
-        if len(self._calls) < MAX_CALLS:
-            self._room.set()
+        self._calls.run(self._call)
+        self._due = self._work()
+
+    def _call(self, function: Callable[[float], None]) -> bool:
+        """Make a call; return whether the turn is over."""
+        self._faults.call(function, self._clock())
+        return self.is_turn_over()
 
     def _run(self) -> None:
         while not self._stopping.is_set():
@@ -274,7 +361,7 @@ class LinkThread:
                 self._faults.log()
                 self._stopping.wait(FAULT_PAUSE)
         self._turn_ends = math.inf
-        self._run_calls()
+        self._calls.run(self._call)
         self._faults.call(self._finish)
         self._release()
 

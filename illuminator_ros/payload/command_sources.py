@@ -110,6 +110,10 @@ class Sources(Arbiter[str]):
         is_lower = commander is not None and self._rank(commander) < self._rank(source)
         return f'held by {commander}' if is_lower else ''
 
+    def takes_over(self, source: str) -> bool:
+        """Return whether a request of a source ends those of another one, which is not higher."""
+        return self.are_ranked and self.commander != source and not self.refusal(source)
+
     @property
     def shown_holder(self) -> str | None:
         """Return the holder for snapshots: '' for none, None if commands have no sources."""

@@ -44,19 +44,13 @@ from ..mavlink.command_sender import (
 )
 from ..mavlink.dialect import MAV_RESULT_COMMAND_UNSUPPORTED_MAV_FRAME, mavlink
 from ..mavlink.messages import Address, result_name
+from ..mavlink.retries import Retries, STATUS, STILL_UNCONFIRMED, UNCONFIRMED
 
 # s from the acknowledgement, or the last try, or the end of the fence, to the status that shows
 # the change.
 CONFIRMATION_TIMEOUT = 1.0
 # s after the last frame of an unacknowledged command in which its frames and answers may come.
 FENCE = 1.5
-# s between requests for the status after one that does not show the change; the last one repeats.
-REQUEST_WAITS = (0.05, 0.1, 0.2, 0.25)
-# s between tries within the fence, and of a command that is sent until a status shows the change;
-# so often, and s between the tries after these.
-REPEAT_INTERVAL = 0.25
-QUICK_REPEATS = 10
-SLOW_REPEAT_INTERVAL = 2.0
 # Tries after which a status counts though none of them was acknowledged, where there is no last.
 ENOUGH_TRIES = 3
 # s; a command ends after this time even if the device still reports progress.
@@ -217,30 +211,37 @@ class ConfirmedCommand(Generic[S]):
         self._answer: CommandResult | None = None
         # The last status that counts and shows something else.
         self._instead: S | None = None
-        self._ends_at = self._request_due = self._repeat_due = math.inf
-        self._requests = self._acknowledged = 0
+        self._ends_at = self._repeat_due = math.inf
+        self._requests = Retries(STATUS, math.inf)
+        self._acknowledged = 0
         self._has_restarted = False
         self._send(now)
 
     # The command
 
     def _send(self, now: float, tried: int = 0) -> None:
-        """Send the command: once if another try is due anyway, else by the command protocol."""
+        """
+        Send the command by the command protocol, which tries again until it is acknowledged.
+
+        Where more tries are due whatever the device answers, each is sent once.
+        """
         change, target, terms = self.change, self._target, self.terms
-        is_single = not change.is_idempotent
+        is_fenced = now < terms.fence
+        is_repeated = change.is_idempotent and (
+            terms.insists or is_fenced or self._is_accepted)
         self._repeat_due = math.inf
-        if change.is_idempotent and (terms.insists or now < terms.fence or self._is_accepted):
-            is_single = True
-            is_slow = terms.insists and tried >= QUICK_REPEATS
-            self._repeat_due = now + (SLOW_REPEAT_INTERVAL if is_slow else REPEAT_INTERVAL)
-            if now < terms.fence:
+        if is_repeated:
+            is_slow = terms.insists and tried >= (UNCONFIRMED.tries or 0)
+            self._repeat_due = now + (STILL_UNCONFIRMED if is_slow else UNCONFIRMED).first
+            if is_fenced:
                 self._repeat_due = min(self._repeat_due, terms.fence)
-        elif now < terms.fence:
+        elif is_fenced:
             self._ends_at = terms.fence + CONFIRMATION_TIMEOUT
-            self._request_due = terms.fence
+            self._requests = Retries(STATUS, terms.fence, 1)
         self._sending = target.commands.start(
             Command(target.address, change.command, change.params, position=change.position),
-            now, self._answered, deadline=self._limit, retries=0 if is_single else None,
+            now, self._answered, deadline=self._limit,
+            retries=0 if is_repeated or not change.is_idempotent else None,
             tried=tried, follow_up=target.status_request)
 
     @property
@@ -266,7 +267,8 @@ class ConfirmedCommand(Generic[S]):
         if self.change.is_idempotent:
             self.terms = self.terms._replace(fence=now + FENCE, is_sole_cause=False)
             self._answer = self._instead = None
-            self._ends_at = self._request_due = math.inf
+            self._ends_at = math.inf
+            self._requests.stop()
             self._send(now, self._sending.tries)
 
     def withdraw(self, now: float) -> None:
@@ -287,7 +289,7 @@ class ConfirmedCommand(Generic[S]):
                 return
             if self._answer is None:
                 self._ends_at = now + CONFIRMATION_TIMEOUT
-                self._request_due = now + REQUEST_WAITS[0]
+                self._requests = Retries(STATUS, now + STATUS.first, 1)
             self._answer = answer
             if self._target.status_id is None or answer.refused and self._gap is None:
                 self._ends_at = now
@@ -334,7 +336,7 @@ class ConfirmedCommand(Generic[S]):
         if self._answer is not None and self._answer.refused:
             return self._expired(now)
         if self._is_accepted and change.is_repeated and self._repeat_due == math.inf:
-            self._repeat_due = self.last_sent + REPEAT_INTERVAL
+            self._repeat_due = self.last_sent + UNCONFIRMED.first
         return None
 
     # Time
@@ -345,11 +347,8 @@ class ConfirmedCommand(Generic[S]):
             return self._expired(now)
         if now >= self._repeat_due:
             self._send(now, self._sending.tries)
-        if now >= self._request_due:
-            self._requests += 1
-            self._request_due = now + REQUEST_WAITS[min(self._requests, len(REQUEST_WAITS) - 1)]
-            if request := self._target.status_request:
-                self._target.commands.send_once(request)
+        if self._requests.begin_try(now) and (request := self._target.status_request):
+            self._target.commands.send_once(request)
         return None
 
     @property
@@ -362,7 +361,7 @@ class ConfirmedCommand(Generic[S]):
 
     def next_deadline(self) -> float:
         """Return when :meth:`poll` has something to do."""
-        return min(self._end, self._repeat_due, self._request_due)
+        return min(self._end, self._repeat_due, self._requests.due)
 
     # The result
 

@@ -22,17 +22,16 @@ which a newer candidate may replace.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Hashable, Iterator
 import math
 from typing import Generic, Protocol, TypeVar
 
-from ..mavlink.command_sender import CommandSender, CommandStatus
-from ..mavlink.messages import Address
+from .device_events import DeviceEvent, DeviceForgotten, DeviceFound
 
 # Devices of one kind; one more is ignored, so that memory is bounded.
 MAX_DEVICES = 128
 # Candidates; one more replaces the oldest, if that has had CANDIDATE_TIME, s, to answer.
-MAX_CANDIDATES = 32
+MAX_CANDIDATES = 8
 CANDIDATE_TIME = 1.0
 # Ignored devices that are remembered, to name them where the target is missing.
 MAX_IGNORED = 8
@@ -44,12 +43,8 @@ class Device(Protocol):
     """The part of a device that the discovery uses."""
 
     @property
-    def address(self) -> Address:
-        """Return the address that it sends from."""
-
-    @property
     def lost_at(self) -> float:
-        """When it was lost, s; infinity while it is heard."""
+        """When it was lost, s; while it is heard infinity, or when it was last heard."""
 
     @property
     def was_commanded(self) -> bool:
@@ -62,107 +57,112 @@ class Device(Protocol):
         """Return when :meth:`poll` is due, infinity if never."""
 
 
+K = TypeVar('K', bound=Hashable)
 D = TypeVar('D', bound=Device)
 
 
-class Discovery(Generic[D]):
+class Discovery(Generic[K, D]):
     """
-    The devices of one kind on a link.
+    The devices of one kind on a link, by keys such as their addresses.
 
-    :param make: makes the device at an address.
-    :param commands: ends the commands to a device that is dropped.
-    :param found: called when a device is announced.
-    :param forgotten: called when an announced device was dropped.
-    :param wanted: returns whether a device at an address is of interest; others are ignored.
-    :ivar devices: the announced devices, by address, in the order of their announcement.
-    :ivar candidates: the devices that are not announced yet, by address.
-    :ivar ignored: the first devices that are not wanted, by address.
-    :ivar limit_reached: whether more than :data:`MAX_DEVICES` have been heard.
+    :param emit: takes :class:`DeviceFound` when a device is announced, and
+        :class:`DeviceForgotten` when it was dropped.
+    :param found: called when a device was announced.
+    :param dropped: called when a device or a candidate was dropped.
+    :param wanted: returns whether a device is of interest; others are ignored.
+    :param limit: returns how many devices are announced at most, that one included.
+    :ivar devices: the announced devices, in the order of their announcement.
+    :ivar candidates: the devices that are not announced yet.
+    :ivar ignored: the first devices that are not wanted.
+    :ivar limit_reached: whether more than the limit have been heard.
     """
 
     def __init__(
-        self, make: Callable[[Address], D], commands: CommandSender, *,
+        self, emit: Callable[[DeviceEvent[K]], None] = lambda event: None, *,
         found: Callable[[D, float], None] = lambda device, now: None,
-        forgotten: Callable[[D], None] = lambda device: None,
-        wanted: Callable[[Address], bool] = lambda address: True,
+        dropped: Callable[[K, float], None] = lambda key, now: None,
+        wanted: Callable[[K], bool] = lambda key: True,
+        limit: Callable[[K], int] = lambda key: MAX_DEVICES,
     ) -> None:
-        self.devices: dict[Address, D] = {}
-        self.ignored: dict[Address, None] = {}
+        self.devices: dict[K, D] = {}
+        self.candidates: dict[K, D] = {}
+        self.ignored: dict[K, None] = {}
         self.limit_reached = False
-        self._make = make
-        self._commands = commands
+        self._emit = emit
         self._found = found
-        self._forgotten = forgotten
+        self._dropped = dropped
         self._wanted = wanted
-        self.candidates: dict[Address, D] = {}
-        self._found_at: dict[Address, float] = {}
+        self._limit = limit
+        self._found_at: dict[K, float] = {}
 
     def __iter__(self) -> Iterator[D]:
         """Return the devices and the candidates."""
         yield from self.devices.values()
         yield from self.candidates.values()
 
-    def get(self, address: Address) -> D | None:
-        """Return the device or the candidate at an address."""
-        return self.devices.get(address) or self.candidates.get(address)
+    def get(self, key: K) -> D | None:
+        """Return a device or a candidate."""
+        return self.devices.get(key) or self.candidates.get(key)
 
-    def hear(self, address: Address, now: float, *, proved: bool) -> D | None:
+    def hear(self, key: K, now: float, make: Callable[[K], D], *, proved: bool) -> D | None:
         """
-        Return the device at an address; a new one becomes a candidate.
+        Return a device; a new one becomes a candidate.
 
+        :param make: makes a new one.
         :param proved: whether the message proves that it is a device, which announces it.
             Otherwise it may replace a candidate only after :data:`CANDIDATE_TIME`.
         :return: None if the device is not wanted, or if there are too many.
         """
-        device = self.devices.get(address)
+        device = self.devices.get(key)
         if device is not None:
             return device
-        device = self.candidates.get(address) or self._candidate(address, now, proved=proved)
-        if device is not None and proved:
-            self.prove(address, now)
+        if key not in self.candidates:
+            if not self._has_room(key, now, proved=proved):
+                return None
+            self.candidates[key], self._found_at[key] = make(key), now
+        device = self.candidates[key]
+        if proved:
+            self.prove(key, now)
         return device
 
-    def _candidate(self, address: Address, now: float, *, proved: bool) -> D | None:
-        if not self._wanted(address):
+    def _has_room(self, key: K, now: float, *, proved: bool) -> bool:
+        """Return whether a device may become a candidate, if need be in place of another one."""
+        if not self._wanted(key):
             if len(self.ignored) < MAX_IGNORED:
-                self.ignored[address] = None
-            return None
-        if len(self.devices) >= MAX_DEVICES:
+                self.ignored[key] = None
+            return False
+        if len(self.devices) >= self._limit(key):
             self.limit_reached = True
-            return None
+            return False
         if len(self.candidates) >= MAX_CANDIDATES:
             oldest, found_at = next(iter(self._found_at.items()))
             if not proved and now < found_at + CANDIDATE_TIME:
-                return None
+                return False
             self._drop(oldest, now)
-        device = self.candidates[address] = self._make(address)
-        self._found_at[address] = now
-        return device
+        return True
 
-    def prove(self, address: Address, now: float) -> None:
+    def prove(self, key: K, now: float) -> None:
         """Note a valid status or an answer, which announces a candidate."""
-        if address in self.candidates and len(self.devices) < MAX_DEVICES:
-            del self._found_at[address]
-            device = self.devices[address] = self.candidates.pop(address)
+        if key in self.candidates and len(self.devices) < self._limit(key):
+            del self._found_at[key]
+            device = self.devices[key] = self.candidates.pop(key)
+            self._emit(DeviceFound(key))
             self._found(device, now)
 
-    def _forgotten_at(self, device: D) -> float:
-        return math.inf if device.was_commanded else device.lost_at + FORGET_AFTER
-
-    def _drop(self, address: Address, now: float) -> None:
-        self._found_at.pop(address, None)
-        self.candidates.pop(address, None)
-        device = self.devices.pop(address, None)
-        self._commands.end_all(now, CommandStatus.CANCELLED, address)
+    def _drop(self, key: K, now: float) -> None:
+        self._found_at.pop(key, None)
+        self.candidates.pop(key, None)
+        device = self.devices.pop(key, None)
+        self._dropped(key, now)
         if device is not None:
             self.limit_reached = False
-            self._forgotten(device)
+            self._emit(DeviceForgotten(key))
 
     def poll(self, now: float) -> None:
         """Poll the devices that have something to do, and forget silent ones."""
-        for device in list(self):
-            if now >= self._forgotten_at(device):
-                self._drop(device.address, now)
+        for key, device in [*self.devices.items(), *self.candidates.items()]:
+            if not device.was_commanded and now >= device.lost_at + FORGET_AFTER:
+                self._drop(key, now)
             elif now >= device.next_deadline():
                 device.poll(now)
 
@@ -171,6 +171,6 @@ class Discovery(Generic[D]):
         due = math.inf
         for devices in (self.devices, self.candidates):
             for device in devices.values():
-                due = min(due, device.next_deadline(), device.lost_at + FORGET_AFTER
-                          if not device.was_commanded else math.inf)
+                due = min(due, device.next_deadline(), math.inf if device.was_commanded else
+                          device.lost_at + FORGET_AFTER)
         return due

@@ -23,6 +23,7 @@ from dataclasses import dataclass, field, replace
 import functools
 from functools import cached_property
 import math
+from operator import itemgetter
 from typing import Any, ClassVar, Generic, NamedTuple, TypeVar
 
 from .faults import Behaviour, FaultInjector, FAULTS, FaultTable
@@ -30,7 +31,6 @@ from .listeners import Listeners
 from .simulated_settings import integer, one_of, Setting, settings_of, Values
 from ..mavlink import messages
 from ..mavlink.component import Endpoint
-from ..mavlink.deadline_queue import DeadlineQueue
 from ..mavlink.dialect import mavlink
 from ..mavlink.messages import Address, AnyCommand, Message
 
@@ -317,13 +317,11 @@ class SimulatedComponent(Generic[D]):
     def __init__(
         self, device: D, now: float,
         outgoing: deque[tuple[Address, Message]] | None = None,
-        changed: Callable[[], None] = lambda: None,
     ) -> None:
         self.device = device
         self.address = device.properties.address
         self.name = device.properties.name
         self.outgoing = deque() if outgoing is None else outgoing
-        self._changed = changed
         self._injector = FaultInjector(f'{device.properties.seed} {self.address}')
         self.power_on(now)
 
@@ -347,9 +345,8 @@ class SimulatedComponent(Generic[D]):
         self._in_progress: set[int] = set()
         self._heartbeat_due = now if self.device.behaviour.heartbeat_interval else math.inf
         # Actions that are due later.
-        self._schedule: DeadlineQueue[Callable[[float], None]] = DeadlineQueue()
+        self._delayed: list[tuple[float, Callable[[float], None]]] = []
         self._reboot_due = now + (self.device.behaviour.reboot_interval or math.inf)
-        self._changed()
 
     def behave(self, behaviour: Behaviour, now: float) -> None:
         """Behave differently from now on."""
@@ -361,7 +358,6 @@ class SimulatedComponent(Generic[D]):
             self._reboot_due = now + (behaviour.reboot_interval or math.inf)
         if behaviour.heartbeat_interval != before.heartbeat_interval:
             self._heartbeat_due = now if behaviour.heartbeat_interval else math.inf
-        self._changed()
 
     def apply(self, effect: Effect, now: float) -> None:
         """Apply an effect, of a command or by hand, and send the streamed messages."""
@@ -371,7 +367,6 @@ class SimulatedComponent(Generic[D]):
                 if stream.interval:
                     stream.due = now + stream.interval
                     self._send(self.device.message(message_id, now), now)
-        self._changed()
 
     def _is_addressed(self, message: Message) -> bool:
         """Return whether a message is for this component (MAVLink guide, "Routing")."""
@@ -396,19 +391,17 @@ class SimulatedComponent(Generic[D]):
         if isinstance(message, self.device.messages):
             for sent in self.device.receive(source, message, now):
                 self._after(behaviour.slow, functools.partial(self._send, sent), now)
-            self._changed()
         if (not isinstance(message, AnyCommand) or not behaviour.answers_commands
                 or isinstance(message, messages.CommandInt) and not behaviour.answers_command_int):
             return
         self._after(behaviour.slow, functools.partial(self._consider, source, message), now)
-        self._changed()
 
     def _after(self, delay: float, action: Callable[[float], None], now: float) -> None:
         """Call an action after a delay, s, or at once."""
         if not delay:
             action(now)
-        elif len(self._schedule) < MAX_DELAYED:
-            self._schedule.set(action, now + delay)
+        elif len(self._delayed) < MAX_DELAYED:
+            self._delayed.append((now + delay, action))
 
     def _consider(self, source: Address, message: AnyCommand, now: float) -> None:
         """Answer a command at once, or report its progress first."""
@@ -448,8 +441,8 @@ class SimulatedComponent(Generic[D]):
         self._in_progress.add(message.command)
         self._acknowledge(source, message.command, mavlink.MAV_RESULT_IN_PROGRESS, now,
                           int(100 * (now - begun) / duration))
-        self._schedule.set(functools.partial(self._progress, source, message, begun),
-                           min(now + PROGRESS_INTERVAL, begun + duration))
+        self._delayed.append((min(now + PROGRESS_INTERVAL, begun + duration),
+                              functools.partial(self._progress, source, message, begun)))
 
     def _finish(self, source: Address, message: AnyCommand, now: float) -> None:
         """Acknowledge a command and execute it."""
@@ -522,7 +515,6 @@ class SimulatedComponent(Generic[D]):
         """See :meth:`Endpoint.link_opened`; send a heartbeat at once for the new peer."""
         if self.device.behaviour.heartbeat_interval:
             self._send_heartbeat(now)
-        self._changed()
 
     def _send_heartbeat(self, now: float) -> None:
         behaviour = self.device.behaviour
@@ -539,8 +531,9 @@ class SimulatedComponent(Generic[D]):
             self.device.behave(replace(self.device.behaviour, silence=0.0), now)
         if now >= self._reboot_due:
             self.restart(now)
-        for action in self._schedule.due(now):
-            self._schedule.set(action, math.inf)
+        due = sorted((one for one in self._delayed if one[0] <= now), key=itemgetter(0))
+        self._delayed = [one for one in self._delayed if one[0] > now]
+        for _, action in due:
             action(now)
         if now >= self._heartbeat_due:
             self._send_heartbeat(now)
@@ -554,11 +547,10 @@ class SimulatedComponent(Generic[D]):
     def next_deadline(self) -> float:
         """See :meth:`Endpoint.next_deadline`."""
         end_of_silence = math.inf if self._silent_until == -math.inf else self._silent_until
-        due = min(self._heartbeat_due, self._reboot_due, end_of_silence,
-                  self._schedule.next_deadline(), self.device.next_deadline())
-        for stream in self._streams.values():
-            due = min(due, stream.due)
-        return due
+        return min(self._heartbeat_due, self._reboot_due, end_of_silence,
+                   self.device.next_deadline(),
+                   *(stream.due for stream in self._streams.values()),
+                   *(due for due, _ in self._delayed))
 
 
 class SimulatedComponents(Endpoint, Generic[D]):
@@ -573,12 +565,7 @@ class SimulatedComponents(Endpoint, Generic[D]):
         super().__init__()
         self.new_peers: Listeners[Address] = Listeners()
         self._peers: set[Address] = set()
-        # By index of the component.
-        self._deadlines: DeadlineQueue[int] = DeadlineQueue()
-        self.components = [
-            SimulatedComponent(one, now, self.outgoing,
-                               functools.partial(self._deadlines.changed, index))
-            for index, one in enumerate(devices)]
+        self.components = [SimulatedComponent(one, now, self.outgoing) for one in devices]
         self.sends = tuple(dict.fromkeys(
             cls for one in self.components for cls in one.device.sends))
         self.messages = tuple(dict.fromkeys((
@@ -600,11 +587,10 @@ class SimulatedComponents(Endpoint, Generic[D]):
 
     def poll(self, now: float) -> None:
         """See :meth:`Endpoint.poll`."""
-        for index in self._deadlines.due(now):
-            component = self.components[index]
-            component.poll(now)
-            self._deadlines.set(index, component.next_deadline())
+        for component in self.components:
+            if now >= component.next_deadline():
+                component.poll(now)
 
     def next_deadline(self) -> float:
         """See :meth:`Endpoint.next_deadline`."""
-        return self._deadlines.next_deadline()
+        return min((one.next_deadline() for one in self.components), default=math.inf)

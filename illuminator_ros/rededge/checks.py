@@ -101,10 +101,6 @@ class CameraSession(Session):
         self._version: rededge.Firmware | None = None
         self._asked_version = False
 
-    def is_device(self, message: Message) -> bool:
-        """See :class:`Session`."""
-        return isinstance(message, Heartbeat)
-
     def images(self) -> int:
         """Return the number of images that the camera has reported."""
         statuses = self.received(rededge.CameraStatus)

@@ -19,7 +19,6 @@ from __future__ import annotations
 from collections import deque
 from collections.abc import Collection
 from dataclasses import dataclass
-import math
 import random
 
 from . import messages as rededge
@@ -27,11 +26,13 @@ from .captures import Captures
 from .feeder import Feeder
 from .input_states import Settings
 from .pings import Done, Pings
-from ..mavlink.command_sender import CommandSender, format_seconds
+from ..mavlink.command_sender import CommandSender
 from ..mavlink.component import Payload
 from ..mavlink.dialect import mavlink
 from ..mavlink.messages import Address, Heartbeat, Message
+from ..payload.device_events import DeviceConnected, DeviceDisconnected, DeviceEvent
 from ..payload.listeners import Listeners
+from ..payload.liveness import Liveness
 from ..payload.messages import Attitude, GlobalPositionInt, SystemTime
 
 # Successive PINGs without a reply after which the camera counts as not receiving.
@@ -39,21 +40,8 @@ UNANSWERED_PINGS = 3
 # So many heartbeats in CONFLICT_WINDOW s show several components: each sends one a second.
 CONFLICT_HEARTBEATS = 10
 CONFLICT_WINDOW = 7.0
-
-
-@dataclass(frozen=True)
-class CameraConnected:
-    """The camera's heartbeat is heard."""
-
-    address: Address
-
-
-@dataclass(frozen=True)
-class CameraLost:
-    """The camera's heartbeat has stopped, or the link is closed."""
-
-    address: Address
-    reason: str
+# The last reports of images that are remembered, since a second path brings them again.
+RECENT_REPORTS = 8
 
 
 @dataclass(frozen=True)
@@ -63,7 +51,7 @@ class ImageTaken:
     feedback: rededge.CameraFeedback
 
 
-CameraEvent = CameraConnected | CameraLost | ImageTaken
+CameraEvent = DeviceEvent[Address] | ImageTaken
 
 
 @dataclass(frozen=True)
@@ -126,12 +114,10 @@ class RedEdgeClient(Payload):
         self._pings = Pings(commands.address, commands.send,
                             random.getrandbits(32) if sequence is None else sequence)
         self._captures = Captures(commands.send)
-        # Why the link is not open, '' while it is.
-        self._link_failure = 'the link is not open'
         self._address: Address | None = None
-        self._connected = False
-        self._heard_at = -math.inf
+        self._liveness = Liveness(settings.heartbeat_timeout, 'the link is not open')
         self._heartbeats: deque[float] = deque(maxlen=CONFLICT_HEARTBEATS)
+        self._reports: deque[rededge.CameraFeedback] = deque(maxlen=RECENT_REPORTS)
 
     @property
     def target(self) -> Address:
@@ -141,7 +127,7 @@ class RedEdgeClient(Payload):
     def snapshot(self, now: float) -> CameraSnapshot:
         """Return the camera at this moment; call it in the link's thread."""
         return CameraSnapshot(
-            self._address, self._connected, self._heard_at, self._loss(now),
+            self._address, self._liveness.connected, self._liveness.heard_at, self._loss(now),
             self._is_conflict(now), self._pings.round_trip, self._pings.unanswered,
             self._captures.images, self._captures.newest)
 
@@ -153,54 +139,55 @@ class RedEdgeClient(Payload):
 
     def link_opened(self, now: float) -> None:
         """See :meth:`Payload.link_opened`."""
-        self._link_failure = ''
+        self._liveness.link_failure = ''
 
     def link_closed(self, now: float, reason: str) -> None:
         """See :meth:`Payload.link_closed`."""
-        self._link_failure = f'link lost: {reason}'
-        self._lose(self._link_failure)
-        self._pings.stop(self._link_failure)
-        self._captures.stop(now, self._link_failure)
+        failure = self._liveness.link_failure = f'link lost: {reason}'
+        self._lose(failure, now)
+        self._pings.stop(failure)
+        self._captures.stop(now, failure)
 
     def components_lost(self, lost: Collection[Address], now: float, reason: str) -> None:
         """See :meth:`Payload.components_lost`."""
         if self._address in lost:
-            self._lose(f'link lost: {reason}')
+            self._lose(f'link lost: {reason}', now)
 
     def _take_heartbeat(self, source: Address, now: float) -> None:
         """Take a heartbeat of the camera's component id, whatever its content."""
-        self._address = source
-        self._heard_at = now
         self._heartbeats.append(now)
-        if not self._connected:
-            self._connected = True
-            self.events.emit(CameraConnected(source))
+        own, address = self._commands.address.system, self._address
+        if self._liveness.connected and address and address.system == own != source.system:
+            # Our camera has adopted our system id, so this is the camera of another vehicle.
+            return
+        self._address = source
+        if self._liveness.hear(now):
+            self.events.emit(DeviceConnected(source))
 
-    def _lose(self, reason: str) -> None:
-        if self._connected:
-            self._connected = False
+    def _lose(self, reason: str, now: float) -> None:
+        if self._liveness.lose(now):
             self._heartbeats.clear()
             self._captures.forget_count()
-            self.events.emit(CameraLost(self.target, reason))
+            self._reports.clear()
+            self.events.emit(DeviceDisconnected(self.target, reason))
 
     def _loss(self, now: float) -> str:
-        if self._connected or self._address is None:
+        if self._liveness.connected or self._address is None:
             return ''
-        reason = self._link_failure or f'no heartbeat for {format_seconds(now - self._heard_at)}'
-        return f'camera {self._address} is lost: {reason}'
+        return self._liveness.loss(f'camera {self._address}', now)
 
     # Requests, and messages of the camera
 
     def ping(self, now: float, done: Done) -> None:
         """Measure the round trip through the camera."""
-        if refusal := self._commands.refusal or self._link_failure:
+        if refusal := self._commands.refusal or self._liveness.link_failure:
             done(False, refusal)
         else:
             self._pings.request(now, done)
 
     def capture(self, shot: rededge.Shot, now: float, done: Done) -> None:
         """Take an image; succeed only after its CAMERA_FEEDBACK."""
-        if self._commands.refusal or not self._connected:
+        if self._commands.refusal or not self._liveness.connected:
             done(False, self._commands.refusal or self._loss(now)
                  or 'no camera connected: none heard yet')
         else:
@@ -216,7 +203,8 @@ class RedEdgeClient(Payload):
             self._pings.take(message, now)
         elif isinstance(message, rededge.CameraStatus):
             self._captures.take_status(message, now)
-        elif isinstance(message, rededge.CameraFeedback):
+        elif isinstance(message, rededge.CameraFeedback) and message not in self._reports:
+            self._reports.append(message)
             note = ("; several components have the camera's id, so another may have taken it"
                     if self._is_conflict(now) else '')
             self.events.emit(ImageTaken(message))
@@ -229,16 +217,15 @@ class RedEdgeClient(Payload):
 
     def poll(self, now: float) -> None:
         """See :meth:`Payload.poll`."""
-        if self._connected and now >= self._heard_at + self.settings.heartbeat_timeout:
-            self._lose(f'no heartbeat for {format_seconds(self.settings.heartbeat_timeout)}')
-        if not self._link_failure:
+        if now >= self._liveness.silent_at:
+            self._lose(self._liveness.silence(now), now)
+        if not self._liveness.link_failure:
             self._pings.poll(now)
         self._captures.poll(now)
         self.feeder.orientation.poll(now)
 
     def next_deadline(self) -> float:
         """See :meth:`Payload.next_deadline`."""
-        return min(
-            self._heard_at + self.settings.heartbeat_timeout if self._connected else math.inf,
-            math.inf if self._link_failure else self._pings.next_deadline(),
-            self._captures.next_deadline(), self.feeder.orientation.next_deadline())
+        due = min(self._liveness.silent_at, self._captures.next_deadline(),
+                  self.feeder.orientation.next_deadline())
+        return due if self._liveness.link_failure else min(due, self._pings.next_deadline())

@@ -126,7 +126,7 @@ def _accuracy(axis: str) -> Field:
 
 
 def _velocity(axis: str) -> Field:
-    return Field(f'~/velocity, {axis}', 'm/s', 100, -327.67, 327.67)
+    return Field(f'velocity, {axis}', 'm/s', 100, -327.67, 327.67)
 
 
 def _angle(name: str, limit: float = math.pi) -> Field:
@@ -152,8 +152,8 @@ FIELDS: Mapping[type[Message], Mapping[str, Field]] = {
         'alt': _ALTITUDE,
         'eph': _accuracy('horizontal'),
         'epv': _accuracy('vertical'),
-        'vel': Field('~/velocity, horizontal', 'm/s', 100, 0, 655.34, UINT16_UNKNOWN),
-        'cog': Field('course of ~/velocity', 'deg', 100, 0, 359.99, UINT16_UNKNOWN),
+        'vel': Field('velocity, horizontal', 'm/s', 100, 0, 655.34, UINT16_UNKNOWN),
+        'cog': Field('course of the velocity', 'deg', 100, 0, 359.99, UINT16_UNKNOWN),
         'satellites_visible': _SATELLITES,
     },
     SystemTime: {'time_unix_usec': _UTC},

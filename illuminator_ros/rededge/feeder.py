@@ -37,15 +37,17 @@ from .input_states import (
     Settings,
     Stamp,
     TIME_REFERENCE_LIFETIME,
+    VELOCITIES,
 )
 from .orientation_feeder import OrientationFeeder
 from ..mavlink.command_sender import format_seconds
 from ..mavlink.messages import Address, Message, time_boot_ms
-from ..payload.rotation import Vector
+from ..payload.rotation import Quaternion, Vector
 
 # s
 GPS_STATUS_INTERVAL = 1.0
 NANO = 1_000_000_000
+ENU = Quaternion(1.0, 0.0, 0.0, 0.0)
 # The first ROS time, ns, whose seconds do not fit into the int32 of a stamp.
 END_OF_STAMPS = 2**31 * NANO
 
@@ -95,7 +97,7 @@ class Feeder:
         self._send = send
         self._inputs = InputStates(settings)
         self.orientation = OrientationFeeder(settings, send, target, self._inputs)
-        self._velocity: Vector | None = None
+        self._velocities: dict[Input, Vector] = {}
         self._satellites: int | None = None
         self._gps_status_due = -math.inf
         self._reference: _Reference | None = None
@@ -105,7 +107,7 @@ class Feeder:
         """Return all inputs at this moment."""
         needed: list[tuple[Input, ...]] = [(Input.FIX,), (Input.IMU, Input.ATTITUDE)]
         if self._settings.position_source is PositionSource.FUSED:
-            needed.append((Input.VELOCITY,))
+            needed.append(VELOCITIES)
         if not self.orientation.mount_is_fixed:
             needed.append((Input.MOUNT,))
         if self._needs_reference:
@@ -118,7 +120,7 @@ class Feeder:
     def take_fix(self, position: Position, stamp: Stamp, now: float) -> None:
         """Send a position at once, or refuse it."""
         settings, is_fresh = self._settings, self._inputs.is_fresh
-        velocity = self._velocity if is_fresh(Input.VELOCITY, now) else None
+        velocity = next((self._velocities[one] for one in VELOCITIES if is_fresh(one, now)), None)
         satellites = self._satellites if is_fresh(Input.SATELLITES, now) else None
         with self._inputs.take(Input.FIX, now, stamp):
             conversions.fix_type(position.status)
@@ -130,7 +132,7 @@ class Feeder:
                 self._send(conversions.gps_raw_int(
                     position, utc, velocity, satellites, settings.geoid_separation))
             elif velocity is None:
-                raise ValueError('position_source fused needs ~/velocity, which is missing')
+                raise ValueError('position_source fused needs a velocity, which is missing')
             else:
                 boot_ms = time_boot_ms(now)
                 placed = conversions.global_position_int(
@@ -170,13 +172,20 @@ class Feeder:
             self._needs_reference = True
             self._reference = _Reference(stamp.time, utc - stamp.time)
 
-    def take_velocity(self, velocity: Vector, stamp: Stamp, now: float) -> None:
-        """Take the velocity of the vehicle, ENU, m/s."""
-        with self._inputs.take(Input.VELOCITY, now, stamp):
-            self._inputs.check(Input.VELOCITY, stamp)
+    def take_velocity(
+        self, name: Input, velocity: Vector, stamp: Stamp, now: float, body: Quaternion = ENU,
+    ) -> None:
+        """
+        Take the velocity of the vehicle.
+
+        :param velocity: m/s, in the axes of ``body``.
+        :param body: the orientation of these axes in ENU, of any norm.
+        """
+        with self._inputs.take(name, now, stamp):
+            self._inputs.check(name, stamp)
             if not all(map(math.isfinite, velocity)):
                 raise ValueError('a component is not a finite number')
-            self._velocity = velocity
+            self._velocities[name] = body.normalized().rotate(velocity)
 
     def take_satellites(self, count: int, now: float) -> None:
         """Take the number of satellites."""

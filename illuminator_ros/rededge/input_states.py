@@ -37,6 +37,8 @@ class Input(Enum):
 
     FIX = 'fix'
     VELOCITY = 'velocity'
+    VELOCITY_WITH_COVARIANCE = 'velocity_with_covariance'
+    ODOMETRY = 'odometry'
     SATELLITES = 'satellites'
     IMU = 'imu'
     ATTITUDE = 'attitude'
@@ -44,8 +46,10 @@ class Input(Enum):
     TIME_REFERENCE = 'time_reference'
 
 
+# The inputs with a velocity, the preferred ones first.
+VELOCITIES = (Input.VELOCITY, Input.VELOCITY_WITH_COVARIANCE, Input.ODOMETRY)
 # Inputs that are used with later messages of others, so that their ages count from their stamps.
-USED_LATER = (Input.VELOCITY, Input.TIME_REFERENCE)
+USED_LATER = (*VELOCITIES, Input.TIME_REFERENCE)
 
 
 class InputState(Enum):

@@ -22,11 +22,10 @@ from typing import NamedTuple
 
 from . import messages as rededge
 from ..mavlink.messages import Address, Message, target_of
+from ..mavlink.retries import PING
 
-# s between PINGs, and the wait for a reply; a requested PING is tried twice.
+# s between PINGs.
 PING_INTERVAL = 2.0
-PING_TIMEOUT = 1.0
-PING_TRIES = 2
 
 # Takes success and a message for people, once.
 Done = Callable[[bool, str], None]
@@ -38,7 +37,7 @@ class _Request(NamedTuple):
 
     @property
     def until(self) -> float:
-        return self.since + PING_TRIES * PING_TIMEOUT
+        return self.since + (PING.tries or 1) * PING.first
 
 
 class Pings:
@@ -83,7 +82,7 @@ class Pings:
         self._ping(now)
 
     def _ping(self, now: float) -> None:
-        self._due = now + (PING_TIMEOUT if self._requests else PING_INTERVAL)
+        self._due = now + (PING.first if self._requests else PING_INTERVAL)
         self._sequence = (self._sequence + 1) & 0xFFFFFFFF
         self._sent[self._sequence] = now
         self._send(rededge.Ping(int(now * 1e6), self._sequence, 0, 0))
@@ -105,16 +104,16 @@ class Pings:
     def poll(self, now: float) -> None:
         """See :meth:`Payload.poll`."""
         for sequence, sent_at in list(self._sent.items()):
-            if now >= sent_at + PING_TIMEOUT:
+            if now >= sent_at + PING.first:
                 del self._sent[sequence]
                 self.unanswered += 1
         for request in [one for one in self._requests if now >= one.until]:
             self._requests.remove(request)
-            request.done(False, f'no reply to {PING_TRIES} PINGs')
+            request.done(False, f'no reply to {PING.tries} PINGs')
         if now >= self._due:
             self._ping(now)
 
     def next_deadline(self) -> float:
         """See :meth:`Payload.next_deadline`."""
-        return min(self._due, min(self._sent.values(), default=math.inf) + PING_TIMEOUT,
+        return min(self._due, min(self._sent.values(), default=math.inf) + PING.first,
                    min((one.until for one in self._requests), default=math.inf))

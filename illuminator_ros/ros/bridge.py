@@ -28,11 +28,14 @@ import threading
 import time
 from typing import NamedTuple
 
+from rclpy.clock import Clock, ClockType
+from rclpy.duration import Duration
+from rclpy.exceptions import InvalidHandle
+from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
 from rclpy.node import Node
 
 from .diagnostics import SIGNING_NEEDED
 from .diagnostics_publisher import DiagnosticsPublisher
-from .executor import NodeExecutor
 from .graph import shared_names, unheard_publishers
 from .ignored_parameters import ignored_parameters
 from .node_manager import NodeManager, without_node_name
@@ -52,21 +55,18 @@ from ..mavlink.command_sender import CommandSender
 from ..mavlink.component import Component
 from ..mavlink.link import Link
 from ..mavlink.link_state import LinkEvent
+from ..mavlink.retries import RESOURCE
 from ..payload.payload_type import PayloadType
 
 # s; SIGINT and SIGTERM end the process within 1 s, including these limits and the exit of ROS.
 OFF_LIMIT = 0.6
 STOP_LIMIT = 0.15
-THREADS_LIMIT = 0.05
+ACKNOWLEDGEMENT_LIMIT = 0.05
 # s for which the interpreter runs one of several busy threads, at the end.
 SWITCH_INTERVAL = 0.0005
-# s in which other processes read the last messages; no event tells that they have.
-READING_TIME = 0.02
-# s between checks of the diagnostics, and the minimum between two checks after events.
+# s between checks of the diagnostics, and from an event to the check that it causes.
 TICK = 1.0
 CHECK_INTERVAL = 0.02
-# s between attempts to start a thread while the system has none to spare.
-START_RETRY = 0.5
 # s between checks for another node of the same name, and for publishers that cannot be heard.
 GRAPH_INTERVAL = 5.0
 
@@ -82,8 +82,6 @@ class _Served(NamedTuple):
 class Bridge:
     """
     Connects the nodes of payloads with one link.
-
-    It has more than 15 fields: the parts of the process, which it starts and ends.
 
     :param node: the node of the first payload.
     :param arguments: the command line, which the nodes of further devices follow too.
@@ -124,27 +122,27 @@ class Bridge:
                 mavlink_version=parameters.mavlink_version)
         except ValueError as error:
             raise ParameterError(f'mavlink_version: {error}') from None
-        # Set if there is work before the next tick.
-        self._wake = threading.Event()
         self._ended = threading.Event()
         self._ending = threading.Lock()
         # The lines for the devices that are not in their final state at the end, by log and key.
         self._late: dict[tuple[NodeLog, Hashable], str] = {
             (self.log, None): 'the link does not answer: devices may still be on'}
         self._closed = threading.Event()
-        self._housekeeping = threading.Thread(
-            target=self._keep_house, name='housekeeping', daemon=True)
-        self._nodes = NodeManager(node, arguments, self.log, self._wake.set)
+        steady = Clock(clock_type=ClockType.STEADY_TIME)
+        # Runs once after each reset.
+        self._check = node.create_timer(CHECK_INTERVAL, self._work, clock=steady)
+        self._executor = SingleThreadedExecutor(context=node.context)
+        self._nodes = NodeManager(
+            node, arguments, self.log, self._executor, self._wake)
         self._diagnostics = DiagnosticsPublisher(
             node, self.link, self._component, urls=tuple(parameters.urls),
             period=parameters.diagnostics_period)
-        self._executor = NodeExecutor(node.context, self.log)
         self._served: list[_Served] = []
         for own, kind, client, value in zip(nodes, kinds, clients, values, strict=True):
             log = self.log if own is node else NodeLog(own.get_logger())
             self._served.append(_Served(own, log, kind.serve(client, Host(
                 own, self.link, log, frame_log, self._nodes, self._diagnostics, value,
-                self._wake.set))))
+                self._wake))))
             self._executor.add_node(own)
         specs = itertools.chain(LINK_PARAMETERS, *(kind.parameters for kind in kinds))
         for warning in ignored_parameters(
@@ -154,6 +152,8 @@ class Bridge:
         # A period is a whole number of ticks, otherwise some periods would be a tick too long.
         self._tick = parameters.diagnostics_period / math.ceil(
             parameters.diagnostics_period / TICK)
+        node.create_timer(self._tick, self._work, clock=steady)
+        node.create_timer(GRAPH_INTERVAL, self._check_graph, clock=steady)
 
     @property
     def nodes(self) -> list[Node]:
@@ -168,20 +168,40 @@ class Bridge:
     def run(self) -> None:
         """Serve until :meth:`end` is called or the context is shut down."""
         try:
-            self._start(self._housekeeping.start)
-            self._start(self.link.start)
-            self._executor.run()
+            self._start_link()
+            while not self._closed.is_set() and self.node.context.ok():
+                self._spin_once()
         finally:
             self.end()
         self._closed.wait(OFF_LIMIT + STOP_LIMIT)
-        self._nodes.end()
-        deadline = time.monotonic() + THREADS_LIMIT
-        if self._housekeeping.ident is not None:
-            self._housekeeping.join(max(deadline - time.monotonic(), 0.0))
-        self._nodes.join(deadline)
-        for one in self._served:
-            one.payload.close()
-        self._leave_graph()
+        # The executor sends some answers. It runs the newest task first, so await two tasks.
+        for _ in range(2):
+            task = self._executor.create_task(lambda: None)
+            while self.node.context.ok() and not task.done():
+                self._spin_once()
+        for payload in self._served:
+            payload.payload.close()
+        self._await_acknowledgements()
+        # The first one last, since the others use its publisher of parameter events.
+        for node in reversed(self.nodes):
+            node.destroy_node()
+
+    def _await_acknowledgements(self) -> None:
+        """Let other processes receive the last messages, such as the removal of a marker."""
+        deadline = time.monotonic() + ACKNOWLEDGEMENT_LIMIT
+        for publisher in (one for node in self.nodes for one in node.publishers):
+            # After a shutdown of the context nothing can be sent.
+            with contextlib.suppress(RuntimeError):
+                publisher.wait_for_all_acked(
+                    Duration(seconds=max(deadline - time.monotonic(), 0.0)))
+
+    def _spin_once(self) -> None:
+        try:
+            self._executor.spin_once()
+        except ExternalShutdownException:
+            pass
+        except Exception as error:
+            self.log.error(f'internal error: {error!r}', 'executor')
 
     def end(self) -> None:
         """
@@ -201,35 +221,16 @@ class Bridge:
             self._shut_down_devices()
         self.link.stop(STOP_LIMIT)
         self._closed.set()
-        self._wake.set()
-        self._executor.end()
+        self._executor.wake()
 
-    def _leave_graph(self) -> None:
-        # A process reads the last messages of another one, and learns of its end, in two threads.
-        # If it learns of the end of a service before it has read an answer, it drops the answer.
-        time.sleep(READING_TIME)
-        # If it learns of the end of the process before it has read that a node is gone, it lists
-        # that node for ever. One more node, which has nothing else to announce, delays that end.
-        with contextlib.ExitStack() as held:
-            nodes = self.nodes
-            # Without it, after a shutdown of the context for example, the nodes end all the same.
-            with contextlib.suppress(Exception):
-                last = PayloadNode('_leaving', first=self.node, enable_rosout=False)
-                held.enter_context(last.handle)
-                nodes.append(last)
-            # The first one last, since the others use its publisher of parameter events.
-            for node in reversed(nodes):
-                node.destroy_node()
-            time.sleep(READING_TIME)
-
-    def _start(self, start: Callable[[], None]) -> None:
+    def _start_link(self) -> None:
         while not self._ended.is_set():
             try:
-                start()
+                self.link.start()
                 return
             except RuntimeError as error:
                 self.log.error(f'{error}: too many threads or processes; trying again', 'thread')
-                self._ended.wait(START_RETRY)
+                self._ended.wait(RESOURCE.first)
 
     def _shut_down_devices(self) -> None:
         reports: queue.SimpleQueue[tuple[NodeLog, Hashable, int | None, str]] = queue.SimpleQueue()
@@ -268,30 +269,33 @@ class Bridge:
         for (log, _), text in list(late.items()):
             log.error(text)
 
-    def _keep_house(self) -> None:
-        graph_due = 0.0
-        while not self._ended.is_set():
-            try:
-                more = self._nodes.work()
-                self.link.call(self._poll)
-                self._diagnostics.poll(self._tick / 2)
-                for one in self._served:
-                    one.log.flush()
-                # A service of rclpy sets the levels of loggers.
-                self._frame_log.adjust()
-                if self.link.clock() >= graph_due:
-                    graph_due = self.link.clock() + GRAPH_INTERVAL
-                    nodes = self.nodes
-                    self.log.write_conditions(shared_names(nodes), 'name')
-                    self.log.write_conditions(itertools.chain.from_iterable(
-                        map(unheard_publishers, nodes)), 'publisher')
-            except Exception as error:
-                self.log.error(f'internal error: {error!r}', 'housekeeping')
-                more = False
-            self._ended.wait(CHECK_INTERVAL)
-            if not more:
-                self._wake.wait(self._tick)
-            self._wake.clear()
+    def _wake(self) -> None:
+        """Have :meth:`_work` called soon; callable from any thread."""
+        # The nodes may leave before the link's thread has ended.
+        with contextlib.suppress(InvalidHandle):
+            if self._check.is_canceled():
+                self._check.reset()
+
+    # In the executor's thread
+
+    def _work(self) -> None:
+        self._check.cancel()
+        if self._nodes.work():
+            self._wake()
+        self.link.call(self._poll)
+        self._diagnostics.poll(self._tick / 2)
+        for one in self._served:
+            one.log.flush()
+        # A service of rclpy sets the levels of loggers.
+        self._frame_log.adjust()
+
+    def _check_graph(self) -> None:
+        nodes = self.nodes
+        self.log.write_conditions(shared_names(nodes), 'name')
+        self.log.write_conditions(itertools.chain.from_iterable(
+            map(unheard_publishers, nodes)), 'publisher')
+
+    # In the link's thread
 
     def _poll(self, now: float) -> None:
         needs_signing = (self._component.commands.unanswering
@@ -306,7 +310,7 @@ class Bridge:
     def _link_event(self, event: LinkEvent) -> None:
         self.log.write(logging.INFO if event.is_open else logging.WARNING, str(event),
                        f'link {event.label}')
-        self._wake.set()
+        self._wake()
 
 
 def _link_parameters(node: Node, kinds: Sequence[RosPayload], url: str) -> LinkParameters:

@@ -18,7 +18,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Hashable, Iterator
 import math
-from typing import Generic, Protocol, TypeVar
+from typing import Any, Generic, Protocol, TypeVar
 
 from rclpy.node import Node
 
@@ -26,6 +26,7 @@ from .diagnostics_publisher import DiagnosticsSource
 from .node_manager import NodeRequest
 from .payload import Host
 from .throttled_log import NodeLog
+from ..payload.device_events import DeviceEvent, DeviceForgotten
 
 # s without a device until the log gives the reason, once.
 ABSENCE_DELAY = 5.0
@@ -35,6 +36,9 @@ class DeviceNode(Protocol):
     """A node that serves a device, or none yet."""
 
     source: DiagnosticsSource
+
+    def take(self, event: Any) -> None:
+        """Publish an event of the device, which is of a class of its payload."""
 
     def release(self) -> None:
         """Serve no device: it was forgotten."""
@@ -117,7 +121,16 @@ class DeviceNodes(Generic[K, N]):
         self._bind_node(node, key, now)
         self._host.diagnostics.add(node.source)
 
-    def forget(self, key: K) -> None:
+    def take(self, event: DeviceEvent[K]) -> bool:
+        """Take an event of a device; return whether a node serves the device."""
+        node = self._nodes.get(event.key)
+        if isinstance(event, DeviceForgotten):
+            self._forget(event.key)
+        elif node is not None:
+            node.take(event)
+        return node is not None
+
+    def _forget(self, key: K) -> None:
         """Remove the node of a device that was forgotten; the payload's own one stays."""
         node = self._nodes.pop(key, None)
         if node is not None:

@@ -35,7 +35,9 @@ from ..mavlink.component import Component
 from ..mavlink.duplicate_filter import OWN
 from ..mavlink.link import Link
 from ..mavlink.message_traits import name_of
-from ..mavlink.messages import Address
+from ..mavlink.messages import Address, Heartbeat
+from ..mavlink.transport.udp import MAX_PEERS
+from ..payload.component_kinds import described
 
 OK, WARN, ERROR = DiagnosticStatus.OK, DiagnosticStatus.WARN, DiagnosticStatus.ERROR
 
@@ -58,13 +60,13 @@ LINK_VALUES = {
     'peers': 'peers with recent valid frames',
     'frames_received': 'frames with a valid checksum',
     'frames_sent': 'frames that were sent',
-    'frames_dropped': 'frames that were not sent, because the queue was full or the line slow',
+    'frames_dropped': 'frames that were not sent, because the queue was full or the link slow',
     **dict.fromkeys(('bytes_received', 'bytes_sent'), 'all bytes'),
     **dict.fromkeys(('bytes_received_per_s', 'bytes_sent_per_s'), 'recent average'),
     'crc_errors': 'frames with a wrong checksum',
     'frames_forwarded':
         'frames from other links that were sent, or wait to be sent, over this one',
-    'frames_not_forwarded': 'forwarded frames that the line replaced by newer ones or dropped',
+    'frames_not_forwarded': 'forwarded frames that the link replaced by newer ones or dropped',
     'not_forwarded': 'the most frequent messages of these, with their numbers',
     'copies_received': 'frames that had come over another link less than 5 s before; WARN names '
                        'both links',
@@ -140,6 +142,7 @@ class LinkDiagnostics:
     :param unanswering: the devices whose last command got no acknowledgement.
     :param values: the values of the status of each line that are the same for all devices.
     :param devices: values of single devices, by address.
+    :param heartbeats: see :attr:`~..mavlink.component.Component.heartbeats`.
     """
 
     lines: Sequence[link_state.LinkSnapshot]
@@ -150,6 +153,7 @@ class LinkDiagnostics:
     unanswering: frozenset[Address]
     values: Sequence[Mapping[str, Value]]
     devices: Mapping[Address, Mapping[str, Value]]
+    heartbeats: Mapping[Address, Heartbeat]
 
     @property
     def state(self) -> link_state.LinkSnapshot:
@@ -236,7 +240,7 @@ def link_diagnostics(
         lines, [[text for (_, second), text in texts.items() if second == index]
                 for index in range(len(lines))], now, component.address,
         component.address_conflict(now), frozenset(commands.unanswering),
-        [{**values[0], **own}, *values[1:]], devices)
+        [{**values[0], **own}, *values[1:]], devices, {**component.heartbeats})
 
 
 def _line_values(
@@ -277,6 +281,8 @@ def line_findings(link: LinkDiagnostics, index: int) -> list[Finding]:
     """Return the findings on one line."""
     line = link.lines[index]
     return [*([] if line.is_open else [(ERROR, f'not open: {line.reason}')]),
+            *([] if line.peers <= MAX_PEERS else [(WARN, (
+                f'{line.peers} peers send, and only the first {MAX_PEERS} get an answer'))]),
             *((WARN, text) for text in link.loops[index])]
 
 
@@ -289,7 +295,7 @@ def why_nothing_is_heard(link: LinkDiagnostics, device: str) -> str:
     """
     Return the likeliest reason why no device is found on an open link, for people.
 
-    :param device: such as ``an illuminator``.
+    :param device: such as ``a light``.
     """
     signing, frames, bytes_ = link.state.signing, link.frames_received, link.bytes_received
     if link.address_conflict:
@@ -303,9 +309,13 @@ def why_nothing_is_heard(link: LinkDiagnostics, device: str) -> str:
     if signing.unsigned and not frames:
         return (f'{signing.unsigned} frames refused because they are not signed: sign them at the '
                 'other side, or set signing_mode to sign')
+    unset = [str(one) for one in link.state.traffic.sources if not one.system]
+    if unset:
+        return (f'{", ".join(unset[:5])} heard, whose system id 0 cannot be addressed: set its '
+                'system id, such as 1')
     if frames:
-        return (f'{frames} frames received, none from {device}: check that it is '
-                'on, and that routers forward its frames')
+        return (f'{frames} frames from {described(link.state.traffic.sources, link.heartbeats)}, '
+                f'none from {device}: check that it is on, and that routers forward its frames')
     if bytes_:
         return f'{bytes_} bytes received, no valid frame; check the baud rate'
     return ('nothing is received: check that the device is on, and that it, or a router, sends '

@@ -17,20 +17,20 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
+import contextlib
 from dataclasses import dataclass
 import queue
 import threading
+from typing import NamedTuple
 
 from diagnostic_msgs.msg import DiagnosticArray
+from rclpy.exceptions import InvalidHandle
 from rclpy.node import Node
 
 from .diagnostics import line_reports, link_diagnostics, LinkDiagnostics, loops, Report
 from .qos import STREAM_QOS
 from ..mavlink.component import Component
 from ..mavlink.link import Link
-
-# Longest wait for the link's thread, s.
-SNAPSHOT_TIMEOUT = 1.0
 
 # Makes reports of a snapshot that was taken in the link's thread; a pure function.
 MakeReports = Callable[[LinkDiagnostics], Sequence[Report]]
@@ -47,6 +47,20 @@ class DiagnosticsSource:
 
     node: str
     take_snapshot: Callable[[float], MakeReports]
+
+
+class _Taken(NamedTuple):
+    """
+    Snapshots of the link and of the sources.
+
+    :param now: when they were taken, s.
+    :param tolerance: see :meth:`DiagnosticsPublisher.poll`.
+    """
+
+    now: float
+    tolerance: float
+    link: LinkDiagnostics
+    sources: Sequence[tuple[DiagnosticsSource, MakeReports]]
 
 
 class DiagnosticsPublisher:
@@ -70,6 +84,9 @@ class DiagnosticsPublisher:
         self._lock = threading.Lock()
         # When each source is due, and the levels that were published last.
         self._sources: dict[DiagnosticsSource, tuple[float, list[bytes]]] = {}
+        # What the link's thread has taken and the executor's thread publishes.
+        self._taken: queue.SimpleQueue[_Taken] = queue.SimpleQueue()
+        self._have_taken = node.create_guard_condition(self._publish_due)
 
     def add(self, source: DiagnosticsSource) -> None:
         """Publish for a node from now on; callable from any thread."""
@@ -91,33 +108,42 @@ class DiagnosticsPublisher:
 
     def poll(self, tolerance: float) -> None:
         """
-        Publish everything that is due or has changed.
+        Have everything published that is due or has changed; callable from any thread.
 
         :param tolerance: how early a publication may be, s.
         """
         with self._lock:
-            sources = list(self._sources)
-        taken: queue.SimpleQueue[tuple[float, LinkDiagnostics, list[MakeReports]]] = (
-            queue.SimpleQueue())
-        self._link.call(lambda now: taken.put((
-            now, self.snapshot(now), [source.take_snapshot(now) for source in sources])))
-        try:
-            now, link, snapshots = taken.get(timeout=SNAPSHOT_TIMEOUT)
-        except queue.Empty:
-            return
-        for source, make_reports in zip(sources, snapshots, strict=True):
-            # The first node alone reports the further lines.
-            reports = [*make_reports(link), *(line_reports(link) if source is sources[0] else ())]
-            levels = [report.level for report in reports]
-            due, published = self._sources.get(source, (0.0, levels))
-            if now >= due - tolerance:
-                due = now + self._period
-            elif levels == published:
-                continue
-            with self._lock:
-                if source in self._sources:
-                    self._sources[source] = due, levels
-            self._publish(source, reports)
+            sources = tuple(self._sources)
+
+        def take(now: float) -> None:
+            self._taken.put(_Taken(now, tolerance, self.snapshot(now), [
+                (source, source.take_snapshot(now)) for source in sources]))
+            # At the end of the process the nodes may leave before the link's thread has ended.
+            with contextlib.suppress(InvalidHandle):
+                self._have_taken.trigger()
+
+        self._link.call(take)
+
+    # In the executor's thread
+
+    def _publish_due(self) -> None:
+        while not self._taken.empty():
+            taken = self._taken.get()
+            for source, make_reports in taken.sources:
+                reports = [*make_reports(taken.link)]
+                # The first node alone reports the further lines.
+                if source is taken.sources[0][0]:
+                    reports += line_reports(taken.link)
+                levels = [report.level for report in reports]
+                due, published = self._sources.get(source, (0.0, levels))
+                if taken.now >= due - taken.tolerance:
+                    due = taken.now + self._period
+                elif levels == published:
+                    continue
+                with self._lock:
+                    if source in self._sources:
+                        self._sources[source] = due, levels
+                self._publish(source, reports)
 
     def _publish(self, source: DiagnosticsSource, reports: Sequence[Report]) -> None:
         array = DiagnosticArray()

@@ -16,9 +16,10 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Callable, Hashable
 import threading
-from typing import Any, TypeVar
+from typing import TypeVar
 
 from .throttled_log import NodeLog
 from ..mavlink.link import Link
@@ -44,9 +45,8 @@ class LinkCalls:
         self._link = link
         self._log = log
         self._limit = limit
-        # Kind and refusal of each request that waits, by the function that ends it. Untyped: the
-        # answers of requests have different types.
-        self._waiting: dict[Callable[[Any], None], tuple[Hashable, Callable[[str], Any]]] = {}
+        # How many of each kind wait.
+        self._waiting: Counter[Hashable] = Counter()
         self._lock = threading.Lock()
 
     def ask(
@@ -56,15 +56,25 @@ class LinkCalls:
         """
         Start a request.
 
-        :param answer: called once with the answer, in any thread.
+        :param answer: called once with the answer, in the link's thread, or at once.
         :param refusal: returns the answer for a reason why the request cannot be executed.
         :param kind: an OFF is of another kind than an ON, so that no number of these refuses it.
         """
+        with self._lock:
+            is_busy = self._waiting[kind] >= self._limit
+            self._waiting[kind] += not is_busy
+        if is_busy:
+            answer(refusal(f'busy: {self._limit} requests wait for an answer already'))
+            return
+        is_waiting = True
+
         def end(value: T) -> None:
-            with self._lock:
-                if self._waiting.pop(end, None) is None:
-                    return
-            answer(value)
+            nonlocal is_waiting
+            if is_waiting:
+                is_waiting = False
+                with self._lock:
+                    self._waiting[kind] -= 1
+                answer(value)
 
         def run(now: float) -> None:
             try:
@@ -74,18 +84,4 @@ class LinkCalls:
                 self._log.error(reason, 'request')
                 end(refusal(reason))
 
-        with self._lock:
-            busy = sum(one == kind for one, _ in self._waiting.values()) >= self._limit
-            if not busy:
-                self._waiting[end] = kind, refusal
-        if busy:
-            answer(refusal(f'busy: {self._limit} requests wait for an answer already'))
-            return
         self._link.call(run)
-
-    def refuse_waiting(self, reason: str) -> None:
-        """Answer the requests that wait with a refusal; callable in any thread."""
-        with self._lock:
-            waiting = tuple(self._waiting.items())
-        for end, (_, refusal) in waiting:
-            end(refusal(reason))

@@ -27,7 +27,7 @@ from rclpy.exceptions import InvalidHandle
 from rclpy.node import Node
 from rclpy.qos import QoSProfile, ReliabilityPolicy
 
-from .executor import DeferredService, Respond, Take
+from .deferred_service import DeferredService, Respond, Take
 from .link_call import LinkCalls, MAX_PENDING
 from .qos import STATE_QOS
 from .throttled_log import NodeLog
@@ -130,7 +130,7 @@ class NodeInterface:
         for service in services:
             calls, endpoint = LinkCalls(link, log, service.limit), service.endpoint
             DeferredService(node, endpoint.type, f'~/{endpoint.name}', _taker(service, calls),
-                            calls.refuse_waiting, SERVICE_QOS)
+                            SERVICE_QOS, log)
         for command in commands:
             endpoint = command.endpoint
             node.create_subscription(

@@ -12,27 +12,24 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Nodes of further devices, made and removed while the process runs, on few threads."""
+"""Nodes of further devices, made and removed while the process runs."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 import contextlib
 from dataclasses import dataclass
-import functools
 import math
 import threading
 import time
 
+from rclpy.executors import Executor
 from rclpy.node import Node
 
-from .executor import NodeExecutor
 from .parameters import ParameterError
 from .payload_node import PayloadNode
 from .throttled_log import NodeLog
-
-# s from a failed attempt to make a node to the next one.
-RETRY_DELAY = 2.0
+from ..mavlink.retries import RESOURCE
 
 
 @dataclass(eq=False)
@@ -61,15 +58,14 @@ class NodeManager:
     """
     The nodes of further devices, made and removed one at a time by :meth:`work`.
 
-    One thread runs the callbacks of all of them; each node adds 20 us to a callback.
-
     :param first: the process's first node, whose namespace the others share.
     :param arguments: the ROS arguments that the nodes follow.
-    :param wake: requests a call of :meth:`work`.
+    :param executor: runs the callbacks of the nodes.
+    :param wake: requests a call of :meth:`work` in the executor's thread.
     """
 
     def __init__(
-        self, first: PayloadNode, arguments: Sequence[str], log: NodeLog,
+        self, first: PayloadNode, arguments: Sequence[str], log: NodeLog, executor: Executor,
         wake: Callable[[], None],
     ) -> None:
         self._first = first
@@ -78,8 +74,7 @@ class NodeManager:
         self._wake = wake
         self._lock = threading.Lock()
         self._requests: list[NodeRequest] = []
-        self._executor = NodeExecutor(first.context, log)
-        self._thread = threading.Thread(target=self._executor.run, name='nodes', daemon=True)
+        self._executor = executor
 
     def make(self, request: NodeRequest) -> None:
         """
@@ -109,7 +104,8 @@ class NodeManager:
             due = [one for one in self._requests if one.node is None and one.due <= now]
         for request in unwanted:
             if request.node is not None:
-                self._executor.call(functools.partial(self._discard, request.node))
+                self._executor.remove_node(request.node)
+                request.node.destroy_node()
         for request in due[:1]:
             try:
                 self._make(request)
@@ -119,21 +115,12 @@ class NodeManager:
             except Exception as error:
                 # Threads, descriptors or memory may be short temporarily.
                 self._log.error(f'{request.device} gets no node yet: {error}; trying again in '
-                                f'{RETRY_DELAY:g} s', f'node of {request.device}')
-                request.due = time.monotonic() + RETRY_DELAY
+                                f'{RESOURCE.first:g} s', f'node of {request.device}')
+                request.due = time.monotonic() + RESOURCE.first
         for request in self._requests:
             if request.log is not None:
                 request.log.flush()
         return len(due) > 1
-
-    def end(self) -> None:
-        """Stop running callbacks; callable from any thread."""
-        self._executor.end()
-
-    def join(self, deadline: float) -> None:
-        """Wait until ``deadline`` (s, monotonic) for the thread."""
-        if self._thread.ident is not None:
-            self._thread.join(max(deadline - time.monotonic(), 0.0))
 
     @property
     def nodes(self) -> list[Node]:
@@ -141,8 +128,6 @@ class NodeManager:
         return [one.node for one in self._requests if one.node is not None]
 
     def _make(self, request: NodeRequest) -> None:
-        if self._thread.ident is None:
-            self._thread.start()
         with contextlib.ExitStack() as stack:
             node = PayloadNode(
                 request.name, first=self._first, namespace=self._first.get_namespace(),
@@ -153,11 +138,6 @@ class NodeManager:
             stack.pop_all()
         self._executor.add_node(node)
         request.node, request.log = node, log
-
-    def _discard(self, node: Node) -> None:
-        self._executor.remove_node(node)
-        with contextlib.suppress(Exception):
-            node.destroy_node()
 
 
 def without_node_name(arguments: Sequence[str]) -> list[str]:

@@ -37,7 +37,7 @@ from rclpy.node import Node
 from rclpy.parameter import Parameter
 from rclpy.qos import qos_profile_services_default, QoSProfile
 
-from .executor import DeferredService, Respond, Take
+from .deferred_service import DeferredService, Respond, Take
 from .ignored_parameters import did_you_mean
 from .link_call import LinkCalls
 from .parameters import ChangeableParameters, DeviceParameters, Values
@@ -52,8 +52,6 @@ MAX_NAMES = 200
 SUGGESTIONS = 10
 # Requests that wait in the middleware, each of the size of a few parameters.
 QUEUE_DEPTH = 100
-# s, in addition to the 0.78 s that a light may take: a set is answered within 0.9 s.
-ANSWER_SPREAD = 0.1
 
 # Sets values in the device, in the link's thread, given the time (s); calls its last argument
 # once with '' or why the values were not set.
@@ -95,8 +93,7 @@ class ParameterServices:
                          reliability=qos_profile_services_default.reliability)
 
         def serve(type_: type[Any], name: str, take: Take) -> None:
-            DeferredService(node, type_, f'~/{name}', take, self._calls.refuse_waiting, qos,
-                            ANSWER_SPREAD)
+            DeferredService(node, type_, f'~/{name}', take, qos, log)
 
         reads: tuple[tuple[type[Any], str, str, Callable[[str], object]], ...] = (
             (srv.DescribeParameters, 'describe_parameters', 'descriptors',

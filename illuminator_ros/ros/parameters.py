@@ -18,10 +18,11 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping
 import contextlib
+import inspect
 import math
 import threading
 import time
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, TypeVar
 
 from rcl_interfaces import msg
 from rclpy.exceptions import InvalidHandle
@@ -35,6 +36,7 @@ from ..mavlink.signing import Signing, SigningMode
 from ..mavlink.signing_files import KeyFileError, load_signing, TimestampStore
 from ..mavlink.url import parse_url, resource, Url, UrlError
 
+T = TypeVar('T')
 # Values of parameters by name, each of the type of its default.
 Values = Mapping[str, Any]
 
@@ -271,6 +273,17 @@ def declare_given(
             node.set_parameters_atomically([Parameter(spec.name, spec.type, [])])
             node.set_descriptor(spec.name, spec.descriptor(read_only=True))
     return values
+
+
+def by_name(make: Callable[..., T], values: Values, **others: object) -> T:
+    """
+    Return settings, with the value of the parameter that has the name of each field.
+
+    :param make: the class of the settings.
+    :param others: fields that are not the value of such a parameter.
+    """
+    return make(**others, **{
+        name: values[name] for name in inspect.signature(make).parameters if name not in others})
 
 
 def given_parameters(node: Node) -> Mapping[str, Parameter]:

@@ -20,15 +20,12 @@ All were seen in rclpy 7.1.6, of Jazzy, and in 9.1.2, of Kilted.
 
 from collections.abc import Mapping
 
-# WaitSet and rmw_service_info_t, for an executor that keeps its wait set.
-from rclpy.impl.implementation_singleton import rclpy_implementation
-
 # The type of a node's logger.
 from rclpy.impl.rcutils_logger import RcutilsLogger
 from rclpy.node import Node
 from rclpy.parameter import Parameter
 
-__all__ = ('parameter_overrides', 'RcutilsLogger', 'rclpy_implementation')
+__all__ = ('parameter_overrides', 'RcutilsLogger')
 
 
 def parameter_overrides(node: Node) -> Mapping[str, Parameter]:

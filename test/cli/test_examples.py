@@ -12,13 +12,15 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""The examples in the help of simulator and conformance."""
+"""The examples in the help of simulator, conformance and discover."""
 
+from collections.abc import Callable
 import re
 import shlex
 import sys
 
-from illuminator_ros.cli.conformance.run import parse
+from illuminator_ros.cli.conformance import run as conformance
+from illuminator_ros.cli.discover import run as discover
 from illuminator_ros.cli.payloads import PAYLOADS
 from illuminator_ros.cli.simulator.options import parser, payload_types
 import pytest
@@ -52,15 +54,17 @@ def test_an_example_of_the_simulator_runs_as_the_simulator_was_started(
 
 
 @pytest.mark.parametrize(('started', 'command'), STARTED)
-def test_an_example_of_conformance_runs_as_conformance_was_started(
-    started: str, command: str, monkeypatch: pytest.MonkeyPatch,
-    capsys: pytest.CaptureFixture[str],
+@pytest.mark.parametrize(('name', 'parse'), [
+    ('conformance', conformance.parse), ('discover', discover.parse)])
+def test_an_example_of_a_tool_runs_as_the_tool_was_started(
+    started: str, command: str, name: str, parse: Callable[[list[str]], object],
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str],
 ) -> None:
-    monkeypatch.setattr(sys, 'argv', [started.format('conformance')])
+    monkeypatch.setattr(sys, 'argv', [started.format(name)])
     with pytest.raises(SystemExit):
         parse(['--help'])
     lines = examples(capsys.readouterr().out)
-    begin = command.format('conformance')
+    begin = command.format(name)
 
     assert lines
     for line in lines:

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""The form of the Markdown pages: links, map, length."""
+"""The form of the Markdown pages: links, lines, map."""
 
 from pathlib import Path
 import re
@@ -23,8 +23,6 @@ ROOT = Path(__file__).parents[2]
 README = ROOT / 'README.md'
 PAGES = [*sorted(ROOT.glob('*.md')), *sorted((ROOT / 'doc').glob('*.md'))]
 LONGEST = 120
-# Words outside tables and code, of a page and of README and doc/ together.
-WORDS, ALL_WORDS = 1_200, 12_000
 
 
 def without_code(page: Path) -> str:
@@ -60,20 +58,6 @@ def test_lines_except_table_rows_are_wrapped(page: Path) -> None:
             if len(line) > LONGEST and not re.match(r'\||!\[', line)]
 
     assert long == []
-
-
-def words(page: Path) -> int:
-    """Return the number of words of a page outside tables and code."""
-    return sum(len(line.split()) for line in without_code(page).splitlines()
-               if not line.startswith('|'))
-
-
-def test_the_pages_are_short_outside_tables_and_code() -> None:
-    counts = {page.relative_to(ROOT): words(page) for page in PAGES
-              if page == README or page.parent == ROOT / 'doc'}
-
-    assert {name: count for name, count in counts.items() if count > WORDS} == {}
-    assert sum(counts.values()) <= ALL_WORDS, counts
 
 
 def test_the_map_lists_every_page_once() -> None:

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""The pages of simulator and conformance, compared with these programs; needs no ROS."""
+"""The pages of simulator, conformance and discover, compared with these programs; needs no ROS."""
 
 from collections.abc import Sequence
 from dataclasses import fields
@@ -23,6 +23,8 @@ import shlex
 from typing import Any
 
 from illuminator_ros.cli.conformance.run import parse
+from illuminator_ros.cli.discover import run as discover
+from illuminator_ros.cli.discover.port import Port
 from illuminator_ros.cli.payloads import PAYLOADS
 from illuminator_ros.cli.simulator.components import scenario
 from illuminator_ros.cli.simulator.options import parser, payload_types
@@ -30,6 +32,7 @@ from illuminator_ros.gimbal.checks import device, manager
 from illuminator_ros.illuminator.checks.requirements import REQUIREMENTS
 from illuminator_ros.illuminator.simulated import SIMULATED
 from illuminator_ros.illuminator.thermal import ThermalProperties
+from illuminator_ros.mavlink.url import parse_url
 from illuminator_ros.payload.checks.report import as_json, RunReport
 from illuminator_ros.payload.checks.requirement import Requirement, Result, Verdict
 from illuminator_ros.rededge.checks import REQUIREMENTS as CAMERA_REQUIREMENTS
@@ -72,8 +75,8 @@ COMMANDS = [
     for page in (*DOC.glob('*.md'), DOC.parent / 'README.md')
     for block in page.read_text().split('```')[1::2]
     for one in re.finditer(
-        r'^[^#\n]*?\b(?:illuminator-|ros2 run illuminator_ros )(simulator|conformance)\b(.*)',
-        block, re.M)]
+        r'^[^#\n]*?\b(?:illuminator-|ros2 run illuminator_ros )'
+        r'(simulator|conformance|discover)\b(.*)', block, re.M)]
 # The design page adds a winch.
 KINDS = {**PAYLOADS, 'winch': WINCH}
 
@@ -86,13 +89,16 @@ def test_a_command_in_a_block_of_code_has_arguments_that_the_program_takes(
 
     if program == 'simulator':
         parser(payload_types(arguments, KINDS), KINDS).parse_args(arguments)
+    elif program == 'discover':
+        discover.parse(arguments)
     else:
         parse(arguments, KINDS)
 
 
-def test_commands_of_both_programs_are_found() -> None:
+def test_commands_of_all_these_programs_are_found() -> None:
     assert len(COMMANDS) > 20
-    assert {program for _, program, _ in COMMANDS} == {'simulator', 'conformance'}
+    assert {program for _, program, _ in COMMANDS} == {
+        'simulator', 'conformance', 'discover'}
 
 
 def test_the_kinds_of_devices_are_listed_with_their_options() -> None:
@@ -130,7 +136,29 @@ def test_each_rule_of_gimbals_is_listed_with_its_requirements_and_has_a_test_or_
               for name in re.findall(r'^(?:async )?def test(\w+)', path.read_text(), re.MULTILINE)
               for number in re.findall(r'_gm_(\d+)', name)}
     listed = {rule: re.findall('`(.+?)`', names) for rule, _, names in table(
-        (DOC / 'gimbal_manager.md').read_text(), 'rule')}
+        (DOC / 'details.md').read_text(), 'rule')}
 
     assert {*listed} == tested | {*checked}
     assert {rule: names for rule, names in listed.items() if names} == checked
+
+
+def test_the_report_of_discover_on_the_page_is_as_the_program_prints_it() -> None:
+    page = (DOC / 'links.md').read_text()
+    url = 'serial:///dev/serial/by-id/usb-FTDI_FT232R_USB_UART_A50285BI-if00-port0:57600'
+    heard = [
+        {'address': address, 'kinds': kinds, 'mavlink_versions': [2], 'signed': False,
+         'frames_per_s': rate, 'served': kinds == ['light']}
+        for address, kinds, rate in (
+            ('1/1', ['autopilot', 'ArduPilot'], 52.4), ('1/243', ['light'], 6.0))]
+    report = {'port': url, 'url': url, 'trouble': '', 'components': heard,
+              'run': [f'ros2 run illuminator_ros bridge {url}'], 'try': []}
+    silent = Port(parse_url('udpin://0.0.0.0:14590'), 'udpin://0.0.0.0:14590', 1.0, lambda: 0.0)
+
+    for one in (report, silent.report()):
+        assert '\n'.join(['', *discover.lines(one), '']) in page
+    keys = [re.findall('`(.+?)`', cell) for cell, _ in table(
+        page, 'key of `--json`, for each port')]
+    assert [key for row in keys for key in row] == [*silent.report()] == [*report]
+    [of_component] = [text for cell, text in table(page, 'key of `--json`, for each port')
+                      if cell == '`components`']
+    assert re.findall('`(.+?)`', of_component) == [*heard[0]]

@@ -23,6 +23,12 @@ from illuminator_ros.gimbal import events
 from illuminator_ros.gimbal.events import GimbalKey
 from illuminator_ros.mavlink.dialect import mavlink
 from illuminator_ros.mavlink.messages import Address, CommandLong, heartbeat, Message
+from illuminator_ros.payload.device_events import (
+    DeviceConnected,
+    DeviceDisconnected,
+    DeviceForgotten,
+    DeviceFound,
+)
 import pytest
 from support.entries import entries
 from support.gimbals import ALL, AUTOPILOT, DEVICE, FakeManager, keys, NAN, OTHER, Rig
@@ -40,10 +46,10 @@ def requests(rig: Rig, message_id: int = INFORMATION) -> list[tuple[float, Addre
 def test_gm_27_gimbal_is_found_by_the_information_of_its_manager() -> None:
     rig = Rig(FakeManager()).run(3.0)
 
-    assert rig.all_of(events.GimbalFound) == [events.GimbalFound(GimbalKey(DEVICE))]
-    assert rig.all_of(events.GimbalConnected) == [
-        events.GimbalConnected(GimbalKey(DEVICE), AUTOPILOT)]
-    assert not rig.all_of(events.GimbalLost)
+    assert rig.all_of(DeviceFound) == [DeviceFound(GimbalKey(DEVICE))]
+    assert rig.all_of(DeviceConnected) == [
+        DeviceConnected(GimbalKey(DEVICE), f'manager {AUTOPILOT}')]
+    assert not rig.all_of(DeviceDisconnected)
     assert [target for _, target in requests(rig)].count(AUTOPILOT) == 1
     snapshot = rig.gimbal.snapshot(rig.now)
     assert (snapshot.unreachable, snapshot.managers) == ('', (AUTOPILOT,))
@@ -74,7 +80,7 @@ def test_gm_25_gm_26_several_gimbals_behind_one_or_several_managers_are_told_apa
     rig = Rig(*managers).run(6.0)
 
     assert sorted(keys(rig)) == sorted(found)
-    assert {event.key for event in rig.all_of(events.GimbalConnected)} == set(found)
+    assert {event.key for event in rig.all_of(DeviceConnected)} == set(found)
     headings = {event.key: event.attitude.heading for event in rig.all_of(events.AttitudeReceived)
                 if event.attitude}
     assert len(set(headings.values())) == len(managers)
@@ -83,7 +89,7 @@ def test_gm_25_gm_26_several_gimbals_behind_one_or_several_managers_are_told_apa
 def test_attitude_of_an_older_device_without_an_id_is_that_of_the_only_gimbal() -> None:
     rig = Rig(FakeManager(device_id=1, attitude_number=0)).run(3.0)
 
-    assert rig.all_of(events.GimbalConnected)
+    assert rig.all_of(DeviceConnected)
     assert rig.all_of(events.AttitudeReceived)[0].key == GimbalKey(AUTOPILOT, 1)
 
 
@@ -125,7 +131,7 @@ def test_manager_that_announces_no_device_yet_is_asked_again_when_it_reports_one
 def test_gm_27_manager_that_tells_no_information_is_known_by_its_status() -> None:
     rig = Rig(FakeManager(announces=False)).run(30.0)
 
-    assert rig.all_of(events.GimbalConnected)
+    assert rig.all_of(DeviceConnected)
     assert rig.gimbal.snapshot(rig.now).capabilities is None
     # The pauses grow.
     assert 3 <= len(requests(rig)) <= 15
@@ -192,10 +198,10 @@ def test_forged_components_take_no_memory_without_end() -> None:
     rig.run(1.0)
 
     assert len(keys(rig)) == limits.MAX_GIMBALS
-    assert rig.client.limit_reached
+    assert rig.client.discovery.limit_reached
     rig.run(60.1)
     assert keys(rig) == [GimbalKey(DEVICE)]
-    assert not rig.client.limit_reached
+    assert not rig.client.discovery.limit_reached
 
 
 @pytest.mark.parametrize('announcement', [FakeManager.status, FakeManager.information])
@@ -219,7 +225,7 @@ def test_wanted_gimbal_is_found_among_forged_ones() -> None:
     rig.managers.append(FakeManager())
     rig.run(3.0)
 
-    assert [event.key for event in rig.all_of(events.GimbalConnected)] == [GimbalKey(DEVICE)]
+    assert [event.key for event in rig.all_of(DeviceConnected)] == [GimbalKey(DEVICE)]
     assert len(keys(rig)) == limits.MAX_GIMBALS + 1
 
 
@@ -230,12 +236,12 @@ def test_gimbal_is_lost_with_its_manager_or_its_device(silent: str, reason: str)
     rig = Rig(FakeManager()).run(3.0)
     setattr(rig.managers[0], silent, False)
     rig.run(4.5)
-    assert rig.all_of(events.GimbalLost)[-1].reason.startswith(reason)
+    assert rig.all_of(DeviceDisconnected)[-1].reason.startswith(reason)
 
     setattr(rig.managers[0], silent, True)
     rig.run(2.0)
 
-    assert len(rig.all_of(events.GimbalConnected)) == 2
+    assert len(rig.all_of(DeviceConnected)) == 2
     assert rig.gimbal.snapshot(rig.now).unreachable == ''
 
 
@@ -244,7 +250,7 @@ def test_closed_link_loses_the_gimbal_at_once() -> None:
 
     rig.component.link_closed(rig.now, 'cable pulled')
 
-    assert rig.all_of(events.GimbalLost)[-1].reason == 'cable pulled'
+    assert rig.all_of(DeviceDisconnected)[-1].reason == 'cable pulled'
     assert not rig.run(3.0).gimbal.snapshot(rig.now).unreachable
 
 
@@ -256,7 +262,7 @@ def test_line_that_is_lost_beside_another_one_takes_the_gimbal_whose_device_or_m
 
     rig.component.components_lost([lost], rig.now, 'cable pulled')
 
-    assert [event.reason for event in rig.all_of(events.GimbalLost)] == (
+    assert [event.reason for event in rig.all_of(DeviceDisconnected)] == (
         [] if is_connected else ['cable pulled'])
     assert not rig.run(3.0).gimbal.snapshot(rig.now).unreachable
 
@@ -271,7 +277,7 @@ def test_silent_gimbal_is_forgotten_unless_it_was_commanded(was_commanded: bool)
     rig.component.link_closed(rig.now, 'cable pulled')
     rig.run(60.1)
 
-    assert bool(rig.all_of(events.GimbalForgotten)) is not was_commanded
+    assert bool(rig.all_of(DeviceForgotten)) is not was_commanded
     assert bool(keys(rig)) is was_commanded
 
 

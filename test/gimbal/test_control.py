@@ -21,7 +21,11 @@ import math
 import re
 
 from illuminator_ros.gimbal.commands import Control
-from illuminator_ros.gimbal.events import AutomaticTakeFailed, ControlChanged, GimbalKey
+from illuminator_ros.gimbal.events import (
+    AutomaticTakeFailed,
+    ControlChanged,
+    GimbalKey,
+)
 from illuminator_ros.gimbal.gimbal import Gimbal
 from illuminator_ros.gimbal.messages import (
     DEVICE_ID_PARAM,
@@ -33,6 +37,7 @@ from illuminator_ros.gimbal.setpoint_stream import REPEATS
 from illuminator_ros.mavlink import messages as mav
 from illuminator_ros.mavlink.dialect import mavlink, short_names
 from illuminator_ros.payload.confirmed_command import Done
+from illuminator_ros.payload.device_events import DeviceDisconnected
 from illuminator_ros.payload.messages import GeoPoint
 from illuminator_ros.payload.mount_attitude import STILL, YawFrame
 from illuminator_ros.payload.rotation import Quaternion
@@ -103,6 +108,10 @@ def test_time_of_control_is_that_of_its_last_change() -> None:
      '1/195 has control and must release it first'),
     ({'results': {CONFIGURE: mavlink.MAV_RESULT_TEMPORARILY_REJECTED}},
      '; 1/195 has control: the log of the manager may have the reason'),
+    # ArduPilot before 4.5 has neither the command nor the status.
+    ({'results': {CONFIGURE: mavlink.MAV_RESULT_UNSUPPORTED}, 'reports': False},
+     'manager 1/1 refused "take control": MAV_RESULT_UNSUPPORTED (1 try, 20 ms); manager 1/1 has '
+     'sent no GIMBAL_MANAGER_STATUS'),
     ({'applies': False}, 'but GIMBAL_MANAGER_STATUS shows primary 1/195, secondary none'),
     ({'reports': False}, 'control taken not confirmed: MAV_RESULT_ACCEPTED, but no '
      'GIMBAL_MANAGER_STATUS came within 1.0'),
@@ -291,11 +300,13 @@ def test_gm_14_status_is_out_of_date_for_a_call_that_comes_before_the_poll(ask: 
     assert not rig.gimbal.in_control
 
 
-def test_control_is_known_of_a_manager_that_sends_its_status_on_request_only() -> None:
-    rig = Rig(FakeManager(primary=OURS, streams=False)).run(60.0)
+@pytest.mark.parametrize('beat', [10, 50], ids=['', 'and a heartbeat each 5 s'])
+def test_control_is_known_of_a_manager_that_sends_its_status_on_request_only(beat: int) -> None:
+    rig = Rig(FakeManager(primary=OURS, streams=False, beat=beat)).run(60.0)
 
     assert [event.ours for event in rig.all_of(ControlChanged)] == [True]
-    assert status_requests(rig) <= 21
+    assert rig.all_of(DeviceDisconnected) == []
+    assert status_requests(rig) <= 25
     rig.managers[0].primary = OTHER
     rig.run(3.2)
     assert rig.all_of(ControlChanged)[-1].was_lost

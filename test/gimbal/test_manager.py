@@ -25,8 +25,12 @@ from hypothesis import assume, example, given
 from hypothesis import strategies as st
 from illuminator_ros.gimbal import managed_device, setpoint_mixer
 from illuminator_ros.gimbal.axes import Range
-from illuminator_ros.gimbal.manager import IDENTITY_TIME
-from illuminator_ros.gimbal.manager_control import ControlSettings, Role, RoleHolderChanged
+from illuminator_ros.gimbal.manager_control import (
+    ControlSettings,
+    IDENTITY_TIME,
+    Role,
+    RoleHolderChanged,
+)
 from illuminator_ros.gimbal.manager_events import (
     AddressShared,
     ReferenceLost,

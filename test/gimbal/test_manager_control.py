@@ -24,7 +24,7 @@ from illuminator_ros.gimbal.manager_control import (
     Role,
     RoleHolderChanged,
 )
-from illuminator_ros.mavlink.messages import Address
+from illuminator_ros.mavlink.messages import Address, heartbeat
 from illuminator_ros.payload.arbitration import Cause, Policy
 import pytest
 from support.tables import table, transitions
@@ -93,8 +93,8 @@ def test_control_ends_after_the_lease_without_a_heartbeat_of_its_player(
         policy: Policy, role: Role) -> None:
     one = control(policy)
     one.configure(PLAYER, (*PLAYER, -1, -1) if role is Role.PRIMARY else (-1, -1, *PLAYER), 0.0)
-    one.heard(PLAYER, 1.0)
-    one.heard(LOWER, 3.9)
+    one.heard(PLAYER, heartbeat(2), 1.0)
+    one.heard(LOWER, heartbeat(2), 3.9)
 
     assert one.next_deadline() == 1.0 + LEASE
     assert one.poll(3.9) == []

@@ -21,7 +21,7 @@ import math
 from typing import Any
 
 from illuminator_ros.gimbal.axes import Range
-from illuminator_ros.gimbal.events import AttitudeReceived, GimbalConnected, GimbalLost
+from illuminator_ros.gimbal.events import AttitudeReceived
 from illuminator_ros.gimbal.gimbal import Gimbal, GimbalSettings
 from illuminator_ros.gimbal.manager import GimbalManager, ManagerSettings
 from illuminator_ros.gimbal.manager_control import Role
@@ -33,6 +33,7 @@ from illuminator_ros.mavlink.component import Component
 from illuminator_ros.mavlink.dialect import mavlink
 from illuminator_ros.mavlink.messages import CommandLong
 from illuminator_ros.payload.confirmed_command import Result
+from illuminator_ros.payload.device_events import DeviceConnected, DeviceDisconnected
 from illuminator_ros.payload.messages import GeoPoint, GimbalDeviceAttitudeStatus
 from illuminator_ros.payload.mount_attitude import YawFrame
 from illuminator_ros.payload.rotation import Quaternion
@@ -121,7 +122,7 @@ def test_ros_keeps_control_without_heartbeats_on_the_link_and_others_are_denied(
 
 def test_ros_gets_the_attitude_of_the_device_and_a_region_of_interest() -> None:
     rig = Rig()
-    assert len(of(GimbalConnected, rig.told)) == 1
+    assert len(of(DeviceConnected, rig.told)) == 1
     assert of(AttitudeReceived, rig.told)
     rig.ask(rig.gimbal.take_control)
     rig.give(AUTOPILOT, position(47.0, 8.0, 500.0))
@@ -156,7 +157,7 @@ def test_the_client_loses_the_gimbal_with_the_line_of_its_device() -> None:
 
     rig.component.components_lost([DEVICE], rig.now, 'cut')
 
-    assert [one.reason for one in of(GimbalLost, rig.told)] == ['cut']
+    assert [one.reason for one in of(DeviceDisconnected, rig.told)] == ['cut']
 
 
 def test_the_client_ends_its_requests_when_the_link_is_lost() -> None:

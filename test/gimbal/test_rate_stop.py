@@ -22,8 +22,9 @@ import math
 from illuminator_ros.gimbal.manager_events import RateStopped
 from illuminator_ros.gimbal.manager_state import ManagerState
 from illuminator_ros.gimbal.messages import GimbalDeviceSetAttitude, GimbalManagerStatus, rates_of
-from illuminator_ros.gimbal.rate_stop import ATTITUDE_SPACING, STOP_INTERVAL, STOP_LIMIT
+from illuminator_ros.gimbal.rate_stop import ATTITUDE_SPACING
 from illuminator_ros.mavlink.messages import Address
+from illuminator_ros.mavlink.retries import ZERO_RATE
 from illuminator_ros.payload.mount_attitude import STILL
 from illuminator_ros.payload.rotation import Quaternion
 import pytest
@@ -31,6 +32,9 @@ from support.gimbal_manager import DEVICE, ManagerRig, NAN, of, PILOT, pitch_yaw
 
 RATE = 0.2
 OTHER = Address(1, 1)
+
+# s for which the zero is repeated.
+LIMIT = (ZERO_RATE.tries or 0) * ZERO_RATE.first
 
 
 class Turning(ManagerRig):
@@ -121,14 +125,14 @@ def test_a_device_that_goes_on_turning_is_reported_once_the_time_is_over(
     rig = Turning(lost_zeros=math.inf)
 
     interrupt(rig)
-    rig.pass_time(STOP_LIMIT - 0.1)
+    rig.pass_time(LIMIT - 0.1)
     assert rig.manager.is_stopping
     assert rig.results == []
     rig.pass_time(0.2)
 
     assert rig.results == [False]
     sent = len(rig.zeros)
-    assert sent >= STOP_LIMIT / STOP_INTERVAL - 1
+    assert sent >= (ZERO_RATE.tries or 0) - 1
     rig.pass_time(0.5)
     assert len(rig.zeros) == sent
 

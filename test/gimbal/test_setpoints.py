@@ -331,6 +331,22 @@ def test_zero_that_is_lost_is_sent_again_when_the_device_is_heard_again() -> Non
     assert manager.received[-1].angular_velocity_z == 0.0
 
 
+def test_a_rate_ends_with_a_zero_when_the_manager_is_lost_which_may_hear_it() -> None:
+    rig = in_control()
+    manager = rig.managers[0]
+    rig.managers = []
+    while rig.gimbal.in_control:
+        rig.gimbal.set_rates((0.0, 0.0, 0.2), rig.now)
+        rig.run(0.1)
+    assert [one.angular_velocity_z for _, one in setpoints(rig)[-2:]] == [approx(-0.2), 0.0]
+
+    # It may not have heard it, either.
+    rig.managers = [manager]
+    rig.run(4.0)
+    assert rig.gimbal.in_control
+    assert [one.angular_velocity_z for one in manager.received] == [0.0]
+
+
 @pytest.mark.parametrize('start', [
     turn, lambda rig: rig.gimbal.set_roi(PLACE, rig.now, lambda *_: None)],
     ids=['rate', 'place'])

@@ -20,11 +20,11 @@ from collections.abc import Callable
 import random
 from typing import Any
 
-from illuminator_ros.gimbal.events import GimbalHeld
 from illuminator_ros.gimbal.messages import DEVICE_ID_PARAM, GimbalManagerSetAttitude
 from illuminator_ros.mavlink.messages import CommandInt, CommandLong
 from illuminator_ros.payload.arbitration import Cause, HolderChanged
 from illuminator_ros.payload.command_sources import SourceSettings
+from illuminator_ros.payload.device_events import DeviceHeld
 from illuminator_ros.payload.mount_attitude import from_mavlink, YawFrame
 import pytest
 from support.gimbals import FakeManager, in_control, OURS, PLACE, Rig
@@ -75,7 +75,7 @@ def test_the_next_source_has_the_gimbal_afterwards_and_must_send_a_setpoint(
     rig.run(0.5)
 
     assert holder(rig) == 'autonomy'
-    assert rig.all_of(GimbalHeld)[-1].change == HolderChanged('safety', 'autonomy', cause)
+    assert rig.all_of(DeviceHeld)[-1].change == HolderChanged('safety', 'autonomy', cause)
     assert asked(rig) == {'safety'}
     assert point(rig, 'autonomy') == ''
     assert asked(rig.run(0.1)) == {'safety', 'autonomy'}
@@ -166,7 +166,7 @@ def test_without_sources_all_are_alike() -> None:
     assert rig.gimbal.refusal('autonomy') == ''
     assert rig.gimbal.release('autonomy', rig.now) == ''
     assert holder(rig) is None
-    assert rig.all_of(GimbalHeld) == []
+    assert rig.all_of(DeviceHeld) == []
 
 
 @pytest.mark.parametrize('seed', range(20))

@@ -15,6 +15,7 @@
 """Commands without a request: off after silence, and lights for which brightness is the switch."""
 
 from collections.abc import Callable
+from typing import Any
 
 from illuminator_ros.illuminator.events import (
     AutomaticSwitch,
@@ -25,6 +26,7 @@ from illuminator_ros.illuminator.events import (
 from illuminator_ros.illuminator.light import Settings
 from illuminator_ros.illuminator.model import SafetyLimits
 from illuminator_ros.mavlink.dialect import mavlink
+from illuminator_ros.payload.command_sources import SourceSettings
 import pytest
 from support.back_to_back import Pair
 from support.fake_light import FakeLight
@@ -134,16 +136,70 @@ def test_a_light_that_is_lost_before_or_during_its_off_goes_off_when_it_is_heard
     assert light.fields['enable'] == 0
 
 
-def test_a_light_that_overheats_and_cools_down_goes_off_after_silence() -> None:
+HOT: dict[str, Any] = {'enable': 0, 'error_status': 2}
+COOL: dict[str, Any] = {'enable': 0, 'error_status': 0}
+LIT: dict[str, Any] = {'enable': 1, 'error_status': 0}
+
+
+@pytest.mark.parametrize('cooling', [(), (COOL,)], ids=['', 'cool before it lights up'])
+def test_a_light_that_overheats_and_cools_down_goes_off_after_silence(
+    cooling: tuple[dict[str, Any], ...],
+) -> None:
     light = FakeLight()
     pair = silenced(light)
     assert pair.enable(True).success
     pair.run(SILENCE - 2.0)
-    for fields in ({'enable': 0, 'error_status': 2}, {'enable': 1, 'error_status': 0}):
+    for fields in (HOT, *cooling, LIT):
         light.fields |= fields
         pair.run(1.1)
     pair.run(1.0)
 
+    assert light.fields['enable'] == 0
+
+
+def _is_silent(pair: Pair) -> None:
+    pair.run(SILENCE)
+
+
+def _release(pair: Pair) -> None:
+    pair.light.release('default', pair.now)
+
+
+def _end(pair: Pair) -> None:
+    pair.controller.close(pair.now)
+    pair.controller.client.switch_off_finally(pair.now, lambda light, result, now: None)
+
+
+@pytest.mark.parametrize('cause', [_is_silent, _release, _end])
+@pytest.mark.parametrize('is_accepted', [True, False])
+@pytest.mark.parametrize('on_while_hot', [False, True])
+def test_an_off_while_heat_keeps_a_light_off_is_repeated_until_it_is_accepted(
+    cause: Callable[[Pair], None], is_accepted: bool, on_while_hot: bool,
+) -> None:
+    light = FakeLight()
+    pair = Pair(light, settings=Settings(
+        off_after_silence=SILENCE if cause is _is_silent else 0.0, off_on_release=True,
+        sources=SourceSettings(('default',), 60.0))).settle()
+    if on_while_hot:
+        light.fields |= HOT
+        light.applies = False
+    pair.ask_enable(True, is_stream=True)
+    pair.run(2.0)
+    light.fields |= HOT
+    pair.run(1.1)
+    if not is_accepted:
+        light.results[ON_OFF] = mavlink.MAV_RESULT_TEMPORARILY_REJECTED
+    cause(pair)
+    pair.turn()
+    pair.run(5.0)
+    on, *offs = [command.param1 for command in pair.commands(ON_OFF)]
+    assert (on, set(offs), len(offs) == 1) == (1.0, {0.0}, is_accepted)
+
+    light.applies = True
+    light.results.clear()
+    if not is_accepted:
+        light.fields |= LIT
+    pair.run(4.0)
     assert light.fields['enable'] == 0
 
 

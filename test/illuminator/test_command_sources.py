@@ -20,12 +20,13 @@ from collections.abc import Callable
 import random
 
 from illuminator_ros.illuminator.client import enable_all
-from illuminator_ros.illuminator.events import AutomaticSwitch, DesiredStateFailed, LightHeld
+from illuminator_ros.illuminator.events import AutomaticSwitch, DesiredStateFailed
 from illuminator_ros.illuminator.light import Settings
 from illuminator_ros.illuminator.model import SafetyLimits
 from illuminator_ros.mavlink.dialect import mavlink
 from illuminator_ros.payload.arbitration import Cause
 from illuminator_ros.payload.command_sources import SourceSettings
+from illuminator_ros.payload.device_events import DeviceHeld
 import pytest
 from support.back_to_back import Pair
 from support.fake_light import FakeLight
@@ -210,7 +211,7 @@ def test_the_state_that_the_next_source_requested_is_sent_once_when_the_hold_of_
     assert shared.holder == 'autonomy'
     assert (shared.sent(ON_OFF, before), shared.sent(CONFIGURE, before)) == ([1.0], [20.0])
     [held] = [one.change for one in shared.pair.recorder.others
-              if isinstance(one, LightHeld)][-1:]
+              if isinstance(one, DeviceHeld)][-1:]
     assert (held.before, held.after, held.cause) == ('safety', 'autonomy', cause)
 
 

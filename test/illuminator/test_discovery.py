@@ -22,6 +22,7 @@ from illuminator_ros.illuminator import events
 from illuminator_ros.illuminator.light import Settings
 from illuminator_ros.mavlink import messages as mav
 from illuminator_ros.mavlink.dialect import mavlink
+from illuminator_ros.payload.device_events import DeviceConnected, DeviceForgotten, DeviceFound
 from illuminator_ros.payload.discovery import CANDIDATE_TIME, MAX_CANDIDATES, MAX_DEVICES
 import pytest
 from support.back_to_back import BRIDGE, Pair
@@ -64,7 +65,7 @@ def test_a_light_is_found_by_its_messages_at_any_address(
         client.receive(source, message, 0.0)
     assert list(client.lights) == [source]
     assert client.lights[source].connected
-    assert client.heard[:2] == [events.LightFound(source), events.LightConnected(source)]
+    assert client.heard[:2] == [DeviceFound(source), DeviceConnected(source)]
 
 
 @pytest.mark.parametrize('message', [
@@ -86,6 +87,17 @@ def test_forged_heartbeats_do_not_keep_a_real_light_out() -> None:
     pair.run(4.0)
     assert list(pair.controller.lights) == [LIGHT]
     assert pair.enable(True).success
+
+
+def test_forged_heartbeats_get_25_commands_a_second_at_most_and_hide_no_light() -> None:
+    pair = Pair(FakeLight(stream=0.0))
+    for source in FORGED[:320]:
+        pair.controller.receive(source, ILLUMINATOR, pair.now)
+        pair.run(1 / 32)
+    pair.run(1.0)
+    commands = pair.commands(mavlink.MAV_CMD_REQUEST_MESSAGE)
+    assert len(commands) <= 25 * 11
+    assert list(pair.controller.lights) == [LIGHT]
 
 
 def test_candidates_are_bounded_cost_few_commands_and_give_way_to_a_status(client: Heard) -> None:
@@ -133,8 +145,8 @@ def test_silent_lights_that_were_never_commanded_give_their_places_to_others(
     client.run(70.0)
     client.receive(LIGHT, status_message(), 70.0)
     assert list(client.lights) == [FORGED[0], LIGHT]
-    forgotten = [event.address for event in client.heard
-                 if isinstance(event, events.LightForgotten)]
+    forgotten = [event.key for event in client.heard
+                 if isinstance(event, DeviceForgotten)]
     assert sorted(forgotten) == FORGED[1:MAX_DEVICES]
     assert [light.address for light in client.lights_by_address] == [LIGHT, FORGED[0]]
 

@@ -24,7 +24,6 @@ from illuminator_ros.illuminator.events import (
     AutomaticSwitch,
     DesiredStateFailed,
     LightEvent,
-    LightHeld,
     LightSwitched,
     SetpointFailed,
 )
@@ -38,6 +37,7 @@ from illuminator_ros.mavlink.dialect import mavlink
 from illuminator_ros.mavlink.messages import Address, CommandAck
 from illuminator_ros.payload.command_sources import SourceSettings
 from illuminator_ros.payload.confirmed_command import Result
+from illuminator_ros.payload.device_events import DeviceHeld
 import pytest
 from support.back_to_back import BRIDGE, Pair
 from support.fake_light import FakeLight
@@ -49,7 +49,7 @@ ENDING = 'the bridge is ending'
 # s that the bridge waits for the lights.
 LIMIT = 0.6
 # Events of changes that the bridge makes, or fails to make.
-ACTIONS = (AutomaticSwitch, DesiredStateFailed, LightHeld, LightSwitched, SetpointFailed)
+ACTIONS = (AutomaticSwitch, DesiredStateFailed, DeviceHeld, LightSwitched, SetpointFailed)
 SOURCES = ('safety', 'default', 'autonomy')
 LATE = Address(1, 250)
 
@@ -267,6 +267,22 @@ def test_a_light_that_is_found_or_heard_again_during_the_end_is_switched_off() -
 
     assert not (found.device.enabled or heard.device.enabled)
     assert all(ending.reports[one.address].success for one in (found, heard))
+
+
+def test_a_light_that_hears_but_is_not_heard_is_switched_off_and_reported_as_lost(
+    ending: Ending, light: FakeLight,
+) -> None:
+    wire = ending.pair.far.wire
+    wire.faults = replace(wire.faults, drop=1.0)
+    ending.pair.run(4.0)
+    ending.begin()
+    ending.pair.run(LIMIT)
+
+    assert light.fields['enable'] == 0
+    # The bridge waits: a serial line takes 8 ms for an OFF, and what waits at its end is dropped.
+    report = ending.reports[light.source]
+    assert (report.success, report.permanent, report.message.partition(':')[0]) == (
+        False, False, 'light 1/243 is lost')
 
 
 @pytest.mark.parametrize(('enabled', 'ask', 'may_be_left_on'), [

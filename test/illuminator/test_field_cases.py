@@ -22,7 +22,7 @@ from typing import Any
 from illuminator_ros.illuminator.events import ChangeCause, LightSwitched, StatesChanging
 from illuminator_ros.illuminator.messages import STATUS_ID
 from illuminator_ros.illuminator.status_order import CALM_TIME
-from illuminator_ros.mavlink.dialect import mavlink
+from illuminator_ros.mavlink.dialect import mavlink, replaced
 import pytest
 from support.back_to_back import Pair
 from support.fake_light import FakeLight
@@ -132,6 +132,28 @@ def test_a_light_that_never_acknowledges_is_switched_with_one_event_and_an_answe
             ' (4 tries, 1.75')
         pair.run(5.0)
     assert switches(pair) == [(True, 'a request'), (False, 'a request')][:1 + then_off]
+
+
+@pytest.mark.parametrize('first', [
+    mavlink.MAV_RESULT_UNSUPPORTED, mavlink.MAV_RESULT_DENIED, mavlink.MAV_RESULT_IN_PROGRESS,
+    mavlink.MAV_RESULT_ACCEPTED])
+def test_a_light_of_which_two_programs_acknowledge_each_command_is_switched_with_one_event(
+    first: int,
+) -> None:
+    light = Acknowledging()
+    send = light.send
+
+    def twice(message: Any) -> None:
+        if message.get_type() == 'COMMAND_ACK':
+            send(replaced(message, result=first))
+        send(message)
+
+    light.send = twice  # type: ignore[method-assign]
+    pair = Pair(light).settle()
+    for on in (True, False):
+        assert pair.enable(on).success
+        pair.run(2.0)
+    assert switches(pair) == [(True, 'a request'), (False, 'a request')]
 
 
 def test_a_light_that_sends_a_status_each_10_s_and_none_on_request_is_told_when_it_is_due(

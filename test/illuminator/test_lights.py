@@ -20,11 +20,12 @@ import functools
 from typing import Any
 
 from illuminator_ros.illuminator.light import Settings
-from illuminator_ros.illuminator.light_queries import MAX_QUESTIONS, SETTLING_TIME
+from illuminator_ros.illuminator.light_queries import SETTLING_TIME
 from illuminator_ros.illuminator.messages import STATUS_ID
 from illuminator_ros.illuminator.simulated_properties import IlluminatorProperties
 from illuminator_ros.mavlink import messages as mav
 from illuminator_ros.mavlink.dialect import decode, encode, mavlink
+from illuminator_ros.mavlink.retries import MESSAGE
 from illuminator_ros.payload.identity import Identity, text
 import pytest
 from support.back_to_back import Pair, START
@@ -51,7 +52,7 @@ def test_a_light_is_lost_after_the_heartbeat_timeout_and_found_again(
     fake: FakeLight, timeout: float,
 ) -> None:
     pair = Pair(fake, settings=Settings(heartbeat_timeout=timeout)).settle()
-    light, heard_at = pair.light, pair.light.heard_at
+    light, heard_at = pair.light, pair.light.liveness.heard_at
     fake.silent = True
     pair.run_until(lambda: not light.connected, within=100.0)
     assert pair.now - heard_at == pytest.approx(timeout)
@@ -234,7 +235,7 @@ def test_the_identity_is_requested_once_and_again_after_a_loss(
     (Selective(mavlink.MAV_RESULT_DENIED), 1, 'refused: MAV_RESULT_DENIED'),
     (Selective(mavlink.MAV_RESULT_UNSUPPORTED), 1, 'refused: MAV_RESULT_UNSUPPORTED'),
     (Selective(None), 4, 'no acknowledgement'),
-    (FakeLight(), MAX_QUESTIONS, 'acknowledged, but not sent'),
+    (FakeLight(), MESSAGE.tries, 'acknowledged, but not sent'),
 ])
 def test_an_identity_that_does_not_come_is_requested_so_often_and_the_reason_named(
     light: FakeLight, count: int, failure: str,

@@ -26,10 +26,10 @@ from illuminator_ros.illuminator.messages import STATUS_ID
 from illuminator_ros.illuminator.simulated_properties import IlluminatorProperties
 from illuminator_ros.mavlink import messages as mav
 from illuminator_ros.mavlink.dialect import mavlink
+from illuminator_ros.mavlink.retries import UNCONFIRMED
 from illuminator_ros.payload.confirmed_command import (
     FENCE,
     PROGRESS_LIMIT,
-    REPEAT_INTERVAL,
     Result,
 )
 from illuminator_ros.payload.device_property import MAX_CALLERS
@@ -76,7 +76,10 @@ def change(fake: FakeLight, **attributes: Any) -> None:
     (True, {'fields': {'error_status': 4}}, True,
      'on, confirmed by ILLUMINATOR_STATUS: MAV_RESULT_ACCEPTED'),
     (False, {'fields': {'error_status': 2, 'enable': 1}}, True,
-     'off, confirmed by ILLUMINATOR_STATUS: MAV_RESULT_ACCEPTED'),
+     'off, accepted (ILLUMINATOR_STATUS shows off, over temperature shutdown): '
+     'MAV_RESULT_ACCEPTED'),
+    (False, {'fields': {'error_status': 2}, 'results': {ON_OFF: DENIED}}, False,
+     'refused: MAV_RESULT_DENIED'),
     (True, {'applies': False, 'fields': {'error_status': 2}}, False,
      'on not confirmed: MAV_RESULT_ACCEPTED, but ILLUMINATOR_STATUS shows off, over temperature '
      'shutdown'),
@@ -151,7 +154,7 @@ def test_requests_to_a_lost_light_fail_at_once_with_the_reason(
     fake.silent = True
     if is_closed:
         faked.close()
-    faked.run(10.0 - (faked.now - faked.light.heard_at))
+    faked.run(10.0 - (faked.now - faked.light.liveness.heard_at))
     sent = len(faked.commands())
     answers = [faked.ask_enable(True), faked.ask_configure(brightness=50), faked.ask_refresh()]
     faked.light.set_brightness(50.0, faked.now)
@@ -159,6 +162,10 @@ def test_requests_to_a_lost_light_fail_at_once_with_the_reason(
         (0.0, f'light 1/243 is lost: {reason}')}
     assert faked.recorder.failed_setpoints == [f'light 1/243 is lost: {reason}']
     assert len(faked.commands()) == sent
+    # It may hear an OFF though it is not heard.
+    answer = faked.ask_enable(False)
+    assert answer.result.message == f'light 1/243 is lost: {reason}'
+    assert [one.param1 for one in faked.commands()[sent:]] == [0.0] * (not is_closed)
 
 
 def test_after_a_stop_of_the_process_a_request_that_may_be_old_is_refused_but_not_an_off(
@@ -202,7 +209,7 @@ def test_an_off_that_replaces_an_on_is_sent_at_once_and_confirmed_after_the_fenc
     assert faked.wait_for(off).success
     assert FENCE <= off.seconds < FENCE + 0.01
     # The tries within the fence are repeated each 250 ms.
-    tries = round(FENCE / REPEAT_INTERVAL) + 1
+    tries = round(FENCE / UNCONFIRMED.first) + 1
     assert (timing(off.result.message)[0], len(faked.commands(ON_OFF))) == (tries, 1 + tries)
 
 

@@ -16,6 +16,7 @@
 
 from __future__ import annotations
 
+import cProfile
 from dataclasses import replace
 
 from hypothesis import assume, example, given, settings
@@ -260,6 +261,17 @@ def test_frame_comes_with_its_last_byte_whatever_its_signature_looks_like(
     for frame, mark in sent:
         whole = frame[:-6] + mark if frame[0] == 0xFD and frame[2] == FLAG_SIGNED else frame
         assert [bytes_of(found) for found in decoder.feed(whole)] == [whole]
+
+
+@pytest.mark.parametrize('noise', [b'\xfd', b'\xfd\x01', b'\xfd\xff\x02'])
+def test_noise_that_cannot_begin_a_frame_costs_no_calls(noise: bytes) -> None:
+    def calls(data: bytes) -> int:
+        profile = cProfile.Profile()
+        profile.runcall(Decoder().feed, data)
+        return sum(entry.callcount for entry in profile.getstats())
+
+    # The last bytes may be the beginning of a header.
+    assert calls(noise * 1000) == calls(noise * 100)
 
 
 def test_longest_frame_is_read_and_a_chain_of_false_beginnings_takes_no_more_memory() -> None:

@@ -22,8 +22,7 @@ from illuminator_ros.illuminator.simulated import SimulatedIlluminator
 from illuminator_ros.illuminator.simulated_properties import IlluminatorProperties
 from illuminator_ros.mavlink.messages import Address
 from illuminator_ros.payload.simulated import SimulatedComponents
-from payloads.winch import SIMULATED, SimulatedWinch, WINCH
-from payloads.winch_checks import REQUIREMENTS
+from payloads.winch import CHECKS, SIMULATED, SimulatedWinch, WINCH
 import pytest
 from support.checks_run import ChecksRun
 from support.virtual_link import START
@@ -44,7 +43,7 @@ def test_a_winch_is_checked_and_restored_by_its_own_requirements_and_those_of_ev
 
     assert done.session.components.found == DECK
     assert done.failed == failed
-    assert len(done.runner.results) == len(REQUIREMENTS)
+    assert len(done.runner.results) == len(CHECKS.requirements)
     assert done.runner.restored == 'the winch is as it was'
     assert winch.line_length == 0.0
 

@@ -13,7 +13,7 @@
 # limitations under the License.
 
 """
-A winch: a second payload, the worked example of doc/design.md.
+A winch: a second payload, the worked example of doc/design.md; its ROS half is winch_ros.py.
 
 It is found by its heartbeat, takes MAV_CMD_DO_WINCH, and reports WINCH_STATUS.
 https://mavlink.io/en/messages/common.html#WINCH_STATUS
@@ -24,96 +24,66 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import partial
-import math
 
-from illuminator_ros.mavlink import messages as mav
 from illuminator_ros.mavlink.command_sender import CommandSender
 from illuminator_ros.mavlink.component import Payload
 from illuminator_ros.mavlink.dialect import mavlink
-from illuminator_ros.mavlink.messages import AnyCommand
+from illuminator_ros.mavlink.messages import Address, AnyCommand, Heartbeat, Message
 from illuminator_ros.payload import simulated
+from illuminator_ros.payload.checks.component_requirements import with_common
+from illuminator_ros.payload.checks.requirement import PayloadChecks, requirement
+from illuminator_ros.payload.checks.session import Session, Transaction
+from illuminator_ros.payload.checks.specifications import MESSAGES
 from illuminator_ros.payload.confirmed_command import Done, Result, Target
 from illuminator_ros.payload.device_property import answer, Caller, Desired, Property
 from illuminator_ros.payload.discovery import Discovery
 from illuminator_ros.payload.faults import Behaviour
 from illuminator_ros.payload.listeners import Listeners
+from illuminator_ros.payload.liveness import Liveness
 from illuminator_ros.payload.payload_type import PayloadType
+from illuminator_ros.payload.plain_change import PlainChange
 
-WINCH = PayloadType('winch', ros='payloads.winch_ros:WINCH',
-                    simulated='payloads.winch:SIMULATED', checks='payloads.winch_checks:CHECKS',
-                    view='payloads.winch_view:VIEW')
-
+WINCH = PayloadType('winch', ros='payloads.winch_ros:WINCH', simulated='payloads.winch:SIMULATED',
+                    checks='payloads.winch:CHECKS', view='payloads.winch_ros:VIEW')
 WinchStatus = mavlink.MAVLink_winch_status_message
-# s without a message after which a winch is lost.
-TIMEOUT = 3.0
 
+
+# The client
 
 @dataclass(frozen=True)
 class WinchReport:
     """The released line of a winch, m."""
 
-    address: mav.Address
+    address: Address
     line_length: float
 
 
-@dataclass(frozen=True)
-class Release:
-    """
-    Releases line, m, or winds it in if negative.
-
-    :param line_length: the released line afterwards, m.
-    """
-
-    length: float
-    line_length: float
-    note: str = ''
-    position: None = None
-    command: int = mavlink.MAV_CMD_DO_WINCH
-    # A winch that gets it twice releases twice the length.
-    is_idempotent: bool = False
-    is_repeated: bool = False
-
-    @property
-    def params(self) -> tuple[float, ...]:
-        """See :class:`Change`."""
-        return 1, mavlink.WINCH_RELATIVE_LENGTH_CONTROL, self.length
-
-    @property
-    def goal(self) -> str:
-        """See :class:`Change`."""
-        return f'{self.line_length:g} m released'
-
-    def shown_by(self, status: WinchStatus) -> bool:
-        """See :class:`Change`."""
-        return abs(status.line_length - self.line_length) < 0.01
-
-    def evidence(self, status: WinchStatus) -> str:
-        """See :class:`Change`."""
-        return 'confirmed by WINCH_STATUS'
-
-    def actual(self, status: WinchStatus) -> str:
-        """See :class:`Change`."""
-        return f'{status.line_length:g} m'
+def release(length: float, line_length: float) -> PlainChange[WinchStatus]:
+    """Return the change by a length of line, m, to the released line afterwards, m."""
+    # A winch that gets the command twice releases twice the length.
+    return PlainChange(
+        mavlink.MAV_CMD_DO_WINCH, (1, mavlink.WINCH_RELATIVE_LENGTH_CONTROL, length),
+        f'{line_length:g} m released', status_name=WinchStatus.msgname, is_idempotent=False,
+        shown_by=lambda status: abs(status.line_length - line_length) < 0.01,
+        actual=lambda status: f'{status.line_length:g} m')
 
 
 class Winch:
     """One winch: a :class:`Device` of the discovery."""
 
-    def __init__(self, address: mav.Address, commands: CommandSender) -> None:
-        self.address = address
-        self.lost_at = math.inf
+    def __init__(self, address: Address, commands: CommandSender) -> None:
+        self.liveness = Liveness(timeout=3.0)
         self.was_commanded = False
-        self._heard_at = self._line_length = 0.0
+        self._line_length = 0.0
         self._length: Property[WinchStatus] = Property(
             Target(address, commands, 'winch', WinchStatus.id, WinchStatus.msgname))
 
-    def heard(self, now: float) -> None:
-        """Note that the winch is alive."""
-        self._heard_at, self.lost_at = now, math.inf
+    @property
+    def lost_at(self) -> float:
+        return self.liveness.lost_at
 
     def take_status(self, status: WinchStatus, now: float) -> None:
-        """Take a status."""
-        self.heard(now)
+        self.liveness.hear(now)
         self._line_length = status.line_length
         self._length.reported(status, now)
         self._answer(now)
@@ -127,9 +97,9 @@ class Winch:
         self.was_commanded = True
         if self._length.desired is not None:
             done(Result(False, 'a release is under way'), now)
-            return
-        self._length.want(
-            Desired(Release(length, self._line_length + length)), now, Caller(done, now))
+        else:
+            change = release(length, self._line_length + length)
+            self._length.want(Desired(change), now, Caller(done, now))
 
     def _answer(self, now: float) -> None:
         while self._length.outcomes:
@@ -137,16 +107,13 @@ class Winch:
             answer(outcome.callers, outcome.result, now)
 
     def poll(self, now: float) -> None:
-        """See :class:`Device`."""
-        if now >= self._heard_at + TIMEOUT:
-            self.lost_at = min(self.lost_at, now)
+        if now >= self.liveness.silent_at:
+            self.liveness.lose(now)
         self._length.poll(now)
         self._answer(now)
 
     def next_deadline(self) -> float:
-        """See :class:`Device`."""
-        lost = math.inf if self.lost_at < math.inf else self._heard_at + TIMEOUT
-        return min(lost, self._length.next_deadline())
+        return min(self.liveness.silent_at, self._length.next_deadline())
 
 
 class WinchClient(Payload):
@@ -157,76 +124,104 @@ class WinchClient(Payload):
     :ivar winches: the winches that were found, by address.
     """
 
-    messages = (mav.Heartbeat, WinchStatus)
+    messages = (Heartbeat, WinchStatus)
 
     def __init__(self, commands: CommandSender) -> None:
         self.events: Listeners[WinchReport] = Listeners()
-        self._discovery = Discovery(self._make, commands)
-        self.winches: Mapping[mav.Address, Winch] = self._discovery.devices
-        self._commands = commands
+        self._discovery = Discovery[Address, Winch]()
+        self.winches: Mapping[Address, Winch] = self._discovery.devices
+        self._hear = partial(self._discovery.hear, make=partial(Winch, commands=commands))
+
+    def receive(self, source: Address, message: Message, now: float) -> None:
+        if isinstance(message, WinchStatus):
+            if winch := self._hear(source, now, proved=True):
+                winch.take_status(message, now)
+                self.events.emit(WinchReport(source, message.line_length))
+        elif (isinstance(message, Heartbeat) and message.type == mavlink.MAV_TYPE_WINCH
+                and (winch := self._hear(source, now, proved=False))):
+            winch.liveness.hear(now)
 
     def poll(self, now: float) -> None:
-        """See :meth:`Payload.poll`."""
         self._discovery.poll(now)
 
     def next_deadline(self) -> float:
-        """See :meth:`Payload.next_deadline`."""
         return self._discovery.next_deadline()
 
-    def _make(self, address: mav.Address) -> Winch:
-        return Winch(address, self._commands)
 
-    def receive(self, source: mav.Address, message: mav.Message, now: float) -> None:
-        """See :meth:`Payload.receive`."""
-        if isinstance(message, WinchStatus):
-            if winch := self._discovery.hear(source, now, proved=True):
-                winch.take_status(message, now)
-                self.events.emit(WinchReport(source, message.line_length))
-        elif (isinstance(message, mav.Heartbeat) and message.type == mavlink.MAV_TYPE_WINCH
-                and (winch := self._discovery.hear(source, now, proved=False))):
-            winch.heard(now)
-
+# The simulated device
 
 class SimulatedWinch(simulated.SimulatedDevice):
     """A winch that releases and winds in at once."""
 
     changes = frozenset({mavlink.MAV_CMD_DO_WINCH})
     sends = (WinchStatus,)
-
-    def __init__(self, properties: simulated.Properties) -> None:
-        super().__init__(properties)
-        self.line_length = 0.0
+    line_length = 0.0
 
     def streams(self) -> Mapping[int, float]:
-        """See :meth:`SimulatedDevice.streams`."""
         return {WinchStatus.id: 1.0}
 
-    def message(self, message_id: int, now: float) -> mav.Message | None:
-        """See :meth:`SimulatedDevice.message`."""
+    def message(self, message_id: int, now: float) -> Message | None:
         return (WinchStatus(int(now * 1e6), self.line_length, 0, 0, 12, 0, 25, 1)
                 if message_id == WinchStatus.id else None)
 
-    def execute(
-        self, source: mav.Address, command: AnyCommand, now: float,
-    ) -> simulated.Reply:
-        """See :meth:`SimulatedDevice.execute`."""
+    def execute(self, source: Address, command: AnyCommand, now: float) -> simulated.Reply:
         if command.command != mavlink.MAV_CMD_DO_WINCH:
             return None
         length = self.line_length + command.param3
         if command.param2 != mavlink.WINCH_RELATIVE_LENGTH_CONTROL or not length >= 0:
             return simulated.CommandReply(mavlink.MAV_RESULT_DENIED)
         return simulated.CommandReply(mavlink.MAV_RESULT_ACCEPTED,
-                                      partial(self.set_length, length))
-
-    def set_length(self, length: float) -> None:
-        """Release or wind in until this length of line is released, m."""
-        self.line_length = length
+                                      partial(setattr, self, 'line_length', length))
 
     def snapshot(self, now: float) -> simulated.Snapshot:
-        """See :meth:`SimulatedDevice.snapshot`."""
         return simulated.Snapshot(f'{self.line_length:.1f} m released', (self.line_length,))
 
 
 SIMULATED = simulated.SimulatedType(
     'winch', 'winches', SimulatedWinch, simulated.Properties(
-        mav.Address(1, 169), Behaviour(heartbeat_type=mavlink.MAV_TYPE_WINCH)))
+        Address(1, 169), Behaviour(heartbeat_type=mavlink.MAV_TYPE_WINCH)))
+
+
+# The checks
+
+class WinchSession(Session):
+    """Releases line, and winds it in at the end."""
+
+    messages = (*Session.messages, WinchStatus)
+    mav_type = mavlink.MAV_TYPE_WINCH
+    before: float | None = None
+
+    async def length(self) -> float | None:
+        """Return the released length, m; None if the winch does not report it."""
+        status = await self.request(WinchStatus)
+        return status.line_length if status else None
+
+    async def release(self, length: float) -> Transaction:
+        return await self.command(
+            mavlink.MAV_CMD_DO_WINCH, 1, mavlink.WINCH_RELATIVE_LENGTH_CONTROL, length)
+
+    async def save(self) -> bool:
+        self.before = await self.length()
+        return self.before is not None
+
+    @property
+    def saved(self) -> str:
+        return f'{self.before} m'
+
+    async def restore(self) -> list[str]:
+        await self.release((self.before or 0.0) - (await self.length() or 0.0))
+        return [] if await self.length() == self.before else ['line_length']
+
+
+@requirement(
+    'release', 'releases line when commanded', MESSAGES, 'MAV_CMD_DO_WINCH', changes=True)
+async def releases(winch: WinchSession) -> None:
+    before = await winch.length()
+    one = await winch.release(2.0)
+    after = await winch.length()
+    if before is None or after != before + 2.0:
+        raise one.failure(f'{before} m, then {after} m')
+
+
+CHECKS = PayloadChecks('winch', 'winch', WinchSession, 'HEARTBEAT with MAV_TYPE_WINCH',
+                       with_common((releases,), WinchStatus))

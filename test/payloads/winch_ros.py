@@ -12,14 +12,17 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""The ROS half of a winch: it publishes ``~/line_length`` and takes ``~/cmd/release``."""
+"""The ROS half of a winch: ``~/line_length``, ``~/cmd/release``, and its view in the monitor."""
 
 from __future__ import annotations
 
+import math
+
 from illuminator_ros.payload.confirmed_command import Result
+from illuminator_ros.ros.monitor_view import Device, Key, measured, Request, Topic, View
 from illuminator_ros.ros.node import CommandTopic, Endpoint, NodeInterface
 from illuminator_ros.ros.payload import Host, RosPayload, ServedPayload
-from payloads.winch import WinchClient, WinchReport
+from payloads.winch import WinchClient
 from std_msgs.msg import Float32
 
 LINE_LENGTH = Endpoint('line_length', Float32, 'length of the line that is out, m')
@@ -30,24 +33,41 @@ class WinchNode(ServedPayload):
     """Serves all winches of a link with one node; at the end the winch stays as it is."""
 
     def __init__(self, client: WinchClient, host: Host) -> None:
-        self._client = client
-        self._log = host.log
-        self._interface = NodeInterface(
+        def release(length: float, now: float) -> None:
+            for winch in client.winches.values():
+                winch.release(length, now, released)
+
+        def released(result: Result, now: float) -> None:
+            host.log.info(f'~/cmd/release: {result.message}', 'release')
+
+        interface = NodeInterface(
             host.node, host.link, host.log, publications=[LINE_LENGTH],
-            commands=[CommandTopic(RELEASE, self._release)])
-        client.events.subscribe(self._publish)
-
-    def _publish(self, report: WinchReport) -> None:
-        self._interface.publish('line_length', report.line_length)
-
-    def _release(self, length: float, now: float) -> None:
-        for winch in self._client.winches.values():
-            winch.release(length, now, self._released)
-
-    def _released(self, result: Result, now: float) -> None:
-        self._log.info(f'~/cmd/release: {result.message}', 'release')
+            commands=[CommandTopic(RELEASE, release)])
+        client.events.subscribe(
+            lambda report: interface.publish('line_length', report.line_length))
 
 
 WINCH = RosPayload(
     'winch', lambda commands, values: WinchClient(commands), WinchNode, summary='a winch',
     link_defaults={'component_id': 195})
+
+
+def length(device: Device) -> str:
+    """Return the released line."""
+    return measured(device.values.get('line_length'), 'm')
+
+
+def release_key(device: Device, typed: str) -> Request | str:
+    """Release line, m, or wind it in if negative."""
+    try:
+        metres = float(typed)
+    except ValueError:
+        metres = math.nan
+    return f'{typed!r} is not a length' if not math.isfinite(metres) else Request(
+        f'release {metres:g} m', 'cmd/release', Float32, Float32(data=metres))
+
+
+VIEW = View(
+    'winch', {'line_length': Topic(Float32)}, ('line_length',), lambda device: [length(device)],
+    lambda device: [('line', [f'{length(device)} released'])],
+    (Key(('p',), 'release line', release_key, 'length (m, negative winds in)'),))

@@ -21,14 +21,10 @@ from typing import Any
 from illuminator_ros.mavlink.command_sender import CommandSender
 from illuminator_ros.mavlink.component import Component
 from illuminator_ros.mavlink.messages import Address, Heartbeat, heartbeat, Message
+from illuminator_ros.payload.device_events import DeviceConnected, DeviceDisconnected
 from illuminator_ros.payload.rotation import Quaternion
 from illuminator_ros.rededge import messages as rededge
-from illuminator_ros.rededge.client import (
-    CameraConnected,
-    CameraLost,
-    ImageTaken,
-    RedEdgeClient,
-)
+from illuminator_ros.rededge.client import ImageTaken, RedEdgeClient
 from illuminator_ros.rededge.input_states import Input, Settings, Stamp
 import pytest
 
@@ -118,40 +114,54 @@ def test_the_camera_is_known_by_its_component_id_alone_re_6_re_7() -> None:
     assert rig.events == []
 
     rig.hear(BEAT)
-    assert rig.events == [CameraConnected(NEW)]
+    assert rig.events == [DeviceConnected(NEW)]
 
 
 def test_a_camera_that_adopts_our_system_id_is_the_same_camera_re_8() -> None:
     rig = Rig()
     rig.hear(BEAT, source=ADOPTED)
     rig.run(3.4)
-    assert rig.events == [CameraConnected(NEW)]
+    assert rig.events == [DeviceConnected(NEW)]
     assert (rig.state.address, rig.state.conflict) == (ADOPTED, False)
     rig.capture()
     control = rig.all(rededge.DigicamControl)[-1]
     assert (control.target_system, control.target_component) == ADOPTED
 
 
+def test_a_camera_with_our_system_id_is_kept_beside_those_of_other_vehicles() -> None:
+    rig = Rig()
+    for system in range(2, 50):
+        rig.hear(BEAT, source=ADOPTED)
+        rig.run(0.1)
+        rig.hear(BEAT, source=Address(system, 100))
+    assert (rig.state.address, rig.state.conflict) == (ADOPTED, True)
+    # A camera that has restarted has another system id until it hears us.
+    rig.run(3.6)
+    rig.hear(BEAT)
+    assert rig.state.address == NEW
+
+
 def test_a_camera_is_lost_after_3_5_s_and_found_again_re_9() -> None:
     rig = Rig()
     rig.run(3.4)
-    assert rig.events == [CameraConnected(NEW)]
+    assert rig.events == [DeviceConnected(NEW)]
     rig.run(0.2)
-    assert rig.events[1:] == [CameraLost(NEW, 'no heartbeat for 3.50 s')]
+    assert rig.events[1:] == [DeviceDisconnected(NEW, 'no heartbeat for 3.50 s')]
     rig.run(6.4)
     rig.capture()
     assert rig.results == [(False, f'camera {NEW} is lost: no heartbeat for 10.00 s')]
     assert rig.state.loss == rig.results[0][1]
     rig.hear(BEAT)
-    assert rig.events[2:] == [CameraConnected(NEW)]
+    assert rig.events[2:] == [DeviceConnected(NEW)]
 
     rig.component.components_lost([ADOPTED], rig.now, 'unplugged')
     assert rig.events[3:] == []
     rig.component.components_lost([NEW], rig.now, 'unplugged')
-    assert rig.events[3:] == [CameraLost(NEW, 'link lost: unplugged')]
+    assert rig.events[3:] == [DeviceDisconnected(NEW, 'link lost: unplugged')]
     rig.hear(BEAT)
     rig.component.link_closed(rig.now, 'unplugged')
-    assert rig.events[4:] == [CameraConnected(NEW), CameraLost(NEW, 'link lost: unplugged')]
+    assert rig.events[4:] == [
+        DeviceConnected(NEW), DeviceDisconnected(NEW, 'link lost: unplugged')]
 
 
 def test_two_components_with_the_camera_s_id_are_noticed() -> None:
@@ -323,6 +333,17 @@ def test_an_image_that_was_not_requested_here_is_reported() -> None:
     rig.hear(status(3), feedback(3))
     assert rig.events[1:] == [ImageTaken(feedback(3))]
     assert (rig.state.images, rig.state.image_index) == (1, 3)
+
+
+def test_a_report_that_comes_again_over_a_second_path_is_one_image() -> None:
+    rig = Rig()
+    for index in (1, 2):
+        rig.capture()
+        rig.hear(*image(index), *image(index))
+    rig.hear(*image(1))
+    assert [one.feedback for one in rig.events[1:]] == [feedback(1), feedback(2)]
+    assert rig.state.images == 2
+    assert rig.results == [(True, taken(1)), (True, taken(2))]
 
 
 @pytest.mark.parametrize('triggered', [[], [status(1)], [status(1), status(1)]],

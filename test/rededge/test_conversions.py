@@ -183,7 +183,7 @@ def test_a_position_that_cannot_be_true_is_not_sent_re_14_re_16_re_18(
 def test_global_position_int_has_ned_velocities_re_18() -> None:
     assert conversions.global_position_int(HERE, (3.0, -4.0, 1.5), 48.25, 7) == GlobalPositionInt(
         7, 473977421, 85455939, 487250, 0, -400, 300, -150, 65535)
-    with pytest.raises(ValueError, match='~/velocity, north: nan m/s'):
+    with pytest.raises(ValueError, match='velocity, north: nan m/s'):
         conversions.global_position_int(HERE, (0.0, math.nan, 0.0), 0.0, 7)
 
 

@@ -18,6 +18,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
+import functools
 import math
 from typing import Any
 
@@ -26,13 +27,14 @@ from illuminator_ros.mavlink.messages import Address, Message
 from illuminator_ros.payload.messages import Attitude, GlobalPositionInt, SystemTime
 from illuminator_ros.payload.rotation import Quaternion, Vector
 from illuminator_ros.rededge.conversions import mount_angles, MountFrame, Position
-from illuminator_ros.rededge.feeder import Feeder
+from illuminator_ros.rededge.feeder import ENU, Feeder
 from illuminator_ros.rededge.input_states import (
     Input,
     InputState,
     PositionSource,
     Settings,
     Stamp,
+    VELOCITIES,
 )
 from illuminator_ros.rededge.messages import GpsRawInt, GpsStatus, MountStatus
 import pytest
@@ -71,9 +73,10 @@ class Rig:
         assert isinstance(sent, GpsRawInt)
         return sent
 
-    def velocity(self, *velocity: float, age: float = 0.0) -> None:
+    def velocity(self, *velocity: float, age: float = 0.0, name: Input = Input.VELOCITY,
+                 body: Quaternion = ENU) -> None:
         self.feeder.take_velocity(
-            (velocity[0], velocity[1], velocity[2]), self.stamp(age), self.now)
+            name, (velocity[0], velocity[1], velocity[2]), self.stamp(age), self.now, body)
 
     def imu(self, orientation: Quaternion | None = LEVEL, age: float = 0.0,
             name: Input = Input.IMU) -> list[Message]:
@@ -134,6 +137,26 @@ def test_speed_and_satellites_are_sent_while_they_are_fresh_re_15_re_30() -> Non
         assert (sent.vel, sent.satellites_visible) == (speed, satellites)
 
 
+def test_a_velocity_in_the_axes_of_the_body_is_sent_in_those_of_the_earth_re_15() -> None:
+    rig = Rig()
+    # Ahead, while the nose points to the north, tilted.
+    rig.velocity(5.0, 0.0, 0.0, name=Input.ODOMETRY, body=Quaternion.from_euler(
+        0.3, 0.0, math.pi / 2))
+    sent = rig.fix_sent()
+    assert (sent.vel, sent.cog) == (500, 0)
+
+
+def test_the_first_fresh_one_of_several_velocities_is_sent_re_15_re_30() -> None:
+    rig = Rig()
+    for east, name in enumerate(reversed(VELOCITIES), 1):
+        rig.velocity(east, 0.0, 0.0, name=name)
+        assert rig.fix_sent().vel == 100 * east
+        rig.run(0.3)
+    for speed in (300, 65535):
+        rig.run(0.6)
+        assert rig.fix_sent().vel == speed
+
+
 def test_fused_position_comes_with_its_utc_and_never_with_gps_raw_int_re_17_re_19() -> None:
     rig = Rig(**FUSED)
     rig.velocity(1.0, 2.0, 3.0)
@@ -148,15 +171,19 @@ def test_fused_position_needs_a_velocity_since_none_can_be_left_unknown_re_18() 
     rig = Rig(**FUSED)
     assert rig.fix() == []
     assert rig.state(Input.FIX) == (
-        InputState.REFUSED, 'position_source fused needs ~/velocity, which is missing')
-    assert [(Input.VELOCITY,) in one.feeder.snapshot(one.now).needed
+        InputState.REFUSED, 'position_source fused needs a velocity, which is missing')
+    assert [VELOCITIES in one.feeder.snapshot(one.now).needed
             for one in (rig, Rig())] == [True, False]
+
+
+def take_velocity(name: Input, rig: Rig, age: float) -> None:
+    rig.velocity(3.0, 4.0, 0.0, age=age, name=name)
 
 
 # How each input with a stamp is taken, and the age at which it is stale, s.
 TAKES: dict[Input, tuple[Callable[[Rig, float], Any], float]] = {
     Input.FIX: (lambda rig, age: rig.fix(age=age), 1.0),
-    Input.VELOCITY: (lambda rig, age: rig.velocity(3.0, 4.0, 0.0, age=age), 1.0),
+    **{name: (functools.partial(take_velocity, name), 1.0) for name in VELOCITIES},
     Input.IMU: (lambda rig, age: rig.imu(age=age), 0.5),
     Input.ATTITUDE: (lambda rig, age: rig.imu(age=age, name=Input.ATTITUDE), 0.5),
     Input.MOUNT: (lambda rig, age: rig.mount(age=age), 0.5),
@@ -194,6 +221,9 @@ def test_an_old_or_early_message_is_refused_and_one_that_another_has_overtaken_r
 @pytest.mark.parametrize(('name', 'take', 'reason'), [
     (Input.VELOCITY, lambda rig: rig.velocity(math.inf, 4.0, 0.0),
      'a component is not a finite number'),
+    (Input.ODOMETRY, lambda rig: rig.velocity(
+        1.0, 0.0, 0.0, name=Input.ODOMETRY, body=Quaternion(0, 0, 0, 0)),
+     '(0, 0, 0, 0) is not a rotation'),
     (Input.FIX, lambda rig: rig.fix(replace(HERE, status=-1), 1.1), 'no fix (status -1)'),
     (Input.FIX, lambda rig: rig.fix(replace(HERE, latitude=0.0, longitude=0.0)),
      'no fix: its position is 0, 0'),

@@ -94,7 +94,7 @@ class Rig:
 
     def fix(self, time: float) -> None:
         truth, feeder, now = self.flight.truth(time), self.client.feeder, self.link.now
-        feeder.take_velocity(truth.velocity, self.stamp(time), now)
+        feeder.take_velocity(Input.VELOCITY, truth.velocity, self.stamp(time), now)
         if time not in self.flight.outage:
             feeder.take_fix(
                 Position(0, truth.latitude, truth.longitude, truth.altitude + GEOID),

@@ -33,13 +33,13 @@ from illuminator_ros.illuminator.ros.diagnostics import (
 )
 from illuminator_ros.mavlink.dialect import mavlink
 from illuminator_ros.mavlink.link_state import LinkState
-from illuminator_ros.mavlink.messages import Address, CommandAck, heartbeat
+from illuminator_ros.mavlink.messages import Address, CommandAck, Heartbeat, heartbeat
 from illuminator_ros.mavlink.signing import Signing, SigningMode
 from illuminator_ros.ros.diagnostics import line_reports, link_diagnostics
 import pytest
 from support.client import Client
 from support.fake_light import LIGHT, status_message
-from support.frames import frame_of, spoilt
+from support.frames import frame_of, heartbeat_frame, spoilt
 from support.signers import KEY, signed_frame, WRONG_KEY
 from support.simulated_link import SimulatedLink
 
@@ -203,7 +203,18 @@ def test_another_sender_with_our_address_is_an_error_and_the_reason_for_a_missin
         assert found(reported.statuses()['link']) == (ERROR, text)
 
 
-FOREIGN = frame_of(heartbeat(2), 0, AUTOPILOT)
+def test_peers_beyond_the_limit_which_get_no_answer_are_a_warning() -> None:
+    reported = Reported()
+    for port, expected in ((32, ''), (33, '33 peers send, and only the first 32 get an answer')):
+        reported.link.receive(*((heartbeat_frame(Address(2, one)), ('127.0.0.1', one))
+                                for one in range(1, port + 1)))
+        message = reported.statuses()['link'].message
+        assert ('peers' in message, expected in message) == (bool(expected), True)
+
+
+FOREIGN = frame_of(Heartbeat(
+    mavlink.MAV_TYPE_QUADROTOR, mavlink.MAV_AUTOPILOT_PX4, 0, 0, 4, 3), 0, AUTOPILOT)
+UNADDRESSABLE = frame_of(heartbeat(mavlink.MAV_TYPE_ILLUMINATOR), 0, Address(0, 243))
 
 
 @pytest.mark.parametrize(('mode', 'received', 'reason'), [
@@ -211,8 +222,11 @@ FOREIGN = frame_of(heartbeat(2), 0, AUTOPILOT)
      'router, sends to this address or line'),
     (SigningMode.OFF, [bytes(range(90)), spoilt(FOREIGN)],
      '111 bytes received, no valid frame; check the baud rate'),
-    (SigningMode.OFF, [FOREIGN], '1 frames received, none from an illuminator: check that it is '
-     'on, and that routers forward its frames'),
+    (SigningMode.OFF, [FOREIGN, frame_of(heartbeat(mavlink.MAV_TYPE_GCS), 0, Address(255, 190))],
+     r'2 frames from 1/1 \(autopilot, PX4\) and 255/190 \(ground station\), none from a light: '
+     'check that it is on, and that routers forward its frames'),
+    (SigningMode.OFF, [FOREIGN, UNADDRESSABLE], '0/243 heard, whose system id 0 cannot be '
+     'addressed: set its system id, such as 1'),
     (SigningMode.REQUIRE, [FOREIGN], '1 frames refused because they are not signed: sign '
      'them at the other side, or set signing_mode to sign'),
     (SigningMode.REQUIRE, [signed_frame(1, key=WRONG_KEY)],

@@ -18,6 +18,8 @@ from collections.abc import Callable, Iterator
 from types import SimpleNamespace
 from typing import cast
 
+from illuminator_ros.mavlink.retries import RESOURCE
+from illuminator_ros.payload.device_events import DeviceForgotten
 from illuminator_ros.ros import node_manager, throttled_log
 from illuminator_ros.ros.device_nodes import DeviceNodes
 from illuminator_ros.ros.diagnostics_publisher import DiagnosticsSource
@@ -27,6 +29,7 @@ from illuminator_ros.ros.payload import Host
 from illuminator_ros.ros.payload_node import PayloadNode
 from illuminator_ros.ros.throttled_log import NodeLog
 import pytest
+from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 from support.ros import Ros
 from support.waiting import eventually
@@ -41,9 +44,9 @@ def first(own_ros: Ros) -> Iterator[PayloadNode]:
 
 @pytest.fixture
 def pool(first: PayloadNode) -> Iterator[NodeManager]:
-    pool = NodeManager(first, [], NodeLog(first.get_logger()), lambda: None)
+    executor = SingleThreadedExecutor(context=first.context)
+    pool = NodeManager(first, [], NodeLog(first.get_logger()), executor, lambda: None)
     yield pool
-    pool.end()
     for node in pool.nodes:
         node.destroy_node()
 
@@ -90,7 +93,7 @@ def test_device_that_goes_before_its_node_is_made_gets_none(pool: NodeManager) -
 def test_device_whose_node_has_a_wrong_parameter_gets_none_and_one_line(
     pool: NodeManager, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str],
 ) -> None:
-    monkeypatch.setattr(node_manager, 'RETRY_DELAY', 0.0)
+    monkeypatch.setattr(node_manager, 'RESOURCE', RESOURCE._replace(first=0.0))
 
     def serve(node: Node, log: NodeLog) -> None:
         raise ParameterError('brightness: wrong')
@@ -127,6 +130,9 @@ class Served:
         self.source = DiagnosticsSource(
             node.get_fully_qualified_name(), lambda now: lambda link: ())
 
+    def take(self, event: object) -> None:
+        """Publish nothing."""
+
     def release(self) -> None:
         """Serve no device."""
 
@@ -145,7 +151,7 @@ def test_device_found_again_while_its_node_is_made_has_one_node_and_one_diagnost
     def make(node: Node, log: NodeLog) -> Served:
         made.append(Served(node))
         if len(made) == 1:
-            nodes.forget(7)
+            nodes.take(DeviceForgotten(7))
             nodes.serve(7, 'further')
         return made[-1]
 

@@ -20,7 +20,7 @@ from collections.abc import Iterator, Sequence
 from typing import Any
 from unittest.mock import Mock
 
-from illuminator_ros.ros.executor import DeferredService, NodeExecutor
+from illuminator_ros.ros.deferred_service import DeferredService
 from illuminator_ros.ros.parameter_services import MAX_NAMES, ParameterServices
 from illuminator_ros.ros.parameters import (
     ChangeableParameters,
@@ -32,6 +32,7 @@ from illuminator_ros.ros.parameters import (
 from illuminator_ros.ros.payload_node import PayloadNode
 import pytest
 from rcl_interfaces import srv
+from rclpy.executors import SingleThreadedExecutor
 from rclpy.parameter import Parameter
 from support.ros import Ros
 
@@ -64,9 +65,8 @@ class Served:
             changeable=ChangeableParameters(
                 self.node, OWN, declare_given(self.node, OWN), check=lambda values: None,
                 change=lambda values, now: self.changes.append(values)))
-        self.executor = NodeExecutor(ros.context, Mock())
+        self.executor = SingleThreadedExecutor(context=ros.context)
         self.executor.add_node(self.node)
-        self.executor.spin_once()
 
     def _configure(self, values: Values, now: float, answer: Any) -> None:
         self.commands.append(values)

@@ -29,6 +29,7 @@ from builtin_interfaces.msg import Time
 from diagnostic_msgs.msg import DiagnosticArray
 from geometry_msgs import msg as geometry
 from illuminator_ros.mavlink.messages import Address
+from nav_msgs.msg import Odometry
 import pytest
 from rosgraph_msgs.msg import Clock
 from sensor_msgs.msg import Imu, NavSatFix, NavSatStatus, TimeReference
@@ -42,6 +43,7 @@ from support.slow import pass_time_until
 from support.waiting import eventually
 
 MODULE = 'illuminator_ros.rededge'
+NORTH_WEST = geometry.Quaternion(w=0.3826834, x=0.0, y=0.0, z=0.9238795)
 EXACT_LENGTHS = {0: 9, 2: 12, 4: 14, 24: 30, 25: 101, 30: 28, 33: 28, 155: 13, 158: 14}
 
 
@@ -87,8 +89,7 @@ class Robot:
             self.publish('fix', NavSatFix(
                 header=header, status=NavSatStatus(status=0), **self.position))
             # The nose points to the north-west.
-            self.publish('imu', Imu(header=header, orientation=geometry.Quaternion(
-                w=0.3826834, x=0.0, y=0.0, z=0.9238795)))
+            self.publish('imu', Imu(header=header, orientation=NORTH_WEST))
             if 'mount' in self._publishers:
                 # The camera looks ahead and 45 degrees down.
                 mount = geometry.Quaternion(
@@ -195,6 +196,30 @@ def test_services_and_topics_tell_what_the_camera_has_confirmed(own_ros: Ros) ->
         pass_time_until(lambda: all(one.answered for one in silent), step=0.25)
         assert [(one.result().success, one.result().message) for one in silent] == [
             (False, 'no reply to 2 PINGs'), (False, 'no answer to DIGICAM_CONTROL within 5.00 s')]
+
+
+# 5 m/s to the north-west: in the axes of the earth, and of a body whose nose points there.
+@pytest.mark.parametrize(('topic', 'message'), [
+    ('velocity_with_covariance', geometry.TwistWithCovarianceStamped(
+        twist=geometry.TwistWithCovariance(twist=geometry.Twist(
+            linear=geometry.Vector3(x=-3.5355, y=3.5355))))),
+    ('odometry', Odometry(
+        pose=geometry.PoseWithCovariance(pose=geometry.Pose(orientation=NORTH_WEST)),
+        twist=geometry.TwistWithCovariance(twist=geometry.Twist(
+            linear=geometry.Vector3(x=5.0)))))])
+def test_the_velocity_may_come_with_a_covariance_or_from_odometry_re_15(
+        own_ros: Ros, topic: str, message: Any) -> None:
+    with running_camera() as camera, running_node(own_ros, camera), Robot(own_ros) as robot:
+        robot.velocity = False
+        publisher = own_ros.publisher(type(message), f'/rededge/{topic}', '/rededge')
+
+        def is_sent() -> bool:
+            message.header.stamp = robot.stamp()
+            publisher.publish(message)
+            return any((one.vel, one.cog) == (500, 31500)
+                       for one in camera.messages('GPS_RAW_INT'))
+
+        eventually(is_sent)
 
 
 def test_first_image_does_not_wait_for_an_import(own_ros: Ros) -> None:

@@ -17,7 +17,6 @@
 import threading
 
 from diagnostic_msgs.msg import DiagnosticArray
-from illuminator_ros.ros.executor import NodeExecutor
 from std_msgs.msg import Bool, String
 from std_srvs.srv import SetBool, Trigger
 from support.embedded import embedded_bridge
@@ -84,9 +83,8 @@ def test_silent_source_loses_the_light_while_the_executor_is_blocked(own_ros: Ro
                           on_release='off') as process, ServedLight(port) as light):
         Parameters(own_ros).wait(mode='internal_control')
         assert ask(own_ros, 'safety', True).success
-        executor = process.node.executor
-        assert isinstance(executor, NodeExecutor)
-        executor.call(block)
+        assert process.node.executor is not None
+        process.node.executor.create_task(block)
         assert blocked.wait(PATIENCE)
 
         pass_time_until(lambda: light.fake.fields['enable'] == 0)

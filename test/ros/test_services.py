@@ -16,25 +16,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
-import math
+from collections.abc import Iterator
 import re
 import socket
 import threading
 
 from illuminator_ros.mavlink.dialect import entry_names, mavlink
-from illuminator_ros.ros import answer_spacing
-from illuminator_ros.ros import executor as executor_module
-from illuminator_ros.ros.executor import DeferredService, ENDED, NodeExecutor, Respond
+from illuminator_ros.ros.deferred_service import DeferredService, Respond, Take
 from illuminator_ros.ros.node import SERVICE_QOS
-from illuminator_ros.ros.payload_node import PayloadNode
 from illuminator_ros.ros.throttled_log import NodeLog
 import pytest
-from rclpy.client import Client
+from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
-from rclpy.qos import QoSProfile
 from std_msgs.msg import Float32, Float64
 from std_srvs.srv import Trigger
+from support.embedded import embedded_bridge
 from support.light import eventually, ON_OFF, ServedLight
 from support.processes import Program
 from support.recording import Call
@@ -159,111 +155,89 @@ def test_requests_fail_at_once_and_say_why_while_the_link_is_not_open(
                 '(doc/routers.md: several programs on one link)'}
 
 
-MakeClient = Callable[[str], Client]
-
-
 @pytest.fixture
-def node(ros: Ros, monkeypatch: pytest.MonkeyPatch) -> Iterator[Node]:
-    """Yield a node of an executor that sends spaced answers hours apart."""
-    monkeypatch.setattr(answer_spacing, 'PAUSE_PER_CLIENT', 3600.0)
-    node = PayloadNode('served', context=ros.context)
-    executor = NodeExecutor(ros.context, NodeLog(node.get_logger()))
+def node(ros: Ros) -> Iterator[Node]:
+    """Yield a node of an executor of rclpy."""
+    node = Node('served', context=ros.context)
     node.create_service(Trigger, '~/fast', lambda request, response: response)
+    executor = SingleThreadedExecutor(context=ros.context)
     executor.add_node(node)
-    thread = threading.Thread(target=executor.run)
+    thread = threading.Thread(target=executor.spin)
     thread.start()
     yield node
-    executor.end()
+    executor.shutdown()
     thread.join()
     node.destroy_node()
 
 
-@pytest.fixture
-def clients(ros: Ros) -> Iterator[MakeClient]:
-    """Yield a function that makes a client of a service of the node, which keeps all answers."""
-    made = []
-
-    def make(name: str) -> Client:
-        made.append(ros.node.create_client(
-            Trigger, f'/served/{name}', qos_profile=QoSProfile(depth=100)))
-        eventually(made[-1].service_is_ready)
-        return made[-1]
-
-    yield make
-    for client in made:
-        ros.node.destroy_client(client)
+def serve(node: Node, take: Take) -> None:
+    """Add the service ``~/slow``."""
+    DeferredService(node, Trigger, '~/slow', take, SERVICE_QOS, NodeLog(node.get_logger()))
 
 
-def serve_later(node: Node) -> Log[Respond]:
-    """Add the service ``~/slow``; return the functions that answer its requests."""
+def calls(ros: Ros, node: Node, name: str, count: int = 1) -> list[Call]:
+    """Call a service of a node once by each of so many clients."""
+    return [ros.start(Trigger, f'{node.get_fully_qualified_name()}/{name}', Trigger.Request())
+            for _ in range(count)]
+
+
+def test_requests_that_wait_delay_no_other_service_and_are_answered_in_any_order(
+    ros: Ros, node: Node,
+) -> None:
     waiting: Log[Respond] = Log()
+    serve(node, lambda request, respond: waiting.append(respond))
+    asked = calls(ros, node, 'slow', 3)
+    waiting.wait_for(lambda one: True, count=3)
 
+    [fast] = calls(ros, node, 'fast')
+    fast.result()
+    assert not any(one.answered for one in asked)
+    for number, respond in reversed(list(enumerate(waiting))):
+        respond(Trigger.Response(message=str(number)))
+
+    assert sorted(one.result().message for one in asked) == ['0', '1', '2']
+
+
+def test_request_that_causes_an_internal_error_is_answered_and_logged(
+    ros: Ros, node: Node, capfd: pytest.CaptureFixture[str],
+) -> None:
     def take(request: Trigger.Request, respond: Respond) -> None:
-        waiting.append(respond)
+        raise LookupError('no such thing')
 
-    def refuse_waiting(reason: str) -> None:
-        for respond in waiting:
-            respond(Trigger.Response(message=reason))
+    serve(node, take)
+    [asked] = calls(ros, node, 'slow')
 
-    DeferredService(
-        node, Trigger, '~/slow', take, refuse_waiting, SERVICE_QOS, spread=math.inf)
-    return waiting
+    assert asked.result() == Trigger.Response()
+    assert "internal error: LookupError('no such thing')" in ''.join(capfd.readouterr())
 
 
-def call(client: Client, waiting: Log[Respond], count: int) -> list[Call]:
-    """Call a service until that many more requests wait for their answers."""
-    before = len(waiting)
-    calls = [Call(client.call_async(Trigger.Request())) for _ in range(count)]
-    waiting.wait_for(lambda one: True, count=before + count)
-    return calls
-
-
-def test_spaced_answers_do_not_delay_other_services_and_are_bounded(
-    node: Node, clients: MakeClient, monkeypatch: pytest.MonkeyPatch,
+def test_requests_that_wait_at_the_end_of_the_process_are_answered(
+    own_ros: Ros, port: int,
 ) -> None:
-    monkeypatch.setattr(executor_module, 'MAX_WAITING', 3)
-    waiting = serve_later(node)
-    slow, fast = clients('slow'), clients('fast')
-    [first] = call(slow, waiting, 1)
-    waiting[0](Trigger.Response())
-    first.result()
-    calls = call(slow, waiting, 20)
+    with embedded_bridge(own_ros.domain, port) as bridge, ServedLight(port) as light:
+        Parameters(own_ros).wait(brightness=100.0)
+        light.fake.results[ON_OFF] = None
+        asked = own_ros.start_enable()
+        light.wait_for(ON_OFF)
 
-    for respond in list(waiting)[1:]:
-        respond(Trigger.Response())
+        bridge.end()
 
-    eventually(lambda: sum(one.answered for one in calls) == len(calls) - 3)
-    Call(fast.call_async(Trigger.Request())).result()
-    assert sum(one.answered for one in calls) == len(calls) - 3
+        assert asked.result().message == 'the bridge is ending'
 
 
-def test_answers_are_spaced_where_a_service_has_more_clients_than_are_answered_at_once(
-    node: Node, clients: MakeClient,
+def test_payload_may_use_timers_clients_and_actions_on_the_executor_of_the_bridge(
+    own_ros: Ros, port: int,
 ) -> None:
-    waiting = serve_later(node)
-    fast = clients('fast')
-    callers = [clients('slow') for _ in range(answer_spacing.MAX_UNSPACED + 1)]
-    eventually(lambda: node.count_clients('~/slow') == len(callers))
-    calls = []
-    # Call in turn: the node counts the clients after the first answer, so the third one waits.
-    for caller in callers[:3]:
-        calls += call(caller, waiting, 1)
-        waiting[-1](Trigger.Response())
+    with embedded_bridge(own_ros.domain, port) as bridge:
+        own_ros.enable()
+        answers: Log[Trigger.Response] = Log()
+        client = bridge.node.create_client(Trigger, '/illuminator/refresh')
 
-    for answered in calls[:2]:
-        answered.result()
-    Call(fast.call_async(Trigger.Request())).result()
-    assert not calls[2].answered
+        def call() -> None:
+            timer.cancel()
+            client.call_async(Trigger.Request()).add_done_callback(
+                lambda future: answers.append(future.result()))
 
+        timer = bridge.node.create_timer(0.001, call)
 
-def test_executor_that_ends_refuses_requests_that_wait_without_a_pause(
-    node: Node, clients: MakeClient,
-) -> None:
-    waiting = serve_later(node)
-    calls = call(clients('slow'), waiting, answer_spacing.MAX_UNSPACED + 2)
-    executor = node.executor
-    assert isinstance(executor, NodeExecutor)
-
-    executor.end()
-
-    assert {answered.result().message for answered in calls} == {ENDED}
+        answers.wait_for(lambda answer: 'no light connected' in answer.message)

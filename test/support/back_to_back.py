@@ -20,7 +20,7 @@ from collections.abc import Callable, Iterator, Sequence
 import math
 from typing import Any
 
-from illuminator_ros.illuminator.events import LightEvent, LightFound, LightSnapshot
+from illuminator_ros.illuminator.events import LightEvent, LightSnapshot
 from illuminator_ros.illuminator.light import Light, Settings
 from illuminator_ros.illuminator.simulated import SimulatedIlluminator
 from illuminator_ros.illuminator.simulated_properties import IlluminatorProperties
@@ -30,6 +30,7 @@ from illuminator_ros.mavlink.dialect import decode
 from illuminator_ros.mavlink.frame import Decoder
 from illuminator_ros.mavlink.statistics import Traffic
 from illuminator_ros.payload.confirmed_command import Result
+from illuminator_ros.payload.device_events import DeviceFound
 from illuminator_ros.payload.simulated import SimulatedComponent, SimulatedComponents
 from support.client import Client
 from support.faulty_wire import Faults, FaultyWire
@@ -110,11 +111,11 @@ class Pair:
         self.open()
 
     def _take(self, event: LightEvent) -> None:
-        if isinstance(event, LightFound):
-            self.recorders[event.address] = Recorder()
-            self._on_light(self.controller.lights[event.address])
+        if isinstance(event, DeviceFound):
+            self.recorders[event.key] = Recorder()
+            self._on_light(self.controller.lights[event.key])
         else:
-            self.recorders[event.address](event)
+            self.recorders[event.key](event)
 
     # Participants
 

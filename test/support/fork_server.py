@@ -50,6 +50,7 @@ _REQUESTS, _SERVER_END = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET
 MAX_REQUEST = 1 << 17
 MODULES = (
     'illuminator_ros.cli.bridge', 'illuminator_ros.cli.conformance.run',
+    'illuminator_ros.cli.discover.run',
     'illuminator_ros.cli.monitor.run', 'illuminator_ros.cli.simulator.run',
     'illuminator_ros.gimbal.ros.gimbals', 'illuminator_ros.gimbal.ros.manager_node',
     'illuminator_ros.gimbal.simulated_device', 'illuminator_ros.illuminator.ros.lights',

@@ -54,6 +54,7 @@ class FakeManager:
     :ivar reports: whether it sends GIMBAL_MANAGER_STATUS.
     :ivar streams: whether it does so without a request.
     :ivar applies: whether it executes the commands that it accepts.
+    :ivar beat: tenths of a second between its heartbeats.
     :ivar answers: whether it acknowledges commands.
     :ivar device_reports: whether the device sends GIMBAL_DEVICE_ATTITUDE_STATUS.
     :ivar received: the received setpoints.
@@ -67,6 +68,7 @@ class FakeManager:
     announces: bool = True
     reports: bool = True
     streams: bool = True
+    beat: int = 10
     applies: bool = True
     answers: bool = True
     alive: bool = True
@@ -104,9 +106,9 @@ class FakeManager:
             number if self.attitude_number is None else self.attitude_number)
 
     def sent_each(self, tenth: int) -> list[tuple[mav.Address, mav.Message]]:
-        """Return its messages of a tenth of a second: heartbeats 1 Hz, statuses 5 Hz."""
+        """Return its messages of a tenth of a second: statuses 5 Hz."""
         sent: list[tuple[mav.Address, mav.Message]] = []
-        if self.alive and tenth % 10 == 0:
+        if self.alive and tenth % self.beat == 0:
             sent.append((self.address, mav.Heartbeat(2, self.autopilot, 0, 0, 4, 3)))
         if self.alive and self.reports and self.streams and tenth % 2 == 0:
             sent.append((self.address, self.status()))

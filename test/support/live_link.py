@@ -22,7 +22,7 @@ import threading
 import time
 from typing import Any, Generic, TypeVar
 
-from illuminator_ros.illuminator.events import LightConnected, LightEvent, LightLost
+from illuminator_ros.illuminator.events import LightEvent
 from illuminator_ros.illuminator.light import Light, Settings
 from illuminator_ros.illuminator.simulated import SimulatedIlluminator
 from illuminator_ros.illuminator.simulated_properties import IlluminatorProperties
@@ -32,6 +32,7 @@ from illuminator_ros.mavlink.link_state import LinkEvent, LinkSnapshot
 from illuminator_ros.mavlink.messages import Address, Message
 from illuminator_ros.mavlink.url import parse_url, Url
 from illuminator_ros.payload.confirmed_command import Result
+from illuminator_ros.payload.device_events import DeviceConnected, DeviceDisconnected
 from illuminator_ros.payload.simulated import SimulatedComponents
 from support.client import Client
 from support.messages import HANDLED
@@ -177,9 +178,9 @@ class Bridge(EndpointLink[Client]):
         super().__init__(url, client, **options)
 
     def _take(self, event: LightEvent) -> None:
-        if isinstance(event, LightConnected | LightLost):
-            kind = 'connected' if isinstance(event, LightConnected) else 'lost'
-            self.lights.append((kind, self.endpoint.lights[event.address]))
+        if isinstance(event, DeviceConnected | DeviceDisconnected):
+            kind = 'connected' if isinstance(event, DeviceConnected) else 'lost'
+            self.lights.append((kind, self.endpoint.lights[event.key]))
 
     def wait_connected(self, count: int = 1) -> Light:
         """Wait for the count-th connection of a light, and return the light."""

@@ -23,6 +23,7 @@ from typing import Any
 from illuminator_ros.illuminator import events as light_events
 from illuminator_ros.illuminator.model import Status
 from illuminator_ros.payload.confirmed_command import Result
+from illuminator_ros.payload.device_events import DeviceConnected, DeviceDisconnected
 from illuminator_ros.payload.identity import Identity
 
 
@@ -40,9 +41,9 @@ class Recorder:
 
     def __call__(self, event: light_events.LightEvent) -> None:
         match event:
-            case light_events.LightConnected():
+            case DeviceConnected():
                 self.events.append('connected')
-            case light_events.LightLost():
+            case DeviceDisconnected():
                 self.events.append(f'lost: {event.reason}')
             case light_events.LightRestarted():
                 self.events.append('restarted')

@@ -15,7 +15,9 @@
 """The package as ``colcon build`` installs it."""
 
 import configparser
+import contextlib
 from pathlib import Path
+import re
 import shlex
 import shutil
 import signal
@@ -25,13 +27,13 @@ import sys
 import pytest
 from support.light import eventually
 from support.ports import free_port
-from support.processes import ended, environment, Program, ROOT
+from support.processes import ended, environment, Program, python, ROOT
 from support.ros import Parameters, Ros
 
 COLCON = shutil.which('colcon', path=f'{Path(sys.executable).parent}:/usr/bin')
 LEFT_OUT = shutil.ignore_patterns(
     '.*', '__pycache__', '*.egg-info', 'build', 'install', 'log', 'bench', 'demo')
-EXECUTABLES = ('bridge', 'conformance', 'monitor', 'simulator')
+EXECUTABLES = ('bridge', 'conformance', 'discover', 'monitor', 'simulator')
 
 pytestmark = [pytest.mark.skipif(COLCON is None, reason='colcon is not installed'),
               pytest.mark.timeout(300)]
@@ -71,8 +73,8 @@ def test_modules_and_files_that_ros_looks_for_are_installed(prefix: Path) -> Non
     [site] = (prefix / 'lib').glob('python*/site-packages')
     share = prefix / 'share' / 'illuminator_ros'
     modules = {path.relative_to(ROOT) for path in (ROOT / 'illuminator_ros').rglob('*.py')}
-    files = {path.relative_to(ROOT) for folder in ('config', 'launch')
-             for path in (ROOT / folder).rglob('*') if path.is_file()}
+    files = {path.relative_to(ROOT) for folder in ('config', 'examples', 'launch')
+             for path in (ROOT / folder).rglob('*.*') if path.suffix != '.pyc'}
 
     assert {path.relative_to(site) for path in site.glob('illuminator_ros/**/*.py')} == modules
     assert (site / 'illuminator_ros' / 'py.typed').is_file()
@@ -108,30 +110,44 @@ def test_installed_programs_find_each_other(
         eventually(lambda: Parameters(own_ros).set(brightness=60)[0].successful)
 
 
-def test_command_of_the_systemd_unit_is_the_bridge_itself_and_ends_on_sigterm(
-    own_ros: Ros, workspace: Path, tmp_path: Path,
-) -> None:
+def test_the_systemd_unit_is_installed_for_a_user_and_runs_two_lights(
+        own_ros: Ros, workspace: Path, tmp_path: Path) -> None:
+    # The page has the command that adapts the unit.
+    [adapt] = re.findall(r'^(sed .*) \|\n', (ROOT / 'doc' / 'ros.md').read_text(), re.M)
+    text = subprocess.run(
+        ['bash', '-c', adapt], capture_output=True, text=True, check=True, env={
+            'USER': 'diver', 'HOME': str(tmp_path), 'SHARE': str(
+                workspace / 'install/illuminator_ros/share/illuminator_ros')}).stdout
+    assert '/home/pilot' not in text
+    assert 'User=diver' in text
     unit = configparser.ConfigParser(interpolation=None)
     unit.optionxform = str  # type: ignore[assignment,method-assign]
-    unit.read(workspace / 'install/illuminator_ros/share/illuminator_ros/config'
-              / 'illuminator.service')
+    unit.read_string(text)
     service = unit['Service']
-    parameters = tmp_path / 'boat.yaml'
-    parameters.write_text('/**: {ros__parameters: {connection_url: "memory://none"}}')
-    command = service['ExecStart'].replace('/home/pilot/ws', str(workspace)).replace(
-        '/home/pilot/boat.yaml', str(parameters))
+    (tmp_path / 'ws').symlink_to(workspace)
+    command = service['ExecStart'].replace('/etc/illuminator_ros', str(tmp_path))
     path = f'{Path(sys.executable).parent}:/usr/bin:/bin'
-    bridge = Program(*shlex.split(command), env={
-        'ROS_DOMAIN_ID': str(own_ros.domain), 'PATH': path})
-    with ended(bridge):
-        bridge.wait_for('link open')
-        assert Path(f'/proc/{bridge.pid}/cmdline').read_text().split('\0')[1].endswith('/bridge')
-        assert bridge.end(signal.SIGTERM) == 0
+    with contextlib.ExitStack() as stack:
+        bridges = []
+        for name in ('bow', 'stern'):
+            url = f'127.0.0.1:{free_port()}'
+            (tmp_path / f'{name}.yaml').write_text(
+                (ROOT / 'config' / 'bridge.yaml').read_text().replace('127.0.0.1:14590', url))
+            bridge = stack.enter_context(ended(Program(
+                *shlex.split(command.replace('%i', name)),
+                env={'ROS_DOMAIN_ID': str(own_ros.domain), 'PATH': path})))
+            stack.enter_context(ended(python('illuminator_ros.simulator', f'udpout://{url}')))
+            bridges.append((name, bridge))
+        for name, bridge in bridges:
+            bridge.wait_for(f'[{name}]: light 1/243 connected')
+            cmdline = Path(f'/proc/{bridge.pid}/cmdline').read_text()
+            assert cmdline.split('\0')[1].endswith('/bridge')
+            assert bridge.end(signal.SIGTERM) == 0
     assert (service['Restart'], service['RestartPreventExitStatus']) == ('on-failure', '2')
     assert float(service['TimeoutStopSec']) > 2
     assert unit['Unit']['StartLimitIntervalSec'] == '0'
     if verify := shutil.which('systemd-analyze'):
         verified = subprocess.run(
-            [verify, 'verify', str(ROOT / 'config' / 'illuminator.service')],
+            [verify, 'verify', str(ROOT / 'config' / 'illuminator@.service')],
             capture_output=True, text=True)
         assert (verified.returncode, verified.stderr) == (0, '')

@@ -27,7 +27,7 @@ import pytest
 from support.ports import free_port
 from support.processes import python, ROOT, run
 
-PROGRAMS = ('bridge', 'simulator', 'monitor')
+PROGRAMS = ('bridge', 'simulator', 'monitor', 'discover')
 MONITOR_REMEDY = "PIP_BREAK_SYSTEM_PACKAGES=1 pip install 'textual>=8' 'textual-serve>=1.1'"
 ROS_REMEDY = 'source the setup file of ROS 2, as in "source /opt/ros/jazzy/setup.bash"'
 
@@ -114,6 +114,8 @@ def test_help_names_every_parameter_option_and_form_of_url() -> None:
     ('monitor', '--ros-args -r 1st:=x', "Couldn't parse remap rule: '-r 1st:=x'"),
     ('monitor', '--ros-args --params-file KEYS/pipe',
      'parameter file KEYS/pipe: it is not a regular file'),
+    ('discover', 'http://x', "unknown scheme 'http'"),
+    ('discover', '--seconds 0', '--seconds: 0 is outside 1 to 3600'),
     ('simulator', '--banana', 'unrecognized arguments: --banana'),
     ('simulator', 'udpin://127.0.0.1:0', 'port 0 is outside 1..65535'),
     ('simulator', '--count 0', 'argument --count: 0 is outside 1 to 200'),
@@ -152,6 +154,7 @@ def test_wrong_argument_is_one_line_with_status_2(
     ('bridge --ros-args -p beam_range:=5.0', 'visualization_msgs',
      'sudo apt install ros-jazzy-visualization-msgs'),
     ('simulator', 'fastcrc', 'pip install fastcrc'),
+    ('discover', 'fastcrc', 'pip install fastcrc'),
 ])
 def test_missing_package_is_one_line_with_its_remedy_and_status_1(
     command: str, package: str, remedy: str, tmp_path: Path,
@@ -194,7 +197,8 @@ def test_old_package_is_one_line_with_its_version_and_remedy_and_status_1(
 
 
 @pytest.mark.parametrize(('program', 'option', 'unbuffered'), [
-    *((program, '--help', '') for program in ('bridge', 'simulator', 'conformance', 'monitor')),
+    *((program, '--help', '') for program in (
+        'bridge', 'simulator', 'conformance', 'discover', 'monitor')),
     ('bridge', '--version', ''), ('simulator', '--version', '1'), ('monitor', '--help', '1')])
 def test_help_that_cannot_be_written_is_one_line_with_status_1(
     program: str, option: str, unbuffered: str,

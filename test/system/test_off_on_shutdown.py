@@ -19,12 +19,10 @@ import contextlib
 import os
 import signal
 import sys
-from unittest import mock
 
 from illuminator_ros.mavlink.dialect import mavlink
 from illuminator_ros.mavlink.link import Link
 from illuminator_ros.ros.bridge import Bridge
-from illuminator_ros.ros.executor import NodeExecutor
 import pytest
 from rcl_interfaces.srv import GetParameters
 import rclpy
@@ -189,10 +187,12 @@ def shut_down_context(bridge: Bridge, ros: Ros) -> None:
 
 
 def fail(bridge: Bridge, ros: Ros) -> None:
-    """Have the executor fail with the next request."""
-    with mock.patch.object(NodeExecutor, 'spin_once', side_effect=SystemExit) as spin:
-        ros.start_enable()
-        eventually(lambda: spin.called)
+    """Have the executor fail."""
+    def exit_thread() -> None:
+        raise SystemExit
+
+    assert bridge.node.executor is not None
+    bridge.node.executor.create_task(exit_thread)
 
 
 @pytest.mark.filterwarnings('ignore::pytest.PytestUnhandledThreadExceptionWarning')

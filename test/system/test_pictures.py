@@ -28,7 +28,7 @@ TEXTS = {
     'monitor-gimbal': ['/gimbal ours OK', 'yaw to 20.0 left: sent', 'pitch 30.0 down'],
     'monitor-camera': ['capture: done : image 1 taken', '/rededge ok WARN'],
     'monitor-phone': ['/illuminator ON', 'space on/off', 'a ALL OFF'],
-    'beam': [], 'flight': []}
+    'beam': [], 'flight': [], 'wiring-companion': [], 'wiring-autopilot': []}
 
 
 def text_of(picture: str) -> str:

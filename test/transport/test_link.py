@@ -32,6 +32,7 @@ from illuminator_ros.mavlink.link import Link, STORE_INTERVAL
 from illuminator_ros.mavlink.link_state import LinkEvent
 from illuminator_ros.mavlink.link_thread import LinkThreadError
 from illuminator_ros.mavlink.messages import CommandLong
+from illuminator_ros.mavlink.retries import RESOURCE
 from illuminator_ros.mavlink.signing import Signing, SigningMode
 from illuminator_ros.mavlink.signing_files import TimestampStore
 from illuminator_ros.mavlink.transport import open_channel, tcp
@@ -256,7 +257,7 @@ def test_fault_while_opening_is_logged_and_tried_again(
 def test_connector_whose_thread_cannot_be_started_is_tried_again(
         run: Run, monkeypatch: pytest.MonkeyPatch) -> None:
     # Threads fail to start, as with a limit on the number of processes.
-    monkeypatch.setattr(line, 'THREAD_RETRY_INTERVAL', 0.01)
+    monkeypatch.setattr(line, 'RESOURCE', RESOURCE._replace(first=0.01))
     genuine, failures = threading.Thread.start, Log[str]()
 
     def start(thread: threading.Thread) -> None:

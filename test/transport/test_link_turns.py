@@ -19,6 +19,7 @@ from __future__ import annotations
 from collections.abc import Callable
 import selectors
 import threading
+from typing import Any
 
 from illuminator_ros.mavlink import link_thread
 from illuminator_ros.mavlink.link_thread import (
@@ -180,3 +181,28 @@ def test_a_stop_of_the_process_is_noted_before_the_calls_that_waited_meanwhile(
     thread.run_once()
     assert order == expected
     thread.stop(0.0)
+
+
+def test_a_line_that_is_always_ready_ends_the_turn_and_keeps_no_other_one_waiting_for_ever(
+) -> None:
+    now, served = [1000.0], list[int]()
+
+    def serve(handle: Any, events: int) -> None:
+        now[0] += 2 * TURN_TIME
+        served.append(handle)
+
+    class Selector(selectors.SelectSelector):
+
+        def select(self, timeout: float | None = None) -> list[tuple[selectors.SelectorKey, int]]:
+            return [(selectors.SelectorKey(one, one, 1, serve), 1) for one in range(3)]
+
+    def clock() -> float:
+        return now[0]
+
+    thread = LinkThread(
+        'link', lambda: now[0], lambda: None, FaultLog(clock), clock, Selector(), monotonic=clock)
+    for turn in range(100):
+        thread.run_once()
+        assert len(served) == turn + 1
+    thread.stop(0.0)
+    assert set(served) == {0, 1, 2}

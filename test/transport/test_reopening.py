@@ -24,7 +24,7 @@ import socket
 from illuminator_ros.illuminator.light import Settings
 from illuminator_ros.mavlink import component, line, link_state
 from illuminator_ros.mavlink import connector as connector_module
-from illuminator_ros.mavlink.connector import FIRST_PAUSE
+from illuminator_ros.mavlink.retries import CONNECTION
 from illuminator_ros.mavlink.transport.udp import MAX_PEERS, PEER_EXPIRY
 from illuminator_ros.payload import confirmed_command
 import pytest
@@ -153,7 +153,7 @@ def test_server_that_drops_connections_is_asked_more_rarely_and_open_once_it_sen
     assert link.state().is_open
 
 
-@pytest.mark.parametrize(('proof_time', 'pause'), [(0.0, 0.0), (3600.0, FIRST_PAUSE)])
+@pytest.mark.parametrize(('proof_time', 'pause'), [(0.0, 0.0), (3600.0, CONNECTION.first)])
 def test_link_that_has_worked_is_reopened_at_once_and_one_that_only_answered_after_a_pause(
         run: live_link.Run, server: Server, pauses: Log[float], monkeypatch: pytest.MonkeyPatch,
         proof_time: float, pause: float) -> None:

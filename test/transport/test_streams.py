@@ -57,6 +57,22 @@ def numbers_in(data: bytes) -> list[int]:
     return numbers
 
 
+# The rate of a serial line
+
+def test_the_rate_of_an_open_serial_port_can_change_and_a_wrong_one_is_an_error(
+        channel: Open, device: PtyDevice) -> None:
+    one = channel(f'serial://{device.path}:57600').channel
+    one.change_rate(921600)
+    line = os.open(device.path, os.O_RDWR | os.O_NOCTTY)
+    speed = termios.tcgetattr(line)[4]
+    os.close(line)
+
+    assert speed == termios.B921600
+    assert (one.rate, one.name) == (92160.0, f'serial {device.path} at 921600 baud')
+    with pytest.raises(OSError, match='has no -1 baud'):
+        one.change_rate(-1)
+
+
 # Queues of whole frames
 
 @given(st.lists(st.integers(1, 4000) | st.floats(0, 1), max_size=60))

@@ -31,7 +31,7 @@ from .session import FORWARD, GIMBAL, GimbalSession, NAN, Pose, PROPOSAL, STEP, 
 from .. import messages as gimbal
 from ..axes import LEVEL
 from ...mavlink.dialect import mavlink
-from ...mavlink.messages import Address, CommandLong, Heartbeat, heartbeat, Message, target_of
+from ...mavlink.messages import Address, CommandLong, heartbeat, Message, target_of
 from ...payload.checks import component_requirements as component
 from ...payload.checks.outcomes import Failed, Skipped
 from ...payload.checks.requirement import Option, PayloadChecks, Requirement, requirement
@@ -59,6 +59,7 @@ class DeviceSession(GimbalSession):
     """
 
     messages = (*Session.messages, INFORMATION, AttitudeStatus)
+    mav_type = mavlink.MAV_TYPE_GIMBAL
     information = INFORMATION
     status = AttitudeStatus
 
@@ -71,7 +72,7 @@ class DeviceSession(GimbalSession):
         # Gimbal managers send these messages with a gimbal_device_id.
         return (isinstance(message, INFORMATION | AttitudeStatus)
                 and message.gimbal_device_id == 0
-                or isinstance(message, Heartbeat) and message.type == mavlink.MAV_TYPE_GIMBAL)
+                or super().is_device(message))
 
     @property
     def operator(self) -> Address:
@@ -236,17 +237,15 @@ async def yaw_lock(device: DeviceSession) -> str:
         return str(pose)
 
 
-REQUIREMENTS: tuple[Requirement[DeviceSession], ...] = (
-    component.heartbeat,
+OWN: tuple[Requirement[DeviceSession], ...] = (
     component.heartbeat_type(mavlink.MAV_TYPE_GIMBAL, 'GIMBAL', 'a gimbal'),
-    component.heartbeat_autopilot, component.address,
+    component.heartbeat_autopilot,
     component.status_stream(AttitudeStatus, GIMBAL, 'Gimbal Device Broadcast/Status Messages'),
     component.sent_on_request(
         'status-request', AttitudeStatus, MESSAGES, attitude.STATUS, optional=True),
     attitude.failures_at_rest, north_needs_heading,
     component.sent_on_request('information', INFORMATION, GIMBAL, 'Discovery of Gimbal Device'),
     *attitude.information(INFORMATION), device_id,
-    component.unknown_command, component.unknown_message, component.broadcast(INFORMATION),
     attitude.command_int(INFORMATION),
     reaches('setpoint', 'turns to an attitude that its manager commands', GIMBAL,
             'Control of a Gimbal Device', DeviceSession.point),
@@ -262,12 +261,11 @@ REQUIREMENTS: tuple[Requirement[DeviceSession], ...] = (
             _send_to_manager),
     ignores('other-target', 'ignores setpoints for other components and systems', ROUTING,
             'Routing Detail', 'setpoints for other addresses', _point_others),
-    *component.interval_requirements(AttitudeStatus),
-    component.heartbeat_rate,
     attitude.statuses('status-to-all', 'sends its attitude to all components (GM-20)', _not_to_all,
                       GIMBAL, 'Gimbal Device Broadcast/Status Messages'),
-    *attitude.STATUSES, *component.ACKNOWLEDGEMENTS, component.checksums,
+    *attitude.STATUSES,
 )
+REQUIREMENTS = component.with_common(OWN, AttitudeStatus, INFORMATION)
 CHECKS: PayloadChecks[DeviceSession] = PayloadChecks(
     payload='gimbal', device='gimbal', session=DeviceSession, requirements=REQUIREMENTS,
     evidence='HEARTBEAT with MAV_TYPE_GIMBAL, or GIMBAL_DEVICE_ATTITUDE_STATUS',

@@ -429,15 +429,13 @@ async def _set_roi(manager: ManagerSession) -> Transaction:
     return one
 
 
-REQUIREMENTS: tuple[Requirement[ManagerSession], ...] = (
-    component.heartbeat, component.address,
+OWN: tuple[Requirement[ManagerSession], ...] = (
     component.status_stream(MANAGER_STATUS, GIMBAL, 'Gimbal Manager Status'),
     component.sent_on_request(
         'status-request', MANAGER_STATUS, MESSAGES, MANAGER_STATUS.msgname, optional=True),
     attitude.failures_at_rest,
     component.sent_on_request('information', INFORMATION, GIMBAL, 'Discovery of Gimbal Manager'),
     *attitude.information(INFORMATION), same_device, attitude_stream,
-    component.unknown_command, component.unknown_message, component.broadcast(INFORMATION),
     attitude.command_int(INFORMATION),
     take, release, unchanged, release_others, secondary, configure_values, one_player,
     reaches('set-attitude', 'turns to an attitude (GIMBAL_MANAGER_SET_ATTITUDE)', GIMBAL,
@@ -474,10 +472,9 @@ REQUIREMENTS: tuple[Requirement[ManagerSession], ...] = (
             GIMBAL, ADDRESSING, 'setpoints for another gimbal device', _point_other_device),
     reaches('all-devices', 'treats gimbal device 0 as all of its gimbals (GM-28)', GIMBAL,
             ADDRESSING, lambda manager, pose: manager.point(pose, device_id=0)),
-    other_target, *component.interval_requirements(MANAGER_STATUS),
-    component.heartbeat_rate, *attitude.STATUSES, *component.ACKNOWLEDGEMENTS,
-    component.checksums,
+    other_target, *attitude.STATUSES,
 )
+REQUIREMENTS = component.with_common(OWN, MANAGER_STATUS, INFORMATION)
 CHECKS: PayloadChecks[ManagerSession] = PayloadChecks(
     payload='gimbal_manager', device='gimbal manager', session=ManagerSession,
     requirements=REQUIREMENTS,

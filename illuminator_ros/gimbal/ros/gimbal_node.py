@@ -33,13 +33,14 @@ from ..client import GimbalClient
 from ..commands import Control
 from ..gimbal import Gimbal
 from ...mavlink.dialect import flag_names, mavlink
-from ...payload.command_sources import DEFAULT, describe
+from ...payload.command_sources import DEFAULT
 from ...payload.confirmed_command import Done, Result
 from ...payload.messages import GeoPoint
 from ...payload.mount_attitude import YawFrame
 from ...ros import node as ros_node
 from ...ros.command_sources import prefixes, release_services, SOURCE
 from ...ros.conversions import quaternion_message
+from ...ros.device_events import publish_event
 from ...ros.diagnostics_publisher import DiagnosticsSource, MakeReports
 from ...ros.node import Endpoint
 from ...ros.parameter_services import ParameterServices
@@ -177,17 +178,9 @@ class GimbalNode:
             self._publish_attitude(event)
             return
         name = f'gimbal {event.key}'
-        if isinstance(event, events.GimbalConnected):
-            self._log.info(f'{name} connected, manager {event.manager}', 'connection')
-            self._interface.publish('connected', True)
-        elif isinstance(event, events.GimbalLost):
-            self._log.warning(f'{name} lost: {event.reason}', 'connection')
-            self._interface.publish('connected', False)
-        elif isinstance(event, events.ControlChanged):
+        publish_event(event, 'gimbal', self._log, self._interface)
+        if isinstance(event, events.ControlChanged):
             self._control_changed(name, event)
-        elif isinstance(event, events.GimbalHeld):
-            self._log.info(f'{name} {describe(event.change)}', 'holder')
-            self._interface.publish('source', event.change.after or '')
         elif isinstance(event, events.SecondManager):
             self._log.warning(
                 f'manager {event.other} announces {name} too: only {event.manager} is used, but '
@@ -312,5 +305,5 @@ class GimbalNode:
             reports, gimbal=gimbal.snapshot(now) if gimbal else None,
             heard=self._heard(now), without_id=self._client.managers_without_id(now),
             known=self._why_none(),
-            limit_reached=self._client.limit_reached,
+            limit_reached=self._client.discovery.limit_reached,
             interval=self._client.settings.attitude_interval, started=self._started)

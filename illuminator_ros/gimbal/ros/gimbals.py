@@ -24,14 +24,15 @@ import re
 from .conversions import FRAME_PARAMETERS
 from .gimbal_node import GimbalNode
 from ..client import GimbalClient
-from ..events import GimbalConnected, GimbalEvent, GimbalForgotten, GimbalKey
+from ..events import GimbalEvent, GimbalKey
 from ..gimbal import GimbalSettings
 from ..setpoint_mixer import STEP_LIMIT
 from ...payload.confirmed_command import Result
+from ...payload.device_events import DeviceConnected
 from ...ros.command_sources import SOURCE_PARAMETERS, source_settings
 from ...ros.conversions import GEOID_SEPARATION
 from ...ros.device_nodes import DeviceNodes
-from ...ros.parameters import ChangeableParameters, ParameterSpec, Values
+from ...ros.parameters import by_name, ChangeableParameters, ParameterSpec, Values
 from ...ros.payload import Host, RosPayload, ServedPayload, ShutdownReport
 from ...ros.transforms import PUBLISH_TF, TransformPublisher
 
@@ -57,9 +58,8 @@ def settings(values: Values) -> GimbalSettings:
 
     :raises ParameterError: if the sources are wrong.
     """
-    return GimbalSettings(values['setpoint_timeout'], values['attitude_interval'],
-                          values['auto_take_control'], values['gimbal_device_id'],
-                          source_settings(values))
+    return by_name(GimbalSettings, values, device_id=values['gimbal_device_id'],
+                   sources=source_settings(values))
 
 
 class Gimbals(ServedPayload):
@@ -90,14 +90,10 @@ class Gimbals(ServedPayload):
         self._client.change_settings(settings(values), now)
 
     def _take(self, event: GimbalEvent) -> None:
-        if isinstance(event, GimbalForgotten):
-            self._nodes.forget(event.key)
-        elif node := self._nodes.get(event.key):
-            node.take(event)
-        elif isinstance(event, GimbalConnected):
+        if not self._nodes.take(event) and isinstance(event, DeviceConnected):
             self._serve(event)
 
-    def _serve(self, event: GimbalConnected) -> None:
+    def _serve(self, event: DeviceConnected[GimbalKey]) -> None:
         """Give a gimbal a node: the first node, or a new one."""
         key, nodes = event.key, self._nodes
         if nodes.first_is_free and self._host.values['gimbal_device_id'] in (0, key.device_id):

@@ -43,7 +43,7 @@ from ...ros.conversions import quaternion_message, read_orientation, read_quater
 from ...ros.diagnostics import ERROR, Finding, LinkDiagnostics, Report, Value, WARN
 from ...ros.diagnostics_publisher import DiagnosticsSource, MakeReports
 from ...ros.node import AnyCommand, CommandTopic, Endpoint, NodeInterface
-from ...ros.parameters import ParameterError, ParameterSpec, Values
+from ...ros.parameters import by_name, ParameterError, ParameterSpec, Values
 from ...ros.payload import Host, RosPayload, ServedPayload, ShutdownReport
 from ...ros.qos import STREAM_QOS
 
@@ -85,7 +85,7 @@ MANAGER_PARAMETERS = (
 
 # The values of the status of the manager, with their meanings for the pages.
 MANAGER_VALUES = {
-    'state': '[no device, listening, active or inactive](#one-manager-for-one-gimbal)',
+    'state': '[no device, listening, active or inactive](details.md#one-manager-for-one-gimbal)',
     'gimbal_device_id': 'of the device',
     'policy': 'as the parameter',
     **dict.fromkeys((f'{role.value}_control' for role in Role),
@@ -128,12 +128,12 @@ def manager_settings(values: Values, ros: Address) -> ManagerSettings:
         if low > high:
             raise ParameterError(f'{axis}_min: {low} rad is above {axis}_max: {high} rad')
         ranges.append(other_signs(axis, Range(low, high)))
-    roll, pitch, yaw = ranges
-    return ManagerSettings(
-        ControlSettings(
-            Policy(values['policy']), _players(values, 'priority', ros),
-            frozenset(_players(values, 'overruling', ros)), values['lease']),
-        values['gimbal_device_id'], values['nudge_limit'], (roll, pitch, yaw))
+    return by_name(
+        ManagerSettings, values, device_id=values['gimbal_device_id'], ranges=tuple(ranges),
+        control=by_name(
+            ControlSettings, values, policy=Policy(values['policy']),
+            priority=_players(values, 'priority', ros),
+            overruling=frozenset(_players(values, 'overruling', ros))))
 
 
 class ManagerNode(ServedPayload):

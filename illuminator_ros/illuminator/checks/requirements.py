@@ -454,10 +454,9 @@ def _judge(seen: list[Status], seconds: float) -> str:
 
 # All requirements
 
-REQUIREMENTS: tuple[Requirement[LightSession], ...] = (
-    component.heartbeat, component.heartbeat_type(
-        mavlink.MAV_TYPE_ILLUMINATOR, 'ILLUMINATOR', 'an illuminator'),
-    component.heartbeat_autopilot, component.address,
+OWN: tuple[Requirement[LightSession], ...] = (
+    component.heartbeat_type(mavlink.MAV_TYPE_ILLUMINATOR, 'ILLUMINATOR', 'an illuminator'),
+    component.heartbeat_autopilot,
     component.status_stream(
         IlluminatorStatus, ILLUMINATOR, 'Message/Command/Enum Summary', optional=True),
     component.sent_on_request(
@@ -467,16 +466,13 @@ REQUIREMENTS: tuple[Requirement[LightSession], ...] = (
         'information-request', ComponentInformationBasic, ILLUMINATOR,
         'COMPONENT_INFORMATION_BASIC', lambda session: session.identity or 'no names'),
     *component.IDENTITY_STRINGS,
-    component.unknown_command, component.unknown_message, component.broadcast(IlluminatorStatus),
     other_target, on_configuration, configure_switch, command_int, repeated,
     on, off, on_off_values,
     internal, external, mode_values,
     brightness, brightness_values, *STROBE, not_a_number,
-    *component.interval_requirements(IlluminatorStatus),
-    thermal,
-    component.heartbeat_rate, component.uptime(IlluminatorStatus, 'uptime_ms'),
-    *component.ACKNOWLEDGEMENTS, agrees, unchanged, component.checksums,
+    thermal, component.uptime(IlluminatorStatus, 'uptime_ms'), agrees, unchanged,
 )
+REQUIREMENTS = component.with_common(OWN, IlluminatorStatus)
 CHECKS: PayloadChecks[LightSession] = PayloadChecks(
     payload='illuminator', device='light', session=LightSession, requirements=REQUIREMENTS,
     evidence='HEARTBEAT with MAV_TYPE_ILLUMINATOR or ILLUMINATOR_STATUS',

@@ -30,7 +30,7 @@ from ..model import (
     unexpected_differences,
 )
 from ...mavlink.dialect import mavlink
-from ...mavlink.messages import ComponentInformationBasic, Heartbeat, Message
+from ...mavlink.messages import ComponentInformationBasic, Message
 from ...payload.checks.component_requirements import restore_interval
 from ...payload.checks.outcomes import Failed, Skipped
 from ...payload.checks.requirement import NOT_AGREED
@@ -110,6 +110,7 @@ class LightSession(Session):
     """
 
     messages = (*Session.messages, IlluminatorStatus, ComponentInformationBasic)
+    mav_type = mavlink.MAV_TYPE_ILLUMINATOR
 
     def __init__(self, conditions: Conditions) -> None:
         super().__init__(conditions)
@@ -121,8 +122,7 @@ class LightSession(Session):
 
     def is_device(self, message: Message) -> bool:
         """See :class:`Session`."""
-        return isinstance(message, IlluminatorStatus) or (
-            isinstance(message, Heartbeat) and message.type == mavlink.MAV_TYPE_ILLUMINATOR)
+        return isinstance(message, IlluminatorStatus) or super().is_device(message)
 
     # Commands and statuses
 

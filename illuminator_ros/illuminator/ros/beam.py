@@ -24,8 +24,9 @@ import time
 from rclpy.node import Node
 
 from .parameters import BeamGeometry
-from ..events import LightEvent, LightLost, StatusReceived
+from ..events import LightEvent, StatusReceived
 from ..model import Mode, Status
+from ...payload.device_events import DeviceDisconnected
 from ...payload.rotation import Quaternion
 from ...ros.node import Endpoint
 from ...ros.qos import STATE_QOS
@@ -185,7 +186,7 @@ class BeamPublisher:
         if isinstance(event, StatusReceived):
             self.device_id = self._mounted_on or event.status.gimbal_device_id
             self._show(self._beam.updated(event.status))
-        elif isinstance(event, LightLost):
+        elif isinstance(event, DeviceDisconnected):
             self._show(replace(self._beam, on=False))
 
     def poll(self) -> None:

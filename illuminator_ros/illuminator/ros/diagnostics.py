@@ -133,7 +133,7 @@ def why_no_light(link: diagnostics.LinkDiagnostics, heard: LightsHeard) -> str:
                 'ILLUMINATOR_STATUS so far: check the line to it, and whether it requires signed '
                 'messages')
     return (f'none heard yet on {link.names}: '
-            + diagnostics.why_nothing_is_heard(link, 'an illuminator'))
+            + diagnostics.why_nothing_is_heard(link, 'a light'))
 
 
 def reports(

@@ -29,7 +29,9 @@ from .parameters import device_parameters
 from .. import events, model
 from ...mavlink.dialect import mavlink
 from ...mavlink.messages import Address
-from ...payload.command_sources import DEFAULT, describe
+from ...payload.command_sources import DEFAULT
+from ...payload.device_events import DeviceConnected, DeviceDisconnected, DeviceHeld
+from ...ros.device_events import publish_event
 from ...ros.diagnostics import ERROR, WARN
 from ...ros.node import Endpoint, NodeInterface
 from ...ros.parameters import DeviceParameters
@@ -56,7 +58,7 @@ PUBLICATIONS = (
              'its sensor failed', STREAM_QOS),
 )
 # Events that may change a level.
-_DIAGNOSED = (events.LightConnected, events.LightLost, events.LightIdentified, events.LightHeld,
+_DIAGNOSED = (DeviceConnected, DeviceDisconnected, events.LightIdentified, DeviceHeld,
               events.StatesChanging, events.ConfigurationChanged, events.ConfigurationRestored,
               events.LimitExceeded)
 ON_OFF = mavlink.MAV_CMD_ILLUMINATOR_ON_OFF
@@ -109,16 +111,11 @@ class EventPublisher:
         if isinstance(event, events.StatusReceived):
             self._status_received(event)
             return
-        log, light = self._log, f'light {event.address}'
+        log, light = self._log, f'light {event.key}'
+        publish_event(event, 'light', log, self._interface)
         match event:
-            case events.LightConnected():
-                log.info(f'{light} connected', 'connection')
-                self._interface.publish('connected', True)
-            case events.LightLost(reason=reason):
-                log.warning(f'{light} lost: {reason}', 'connection')
-                self._interface.publish('connected', False)
             case events.StatesChanging(is_changing=True):
-                log.warning(f'{changing_states(event.address)}; parameters stay as they are '
+                log.warning(f'{changing_states(event.key)}; parameters stay as they are '
                             'meanwhile', 'changing')
             case events.LightRestarted(was_on=was_on, is_on=is_on):
                 log.info(f'{light} has restarted', 'restart')
@@ -131,12 +128,10 @@ class EventPublisher:
                 serial = identity.serial_number and f', serial number {identity.serial_number}'
                 log.info(f'{light} is {known or "nameless"}{serial}', 'identity')
             case events.LightSwitched(on=on, origin=origin):
-                by = self._by(event.address, ON_OFF, on) if origin == events.OTHER_SENDER else ''
+                by = self._by(event.key, ON_OFF, on) if origin == events.OTHER_SENDER else ''
                 log.info(f'{light} was switched {_state(on)} by {origin}{by}', 'switched')
-            case events.LightHeld(change=change):
-                log.info(f'{light} {describe(change)}', 'holder')
+            case DeviceHeld(change=change):
                 self._source = f'{change.after}/' if change.after not in (None, DEFAULT) else ''
-                self._interface.publish('source', change.after or '')
             case events.DesiredStateFailed(source=source, message=message):
                 log.warning(f'{light} does not have the state that {source} requested: {message}',
                             'desired')
@@ -193,18 +188,18 @@ class EventPublisher:
             self._strobe_range = event.status.strobe_range
             self._fit()
         for level, text in self._flags.take(event.status.error_flags, event.received_at):
-            self._log.write(_SEVERITIES.get(level, logging.INFO), f'light {event.address}: {text}',
+            self._log.write(_SEVERITIES.get(level, logging.INFO), f'light {event.key}: {text}',
                             'flags')
         self._check_diagnostics()
 
     def _configuration_changed(self, event: events.ConfigurationChanged) -> None:
         configuration, names = event.configuration, event.names
         if event.cause is events.ChangeCause.LIGHT:
-            by = self._by(event.address, CONFIGURE)
-            self._log.info(f'light {event.address} was changed: {configuration.describe(names)}'
+            by = self._by(event.key, CONFIGURE)
+            self._log.info(f'light {event.key} was changed: {configuration.describe(names)}'
                            f'{by and " by"}{by}', 'changed')
         elif event.cause is events.ChangeCause.LATE_EFFECT:
-            self._log.info(f'light {event.address}: {configuration.describe(names)}, '
+            self._log.info(f'light {event.key}: {configuration.describe(names)}, '
                            f'{events.LATE_EFFECT}', 'changed')
         self._parameters.show({name: _value(configuration, name) for name in names})
 

@@ -31,6 +31,7 @@ from ..light import Light
 from ...mavlink.command_sender import CommandSender
 from ...mavlink.messages import Address
 from ...payload.confirmed_command import Done, Result
+from ...payload.device_events import DeviceConnected
 from ...ros.device_nodes import DeviceNodes
 from ...ros.node import Answer, CommandTopic, Endpoint, RequestService, SWITCH_QOS
 from ...ros.parameters import ChangeableParameters, Values
@@ -85,16 +86,12 @@ class Lights(ServedPayload):
                 node.mount_moved()
 
     def _take(self, event: events.LightEvent) -> None:
-        node = self._nodes.get(event.address)
-        if isinstance(event, events.LightForgotten):
-            self._nodes.forget(event.address)
-        elif node is not None:
-            if isinstance(event, events.LightRestarted):
-                # Its sequence numbers have restarted, which is not a loss.
-                self._host.link.lines.reset_loss(event.address)
-            node.take(event)
-        elif isinstance(event, events.LightConnected | events.StatusReceived):
-            self._serve(event.address)
+        if isinstance(event, events.LightRestarted):
+            # Its sequence numbers have restarted, which is not a loss.
+            self._host.link.lines.reset_loss(event.key)
+        if not self._nodes.take(event) and isinstance(
+                event, DeviceConnected | events.StatusReceived):
+            self._serve(event.key)
 
     def _serve(self, address: Address) -> None:
         """Give a light a node: the first node, or a node of its own."""

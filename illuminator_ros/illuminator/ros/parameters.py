@@ -30,6 +30,7 @@ from ..model import MAX_STROBE_PERIOD, MODES, SafetyLimits
 from ...mavlink.messages import Address
 from ...ros.command_sources import SOURCE_PARAMETERS, source_settings
 from ...ros.parameters import (
+    by_name,
     declare_given,
     ParameterError,
     ParameterSpec,
@@ -127,10 +128,8 @@ def settings(values: Values) -> Settings:
     sources, off = source_settings(values), values['on_release'] == 'off'
     if off and sources is None:
         raise ParameterError('on_release: is given, but sources is empty')
-    return Settings(values['heartbeat_timeout'], values['status_interval'],
-                    values['restore_configuration'],
-                    SafetyLimits(values['max_brightness'], values['min_strobe_period']),
-                    values['off_after_silence'], sources, off)
+    return by_name(Settings, values, limits=by_name(SafetyLimits, values), sources=sources,
+                   off_on_release=off)
 
 
 def check_not_loosened(values: Values, start: Values) -> None:

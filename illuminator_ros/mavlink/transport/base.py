@@ -158,6 +158,14 @@ class Channel(ABC):
         """Return when :meth:`forward_more` is due, infinity if never."""
         return math.inf
 
+    def change_rate(self, baud: int) -> None:
+        """
+        Change the rate of a serial port.
+
+        :raises OSError: if the port does not have this rate, or the channel no rate.
+        """
+        raise OSError(f'{self.name} has no baud rate')
+
     @abstractmethod
     def close(self) -> None:
         """Close it; a second call has no effect."""

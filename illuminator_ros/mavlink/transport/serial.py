@@ -28,6 +28,7 @@ import re
 import struct
 import termios
 import tty
+from typing import Any
 
 from .base import Channel, Peer, StreamChannel
 from ..url import MAVROS_BAUD, PtyUrl, SerialUrl
@@ -36,7 +37,7 @@ from ..url import MAVROS_BAUD, PtyUrl, SerialUrl
 BITS_PER_BYTE = 10
 # Why a port cannot be opened, where the system's own text is wrong or has no remedy.
 REASONS = {
-    errno.EAGAIN: 'it is in use by another program',
+    **dict.fromkeys((errno.EAGAIN, errno.EBUSY), 'it is in use by another program'),
     errno.ENOTTY: 'it is not a serial port',
     errno.EACCES: 'no permission; join its group, as in "sudo usermod -a -G dialout $USER", and '
                   'log in again',
@@ -74,9 +75,7 @@ def open_serial(url: SerialUrl) -> Channel:
     # FTDI adapters delay bytes by 16 ms otherwise; not every driver supports this.
     with contextlib.suppress(OSError, ValueError, AttributeError):
         port.set_low_latency_mode(True)
-    return _LineChannel(
-        port.fileno(), f'serial {url.device} at {url.baud} baud', port.close,
-        rate=url.baud / BITS_PER_BYTE)
+    return _SerialChannel(url, port)
 
 
 def open_pty(url: PtyUrl) -> Channel:
@@ -146,3 +145,22 @@ class _LineChannel(StreamChannel):
             termios.tcflush(self._descriptor, termios.TCOFLUSH)
         with contextlib.suppress(OSError):
             self._close()
+
+
+class _SerialChannel(_LineChannel):
+
+    def __init__(self, url: SerialUrl, port: Any) -> None:
+        # pyserial has no types.
+        self._url, self._port = url, port
+        super().__init__(port.fileno(), f'serial {url.device} at {url.baud} baud', port.close,
+                         rate=url.baud / BITS_PER_BYTE)
+
+    def change_rate(self, baud: int) -> None:
+        """See :meth:`Channel.change_rate`. DTR stays: some boards restart when it is raised."""
+        try:
+            self._port.baudrate = baud
+            termios.tcflush(self._descriptor, termios.TCIFLUSH)
+        except (ValueError, OSError, termios.error) as error:
+            raise OSError(f'{self._url.device} has no {baud} baud: {error}') from None
+        self.name = f'serial {self._url.device} at {baud} baud'
+        self.rate = baud / BITS_PER_BYTE

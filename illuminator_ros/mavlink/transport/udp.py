@@ -32,9 +32,9 @@ MAX_PEERS = 32
 # s without a checked frame until a peer is dropped; MAVSDK has 10 s too.
 PEER_EXPIRY = 10.0
 # Datagrams and bytes read before other work is done. The worst bytes take a microsecond each, so
-# that unbounded garbage would delay everything else for seconds.
+# that unbounded garbage would delay everything else for seconds, and more bytes an OFF by ms.
 BATCH = 128
-BATCH_SIZE = 64 * 1024
+BATCH_SIZE = 4 * 1024
 # Bytes of frames in one datagram, so that Ethernet does not fragment it.
 MAX_DATAGRAM = 1400
 # Bytes; a burst of a flight controller must fit. The kernel may grant less.

@@ -23,7 +23,7 @@ import math
 from statistics import median_high
 
 from .outcomes import fail_if, Failed, Skipped
-from .requirement import Requirement, requirement
+from .requirement import Requirement, requirement, T
 from .session import REJECTIONS, Session, Transaction
 from .specifications import COMMAND, HEARTBEAT, MESSAGES, ROUTING, SERIALIZATION, Specification
 from ...mavlink.dialect import mavlink, raw
@@ -118,7 +118,7 @@ async def unknown_message(session: Session) -> str:
     return one.answer
 
 
-def broadcast(status: type[Message]) -> Requirement[Session]:
+def _broadcast(status: type[Message]) -> Requirement[Session]:
     """Return the requirement on broadcast commands; the command requests the status."""
     @requirement('broadcast', 'answers commands that are broadcast to its system and to all '
                  'systems', ROUTING, 'Routing Detail')
@@ -222,7 +222,7 @@ def status_stream(
     return check
 
 
-def interval_requirements(status: type[Message]) -> tuple[Requirement[Session], ...]:
+def _interval_requirements(status: type[Message]) -> tuple[Requirement[Session], ...]:
     """
     Return the requirements ``interval``, ``interval-stop`` and ``interval-default``.
 
@@ -398,7 +398,7 @@ def _busy(one: Transaction, own: Address) -> str:
             if one.rejections == REJECTIONS else '')
 
 
-ACKNOWLEDGEMENTS = (
+_ACKNOWLEDGEMENTS = (
     _for_each_command('acknowledged', 'acknowledges every command at the first attempt',
                       'COMMAND_LONG sequence', _not_at_first),
     _for_each_command('acknowledged-once', 'acknowledges every command once',
@@ -421,3 +421,20 @@ async def checksums(session: Session) -> None:
     """Count the frames that the link has dropped; noise on a serial line counts, too."""
     if count := session.conditions.checksum_errors():
         raise Failed(f'{count} {"frame" if count == 1 else "frames"} with a wrong checksum')
+
+
+# All of them
+
+def with_common(
+    own: Sequence[Requirement[T]], status: type[Message], requested: type[Message] | None = None,
+) -> tuple[Requirement[T], ...]:
+    """
+    Return the requirements on a device that takes commands: its own, and those on any component.
+
+    :param status: the message that it streams.
+    :param requested: a message that it sends on request; by default the status.
+    """
+    return (
+        heartbeat, address, unknown_command, unknown_message, _broadcast(requested or status),
+        *(one for one in own if not one.whole_run), *_interval_requirements(status),
+        heartbeat_rate, *(one for one in own if one.whole_run), *_ACKNOWLEDGEMENTS, checksums)

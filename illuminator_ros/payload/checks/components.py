@@ -20,18 +20,13 @@ from collections.abc import Collection
 import math
 
 from .outcomes import Skipped
+from ..component_kinds import listed
 from ...mavlink.messages import Address
-
-# The most addresses that are named in one text.
-MAX_NAMED = 8
 
 
 def names(addresses: Collection[Address]) -> str:
     """Return addresses as text, the first few by name."""
-    *most, last = [str(one) for one in sorted(addresses)[:MAX_NAMED]]
-    if len(addresses) > MAX_NAMED:
-        most, last = [*most, last], f'{len(addresses) - MAX_NAMED} more'
-    return f'{", ".join(most)} and {last}' if most else last
+    return listed([str(one) for one in sorted(addresses)])
 
 
 class Components:

@@ -20,7 +20,6 @@ Its coroutines take no real time in a run against a simulated device.
 
 from __future__ import annotations
 
-from abc import abstractmethod
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 import math
@@ -164,6 +163,7 @@ class Session(Endpoint):
     which a component handles or drops.
 
     :cvar messages: the classes of messages that it receives.
+    :cvar mav_type: MAV_TYPE of the device, None for any.
     :cvar component: the component id that alone identifies a device, see :class:`Components`.
     :cvar discovery: a message that is requested of all components until the device is found.
     :ivar consent: whether the operator has agreed to the checks that need consent.
@@ -174,6 +174,7 @@ class Session(Endpoint):
     """
 
     messages: Sequence[type[Message]] = (Heartbeat, CommandAck)
+    mav_type: ClassVar[int | None] = None
     component: ClassVar[int | None] = None
     discovery: ClassVar[type[Message] | None] = None
 
@@ -193,9 +194,9 @@ class Session(Endpoint):
 
     # A payload overrides these
 
-    @abstractmethod
     def is_device(self, message: Message) -> bool:
         """Return whether a message identifies its sender as a device of this payload."""
+        return isinstance(message, Heartbeat) and self.mav_type in (None, message.type)
 
     def is_part(self, source: Address) -> bool:
         """Return whether a component is a part of the device, which sends messages for it."""

@@ -38,13 +38,7 @@ from .diagnostics import (
     why_unused,
 )
 from .inputs import subscriptions
-from ..client import (
-    CameraConnected,
-    CameraEvent,
-    CameraLost,
-    ImageTaken,
-    RedEdgeClient,
-)
+from ..client import CameraEvent, ImageTaken, RedEdgeClient
 from ..conversions import fixed_mount, image_attitude, image_position, MountFrame, MountParent
 from ..input_states import (
     Input,
@@ -58,11 +52,13 @@ from ...mavlink.command_sender import CommandSender
 from ...mavlink.dialect import mavlink
 from ...payload.rotation import Vector
 from ...ros.conversions import GEOID_SEPARATION, quaternion_message
+from ...ros.device_events import publish_event
 from ...ros.device_nodes import ABSENCE_DELAY
 from ...ros.diagnostics_publisher import DiagnosticsSource, MakeReports
 from ...ros.node import Answer, Endpoint, NodeInterface, RequestService
 from ...ros.parameter_services import ParameterServices
 from ...ros.parameters import (
+    by_name,
     ChangeableParameters,
     DeviceParameters,
     given_parameters,
@@ -269,15 +265,10 @@ class CameraNode(ServedPayload):
     # Events
 
     def _take(self, event: CameraEvent) -> None:
-        log = self._host.log
         if isinstance(event, ImageTaken):
             self._publish(event.feedback)
-        elif isinstance(event, CameraConnected):
-            log.info(f'camera {event.address} connected', 'camera')
-            self._interface.publish('connected', True)
-        elif isinstance(event, CameraLost):
-            log.warning(f'camera {event.address} lost: {event.reason}', 'camera')
-            self._interface.publish('connected', False)
+        else:
+            publish_event(event, 'camera', self._host.log, self._interface)
         self._host.check_diagnostics()
 
     def _publish(self, feedback: CameraFeedback) -> None:
@@ -315,10 +306,9 @@ def _angles(values: Values) -> Vector:
 def _make_client(commands: CommandSender, values: Values) -> RedEdgeClient:
     if commands.address.component == mavlink.MAV_COMP_ID_CAMERA:
         raise ParameterError(f'component_id: {mavlink.MAV_COMP_ID_CAMERA} is the id of the camera')
-    return RedEdgeClient(commands, Settings(
-        PositionSource(values['position_source']), values['geoid_separation'],
-        MountFrame(values['mount_frame']), values['attitude_rate'], values['position_timeout'],
-        values['attitude_timeout'], values['send_gps_status'], values['heartbeat_timeout']))
+    return RedEdgeClient(commands, by_name(
+        Settings, values, position_source=PositionSource(values['position_source']),
+        mount_frame=MountFrame(values['mount_frame'])))
 
 
 REDEDGE = RosPayload(

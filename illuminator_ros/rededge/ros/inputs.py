@@ -22,7 +22,8 @@ import math
 import time
 from typing import Any
 
-from geometry_msgs.msg import QuaternionStamped, TwistStamped
+from geometry_msgs.msg import QuaternionStamped, TwistStamped, TwistWithCovarianceStamped
+from nav_msgs.msg import Odometry
 from rclpy.clock import JumpThreshold, TimeJump
 from rclpy.duration import Duration
 from rclpy.node import Node
@@ -48,7 +49,11 @@ TOPICS = {
         (Input.FIX, NavSatFix,
          'required: position; its altitude is above the WGS84 ellipsoid'),
         (Input.VELOCITY, TwistStamped,
-         'velocity of the vehicle, ENU; required with `position_source: fused` only'),
+         'velocity of the vehicle, ENU; one is required with `position_source: fused` only'),
+        (Input.VELOCITY_WITH_COVARIANCE, TwistWithCovarianceStamped,
+         'the same, used while no `~/velocity` comes'),
+        (Input.ODOMETRY, Odometry, 'its velocity, used while neither of these comes; its pose is '
+         'in ENU, its twist in the axes of the body. Its position is not used'),
         (Input.SATELLITES, UInt32, 'number of satellites'),
         (Input.IMU, Imu, 'required, or `~/attitude`: orientation of `base_link` (FLU) in ENU, and '
          'its rates'),
@@ -124,7 +129,14 @@ def subscriptions(node: Node, link: Link, feeder: Feeder) -> Iterable[AnyCommand
 
     return (
         topic(Input.FIX, lambda one: (position(one),), feeder.take_fix),
-        topic(Input.VELOCITY, lambda one: (read_vector(one.twist.linear),), feeder.take_velocity),
+        topic(Input.VELOCITY, lambda one: (read_vector(one.twist.linear),),
+              functools.partial(feeder.take_velocity, Input.VELOCITY)),
+        topic(Input.VELOCITY_WITH_COVARIANCE, lambda one: (read_vector(one.twist.twist.linear),),
+              functools.partial(feeder.take_velocity, Input.VELOCITY_WITH_COVARIANCE)),
+        topic(Input.ODOMETRY, lambda one: (
+                  read_vector(one.twist.twist.linear), read_quaternion(one.pose.pose.orientation)),
+              lambda velocity, body, stamp, now: feeder.take_velocity(
+                  Input.ODOMETRY, velocity, stamp, now, body)),
         CommandTopic(TOPICS[Input.SATELLITES], feeder.take_satellites),
         topic(Input.IMU, orientation_and_rates,
               functools.partial(feeder.orientation.take_attitude, Input.IMU)),

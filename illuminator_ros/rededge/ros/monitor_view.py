@@ -26,7 +26,8 @@ from ...ros import monitor_view as shared
 from ...ros.monitor_view import Device, Topic, trigger_key, UNKNOWN
 
 # The inputs, as /diagnostics names them, and the styles of their states.
-INPUTS = ('fix', 'velocity', 'satellites', 'imu', 'attitude', 'mount', 'time_reference')
+INPUTS = ('fix', 'velocity', 'velocity_with_covariance', 'odometry', 'satellites', 'imu',
+          'attitude', 'mount', 'time_reference')
 STYLES = {'ok': 'green', 'missing': 'yellow', 'stale': 'yellow', 'refused': 'bold red'}
 
 

@@ -1,0 +1,119 @@
+# Copyright 2026 The illuminator_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""A search: a light on a gimbal shines in one direction after the other, then goes off."""
+
+import math
+import signal
+import sys
+import time
+from typing import Any
+
+from geometry_msgs.msg import Vector3, Vector3Stamped
+import rclpy
+from rclpy.node import Node
+from rclpy.qos import DurabilityPolicy, QoSProfile
+from rclpy.signals import SignalHandlerOptions
+from std_msgs.msg import Bool, Float32, Header
+from std_srvs.srv import SetBool, Trigger
+
+# Change these: the nodes, the brightness, %, the directions (degrees down, degrees left), and s
+# at each of them.
+LIGHT, GIMBAL = '/illuminator', '/gimbal'
+BRIGHTNESS = 40.0
+PATTERN = [(20, 40), (20, 0), (20, -40), (40, -40), (40, 0), (40, 40)]
+DWELL = 2.0
+
+FRAME = 'base_link_stabilized'
+STATE = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
+
+
+class Search(Node):
+
+    def __init__(self) -> None:
+        super().__init__('search_pattern')
+        self.in_control, self.angles, self.is_stopped = False, Vector3Stamped(), False
+        self.setpoint = self.create_publisher(Vector3Stamped, f'{GIMBAL}/cmd/angles', 10)
+        self.brightness = self.create_publisher(Float32, f'{LIGHT}/cmd/brightness', 10)
+        # Repeated, so that off_after_silence of the bridge ends the light with this program.
+        self.create_timer(0.5, lambda: self.brightness.publish(Float32(data=BRIGHTNESS)))
+        self.create_subscription(Vector3Stamped, f'{GIMBAL}/angles', self.take_angles, 10)
+        self.create_subscription(Bool, f'{GIMBAL}/in_control', self.take_control, STATE)
+
+    def take_angles(self, message: Vector3Stamped) -> None:
+        self.angles = message
+
+    def take_control(self, message: Bool) -> None:
+        self.in_control = message.data
+
+    def stop(self, *signal_and_frame: object) -> None:
+        self.is_stopped = True
+
+    def call(self, type_: Any, name: str, **request: bool) -> None:
+        client = self.create_client(type_, name)
+        if not client.wait_for_service(10.0):
+            sys.exit(f'{name}: no such service')
+        # The answer to the first call of a client may be lost.
+        for _ in range(3):
+            answer = client.call_async(type_.Request(**request))
+            rclpy.spin_until_future_complete(self, answer, timeout_sec=4.0)
+            if result := answer.result():
+                break
+        if not result or not result.success:
+            sys.exit(f'{name} failed: {result.message if result else "no answer"}')
+
+    def spin_for(self, seconds: float) -> None:
+        end = time.monotonic() + seconds
+        while time.monotonic() < end:
+            rclpy.spin_once(self, timeout_sec=0.1)
+            if self.is_stopped:
+                sys.exit()
+            if not self.in_control:
+                sys.exit('another component has taken the gimbal')
+
+    def look(self, down: float, left: float) -> None:
+        wanted = Vector3(y=math.radians(down), z=math.radians(left))
+        for _ in range(20):
+            self.setpoint.publish(Vector3Stamped(header=Header(frame_id=FRAME), vector=wanted))
+            self.spin_for(0.5)
+            at = self.angles.vector
+            # A gimbal may report its yaw in another frame; then only the pitch can be compared.
+            yaw_error = at.z - wanted.z if self.angles.header.frame_id == FRAME else 0.0
+            if max(abs(at.y - wanted.y), abs(yaw_error)) < math.radians(2):
+                return
+        sys.exit(f'the gimbal does not reach {down} degrees down, {left} left')
+
+
+def main() -> None:
+    # By default Ctrl-C ends ROS, and the light could not be switched off any more.
+    rclpy.init(signal_handler_options=SignalHandlerOptions.NO)
+    search = Search()
+    for number in (signal.SIGINT, signal.SIGTERM):
+        signal.signal(number, search.stop)
+    try:
+        search.call(Trigger, f'{GIMBAL}/take_control')
+        while not search.in_control:
+            rclpy.spin_once(search)
+        search.look(*PATTERN[0])
+        search.call(SetBool, f'{LIGHT}/enable', data=True)
+        for direction in PATTERN:
+            search.look(*direction)
+            search.spin_for(DWELL)
+    finally:
+        search.call(SetBool, f'{LIGHT}/enable', data=False)
+        search.call(Trigger, f'{GIMBAL}/release_control')
+
+
+if __name__ == '__main__':
+    main()

@@ -1,0 +1,85 @@
+# Copyright 2026 The illuminator_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""A survey: an image each 10 m of flight, and a list of the places where they were taken."""
+
+import contextlib
+import csv
+import math
+from typing import TextIO
+
+import rclpy
+from rclpy.executors import ExternalShutdownException
+from rclpy.node import Node
+from rclpy.qos import qos_profile_sensor_data
+from rclpy.task import Future
+from sensor_msgs.msg import NavSatFix, NavSatStatus
+from std_srvs.srv import Trigger
+
+# Change these: the camera's node, the vehicle's position, m between images, the list.
+CAMERA, FIX = '/rededge', '/gps/fix'
+DISTANCE = 10.0
+LIST = 'images.csv'
+
+# m
+EARTH_RADIUS = 6_371_000.0
+
+
+def distance(one: NavSatFix, other: NavSatFix) -> float:
+    north = math.radians(other.latitude - one.latitude)
+    east = math.radians(other.longitude - one.longitude) * math.cos(math.radians(one.latitude))
+    return math.hypot(north, east) * EARTH_RADIUS
+
+
+class Survey(Node):
+
+    def __init__(self, file: TextIO) -> None:
+        super().__init__('survey')
+        self.last: NavSatFix | None = None
+        self.file, self.rows = file, csv.writer(file)
+        self.rows.writerow(['time_s', 'latitude_deg', 'longitude_deg', 'altitude_m'])
+        self.capture = self.create_client(Trigger, f'{CAMERA}/capture')
+        self.create_subscription(NavSatFix, f'{CAMERA}/image/fix', self.take_image, 10)
+        self.create_subscription(NavSatFix, FIX, self.take_fix, qos_profile_sensor_data)
+
+    def take_fix(self, fix: NavSatFix) -> None:
+        near = self.last is not None and distance(self.last, fix) < DISTANCE
+        has_fix = fix.status.status >= NavSatStatus.STATUS_FIX
+        if has_fix and not near and self.capture.service_is_ready():
+            self.last = fix
+            self.capture.call_async(Trigger.Request()).add_done_callback(self.take_answer)
+
+    def take_answer(self, answer: Future) -> None:
+        if not answer.result().success:
+            self.get_logger().error(
+                f'no image: {answer.result().message}', throttle_duration_sec=1.0)
+            # The next fix triggers the camera again.
+            self.last = None
+
+    def take_image(self, fix: NavSatFix) -> None:
+        stamp = fix.header.stamp
+        self.rows.writerow([f'{stamp.sec}.{stamp.nanosec // 1_000_000:03}', f'{fix.latitude:.7f}',
+                            f'{fix.longitude:.7f}', f'{fix.altitude:.1f}'])
+        self.file.flush()
+
+
+def main() -> None:
+    rclpy.init()
+    with (contextlib.suppress(KeyboardInterrupt, ExternalShutdownException),
+          open(LIST, 'w', newline='') as file):
+        rclpy.spin(Survey(file))
+
+
+if __name__ == '__main__':
+    main()

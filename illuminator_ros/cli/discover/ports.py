@@ -1,0 +1,71 @@
+# Copyright 2026 The illuminator_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""The serial ports of this machine, from /sys, and the users of a port, from /proc."""
+
+from __future__ import annotations
+
+import contextlib
+import os
+from pathlib import Path
+
+from ...mavlink.url import SerialUrl, UdpUrl, Url
+
+# The longest command line of a program that is shown, characters.
+MAX_COMMAND = 80
+PTY_MAKERS = {'/dev/ptmx', '/dev/pts/ptmx'}
+
+
+def _read(path: Path) -> str:
+    with contextlib.suppress(OSError):
+        return path.read_text(errors='replace').strip()
+    return ''
+
+
+def serial_ports(root: Path = Path('/')) -> dict[str, bool]:
+    """Return the serial ports by their stable names, and whether each is the system's console."""
+    consoles = _read(root / 'sys/class/tty/console/active').split()
+    stable = {os.path.realpath(link): str(link)
+              for link in sorted((root / 'dev/serial/by-id').glob('*'))}
+    ports = {}
+    for name in sorted(path.parent.name for path in (root / 'sys/class/tty').glob('*/device')):
+        device = str(root / 'dev' / name)
+        # Linux makes ttyS0 to ttyS3 without hardware, with the type PORT_UNKNOWN.
+        if os.path.exists(device) and _read(root / 'sys/class/tty' / name / 'type') != '0':
+            ports[stable.get(os.path.realpath(device), device)] = name in consoles
+    return ports
+
+
+def users_of(url: Url) -> str:
+    """Return the other programs that have the port of a URL open; not those of other users."""
+    targets: set[str] = set()
+    if isinstance(url, SerialUrl):
+        targets = {os.path.realpath(url.device)}
+    elif isinstance(url, UdpUrl):
+        rows = [line.split() for table in ('udp', 'udp6')
+                for line in _read(Path('/proc/net', table)).splitlines()[1:]]
+        targets = {f'socket:[{row[9]}]' for row in rows
+                   if int(row[1].rpartition(':')[2], 16) == url.bind.port}
+    # The program that has made a pseudo-terminal is its other side.
+    is_pty = any(target.startswith('/dev/pts/') for target in targets)
+    found = []
+    for process in Path('/proc').glob('[0-9]*'):
+        # A process may end meanwhile, or be of another user.
+        with contextlib.suppress(OSError):
+            files = {os.readlink(link) for link in (process / 'fd').iterdir()}
+            if files & targets and process.name != str(os.getpid()) and not (
+                    is_pty and files & PTY_MAKERS):
+                command = _read(process / 'cmdline').replace('\0', ' ')[:MAX_COMMAND].strip()
+                found.append(f'"{command}" (process {process.name})')
+    return ' and '.join(found)

@@ -1,0 +1,192 @@
+# Copyright 2026 The illuminator_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""``discover`` as a process: its ports, time, signals and report."""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Callable, Iterator, Sequence
+import json
+import os
+import re
+import selectors
+import signal
+import sys
+import time
+from typing import Any
+
+from .port import Port, RATES
+from .ports import serial_ports
+from ..arguments import invocation, option, Parser
+from ..entry_point import print_output
+from ...mavlink.link_thread import Waker
+from ...mavlink.url import HostPort, parse_url, SerialUrl, UdpUrl, Url
+from ...payload.simulated_settings import number
+
+UDP_PORTS = 14540, 14550, 14590
+# s to listen. A heartbeat comes once a second; each rate of a serial port has a quarter of it.
+DURATION = 10.0
+# s between looks at the rates, and at incomplete frames.
+TICK = 0.25
+# Columns of the line that shows the progress.
+WIDTH = 78
+CONSOLE = 'the console of this system, not opened (on a Raspberry Pi: raspi-config, Serial Port)'
+NO_SERIAL = 'no serial port: plug its adapter in; a container needs --device'
+DESCRIPTION = f"""\
+Finds the port of a device, and prints the command to run. It listens to each serial port at
+{', '.join(map(str, RATES))} baud, to the UDP ports {', '.join(map(str, UDP_PORTS))}, and to the
+given URLs. It sends nothing."""
+EPILOG = """\
+examples:
+  {command}
+  {command} --seconds 30
+  {command} /dev/ttyUSB0,9600            # at this rate first
+  {command} tcpout://192.168.1.10:5760   # connects, and sends nothing
+
+exit status: 0 if a device that this package serves was heard, 1 if not, 2 if an argument is
+wrong. Ctrl-C ends the listening before its time."""
+
+
+def ports_of(
+    given: Sequence[tuple[str, Url]], duration: float, clock: Callable[[], float],
+    serial: dict[str, bool],
+) -> list[Port]:
+    """
+    Return the ports to listen to; a given URL replaces a port of this machine.
+
+    :param given: URLs by their texts.
+    :param serial: see :func:`~.ports.serial_ports`.
+    """
+    default: list[tuple[str, Url]] = [
+        *((path, SerialUrl(path, RATES[0])) for path in serial),
+        *((f'udpin://0.0.0.0:{port}', UdpUrl(HostPort('', port))) for port in UDP_PORTS)]
+    listened = {_opened(url): (text, url) for text, url in (*default, *given)}
+    return [Port(url, text, duration, clock, CONSOLE if serial.get(text) else '')
+            for text, url in listened.values()]
+
+
+def _opened(url: Url) -> object:
+    """Return what two URLs would both open."""
+    return (os.path.realpath(url.device) if isinstance(url, SerialUrl) else
+            url.bind.port if isinstance(url, UdpUrl) and url.bind.port else url)
+
+
+def lines(report: dict[str, Any]) -> Iterator[str]:
+    """Return the lines on one port."""
+    trouble = report['trouble']
+    if not report['components']:
+        yield f'{report["port"]}: {trouble}'
+    else:
+        yield report['url']
+        for one in report['components']:
+            version = f'MAVLink {" and ".join(map(str, one["mavlink_versions"]))}'
+            yield (f'  {one["address"]:8} {", ".join(one["kinds"]) or "no HEARTBEAT":32} '
+                   f'{version + (", signed" if one["signed"] else ""):18} '
+                   f'{one["frames_per_s"]:7.1f} frames/s')
+        if trouble:
+            yield f'  {trouble}'
+    yield from (f'  {verb}: {command}' for verb in ('run', 'try') for command in report[verb])
+
+
+def parse(args: Sequence[str] | None) -> tuple[argparse.Namespace, list[tuple[str, Url]]]:
+    """
+    Return the options, and the given URLs by their texts.
+
+    :raises SystemExit: if an argument is wrong, with status 2.
+    """
+    parser = Parser('discover', DESCRIPTION, EPILOG.format(command=invocation('discover')))
+    parser.add_argument('url', nargs='*', help='further connection URL, or a serial port')
+    parser.add_argument('--seconds', type=option(number(1, 3600)), default=DURATION, metavar='S',
+                        help='how long to listen (default: %(default)g)')
+    parser.add_argument('--json', action='store_true', help='print the report as JSON')
+    options = parser.parse_args(args)
+    try:
+        # A serial port may be given without its rate; a name by path contains colons.
+        return options, [(text, parse_url(
+            f'{text},{RATES[0]}' if re.match(r'/(?!.*[,:]\d+$)', text) else text))
+            for text in options.url]
+    except ValueError as error:
+        parser.error(str(error))
+
+
+def run(args: Sequence[str] | None = None) -> int:
+    """
+    Listen, print what is heard, and return the exit status.
+
+    :param args: the command line without the program's name, by default from ``sys.argv``.
+    """
+    options, given = parse(args)
+    serial = serial_ports()
+    ports = ports_of(given, options.seconds, time.monotonic, serial)
+    _listen(ports, options.seconds)
+    reports = sorted((port.report() for port in ports), key=lambda one: not one['run'])
+    if options.json:
+        text = json.dumps(reports, indent=2)
+    else:
+        text = '\n'.join([*(line for one in reports for line in lines(one)),
+                          *([] if serial else [NO_SERIAL])])
+    written = print_output(_complain, text)
+    return 0 if written and any(one['run'] for one in reports) else 1
+
+
+def _listen(ports: Sequence[Port], duration: float) -> None:
+    """Open the ports, and listen until the time is over or a signal comes."""
+    selector, waker = selectors.DefaultSelector(), Waker()
+    end = time.monotonic() + duration
+
+    def stop(*_: object) -> None:
+        nonlocal end
+        end = 0.0
+        waker.wake()
+
+    for one in (signal.SIGINT, signal.SIGTERM):
+        signal.signal(one, stop)
+    selector.register(waker, selectors.EVENT_READ, lambda waker, events: waker.clear())
+    _say(f'listening for {duration:g} s, sending nothing')
+    for port in ports:
+        port.listen(selector)
+    shown = ''
+    while (left := end - time.monotonic()) > 0:
+        for key, events in selector.select(min(TICK, left)):
+            key.data(key.fileobj, events)
+        for port in ports:
+            port.poll()
+        if shown != (shown := _progress(ports, left)):
+            _show(shown)
+    for port in ports:
+        port.close()
+    _show('')
+
+
+def _progress(ports: Sequence[Port], left: float) -> str:
+    heard = [str(address) for port in ports for address in port.components]
+    rates = dict.fromkeys(f'{port.rate}' for port in ports if port.rate and not port.trouble)
+    return (f'{left:.0f} s left; heard: {", ".join(heard) or "nothing yet"}'
+            + (f'; at {", ".join(rates)} baud' if rates else ''))
+
+
+def _show(progress: str) -> None:
+    """Write a line over the one before, on a terminal."""
+    if sys.stderr is not None and sys.stderr.isatty():
+        _say(progress[:WIDTH].ljust(WIDTH), end='\r')
+
+
+def _complain(reason: str) -> None:
+    _say(f'discover: {reason}')
+
+
+def _say(text: str, end: str = '\n') -> None:
+    if sys.stderr is not None:
+        print(text, end=end, file=sys.stderr, flush=True)

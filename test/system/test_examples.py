@@ -1,0 +1,196 @@
+# Copyright 2026 The illuminator_ros developers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""The programs of examples/ operate simulated devices through their nodes."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+import contextlib
+import csv
+import math
+from pathlib import Path
+import re
+import signal
+import sys
+from typing import Any
+
+from illuminator_ros.gimbal.simulated_manager import ManagerProperties, SimulatedManager
+from illuminator_ros.illuminator.simulated import SimulatedIlluminator
+from illuminator_ros.illuminator.simulated_properties import IlluminatorProperties
+from illuminator_ros.mavlink.messages import Address, Message
+from illuminator_ros.payload.simulated import SimulatedComponents, SimulatedDevice
+from illuminator_ros.rededge.messages import GpsRawInt
+from illuminator_ros.rededge.simulated import RedEdgeProperties, SimulatedRedEdge
+import pytest
+from sensor_msgs.msg import NavSatFix, NavSatStatus
+from std_msgs.msg import Bool, Header
+from std_srvs.srv import Trigger
+from support.live_link import EndpointLink
+from support.ports import free_port
+from support.processes import ended, Program, python, ROOT
+from support.ros import bridge_arguments, repeated, Ros
+from support.waiting import eventually, Log
+
+# s; the clocks of programs and devices are those of the machine, which may pause.
+LOST_AFTER = 60.0
+EARTH_RADIUS = 6_371_000.0
+
+
+@contextlib.contextmanager
+def served(port: int, *devices: SimulatedDevice, **options: Any) -> Any:
+    """Serve simulated devices over UDP; yield their link."""
+    link = EndpointLink(
+        f'udpout://127.0.0.1:{port}', SimulatedComponents(devices, 0.0), **options)
+    try:
+        yield link
+    finally:
+        link.stop()
+
+
+def node(ros: Ros, name: str, port: int, *arguments: str, **parameters: Any) -> Any:
+    """Run a node of this package."""
+    return ended(python(
+        f'illuminator_ros.{name}', *bridge_arguments(
+            port, *arguments, heartbeat_timeout=LOST_AFTER, **parameters),
+        env={'ROS_DOMAIN_ID': str(ros.domain)}))
+
+
+def example(ros: Ros, name: str, folder: Path, **changes: str) -> Any:
+    """Run an example with other values in the lines that a reader changes."""
+    text = (ROOT / 'examples' / f'{name}.py').read_text()
+    head, marked, rest = re.split(r'(?s)(\n# Change these: .*?\n\n)', text)
+    for variable, value in changes.items():
+        marked, count = re.subn(rf'(?m)^{variable} = .*', f'{variable} = {value}', marked)
+        assert count == 1
+    (folder / f'{name}.py').write_text(head + marked + rest)
+    return Program(sys.executable, f'{name}.py', cwd=folder,
+                   env={'ROS_DOMAIN_ID': str(ros.domain)})
+
+
+@pytest.mark.parametrize('number', [signal.SIGINT, signal.SIGTERM, signal.SIGKILL])
+def test_the_searchlight_dims_while_it_is_hot_and_goes_off_however_the_program_ends(
+        own_ros: Ros, tmp_path: Path, number: int) -> None:
+    port, light = free_port(), SimulatedIlluminator(IlluminatorProperties())
+    with (node(own_ros, 'bridge', port, off_after_silence=2.0), served(port, light) as link,
+          ended(example(own_ros, 'searchlight', tmp_path)) as program):
+        def shines(brightness: float) -> Callable[[], bool]:
+            return lambda: light.enabled and light.configuration.brightness == brightness
+
+        eventually(shines(40.0))
+        for temperature, brightness in ((85.0, 10.0), (25.0, 40.0)):
+            link.ask(lambda now, to=temperature: light.heat_to(to, now))
+            eventually(shines(brightness))
+
+        status = program.end(number)
+        if number == signal.SIGKILL:
+            eventually(lambda: not light.enabled)
+        else:
+            assert (status, light.enabled) == (0, False), program.log
+
+
+def test_the_search_looks_in_each_direction_with_the_light_on_and_releases_the_gimbal(
+        own_ros: Ros, tmp_path: Path) -> None:
+    port, light = free_port(), SimulatedIlluminator(IlluminatorProperties())
+    gimbal = SimulatedManager(ManagerProperties())
+    pattern = [(20, 30), (40, -10)]
+    with (node(own_ros, 'bridge', port, payloads='[illuminator, gimbal]', off_after_silence=1.5),
+          served(port, light, gimbal),
+          ended(example(own_ros, 'search_pattern', tmp_path, PATTERN=f'{pattern}',
+                        DWELL='0.5')) as program):
+        for down, left in pattern:
+            eventually(lambda down=down, left=left: light.enabled and points_to(  # type: ignore
+                gimbal, down, left))
+
+        assert (program.wait(), program.log, light.enabled) == (0, '', False)
+        own_ros.subscribe(Bool, '/gimbal/in_control').wait_value(False)
+
+
+def points_to(gimbal: SimulatedManager, down: float, left: float) -> bool:
+    _, pitch, yaw = map(math.degrees, gimbal.mount.motion.angles)
+    return abs(pitch + down) < 2.5 and abs(yaw + left) < 2.5
+
+
+@pytest.mark.parametrize(('number', 'outcome'), [
+    (0, (1, 'another component has taken the gimbal\n')), (signal.SIGINT, (0, '')),
+    (signal.SIGTERM, (0, ''))], ids=['the gimbal is taken', 'SIGINT', 'SIGTERM'])
+def test_the_search_ends_with_the_light_off_and_says_why(
+        own_ros: Ros, tmp_path: Path, number: int, outcome: tuple[int, str]) -> None:
+    port, light = free_port(), SimulatedIlluminator(IlluminatorProperties())
+    gimbal = SimulatedManager(ManagerProperties())
+    with (node(own_ros, 'bridge', port, payloads='[illuminator, gimbal]'),
+          served(port, light, gimbal),
+          ended(example(own_ros, 'search_pattern', tmp_path, DWELL='60.0')) as program):
+        eventually(lambda: light.enabled)
+
+        if number:
+            program.send(number)
+        else:
+            assert own_ros.call(Trigger, '/gimbal/release_control', Trigger.Request()).success
+
+        assert (program.wait(), program.log) == outcome
+        assert not light.enabled
+
+
+class Camera(SimulatedRedEdge):
+    """
+    A simulated camera.
+
+    :ivar latitudes: of the received positions, degrees.
+    """
+
+    def __init__(self) -> None:
+        super().__init__(RedEdgeProperties())
+        self.latitudes: Log[float] = Log()
+
+    def receive(self, source: Address, message: Message, now: float) -> Iterable[Message]:
+        if isinstance(message, GpsRawInt):
+            self.latitudes.append(message.lat / 1e7)
+        return super().receive(source, message, now)
+
+
+def test_the_survey_takes_an_image_each_10_m_and_lists_it_and_repeats_one_that_failed(
+        own_ros: Ros, tmp_path: Path) -> None:
+    port, camera = free_port(), Camera()
+    fixes = own_ros.node.create_publisher(NavSatFix, '/gps/fix', 10)
+
+    def fix(metres: float) -> NavSatFix:
+        """Return a position so far north of the start."""
+        return NavSatFix(
+            header=Header(stamp=own_ros.node.get_clock().now().to_msg()),
+            status=NavSatStatus(status=NavSatStatus.STATUS_FIX),
+            latitude=47.0 + math.degrees(metres / EARTH_RADIUS), longitude=8.0, altitude=500.0)
+
+    def rows() -> list[dict[str, str]]:
+        return [*csv.DictReader((tmp_path / 'images.csv').read_text().splitlines())]
+
+    with (node(own_ros, 'rededge', port, '-r', '~/fix:=/gps/fix'),
+          ended(example(own_ros, 'survey', tmp_path)) as program,
+          contextlib.ExitStack() as stack):
+        eventually(lambda: fixes.get_subscription_count() == 2)
+        with repeated(fixes, fix(0.0), 0.05):
+            program.wait_for('no image: no camera connected')
+            stack.enter_context(served(port, camera, mavlink_version=1))
+            eventually(rows)
+        for count, way in ((2, (5.0, 9.9, 10.5)), (3, (15.0, 20.4, 21.5))):
+            for metres in way:
+                message = fix(metres)
+                fixes.publish(message)
+                camera.latitudes.wait_for(lambda one: one == pytest.approx(
+                    message.latitude, abs=1e-7))  # noqa: B023
+            eventually(lambda: len(rows()) == count)  # noqa: B023
+        places = [math.radians(float(row['latitude_deg']) - 47.0) * EARTH_RADIUS
+                  for row in rows()]
+        # The camera may not yet have the position that has caused the image.
+        assert places == pytest.approx([0.0, 10.5, 21.5], abs=1.2)
