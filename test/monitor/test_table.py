@@ -111,11 +111,14 @@ def test_report_begins_with_what_is_new_and_ends_with_the_values() -> None:
     one.diagnoses['lamp'] = Diagnosis(1, 'dimmed because it is hot', {'off_in_s': '12.3'})
 
     assert text_of(one).startswith(
-        'on: done; off in 12 s (o: keep on); dimmed because it is hot; 40 %  41.5 C')
-    one.news = one.news[0], NOW + 1
-    assert text_of(one).startswith(
-        'on: done; is switched off by off_after_silence: no request for 30 s; off in 12 s')
-    one.now = one.heard_at = NOW + NEWS_LIFETIME + 1
+        'on: done; is switched off by off_after_silence: no request for 30 s; off in 12 s '
+        '(o: keep on); dimmed because it is hot; 40 %  41.5 C')
+    # The request itself is said once.
+    one.news = 'light 1/243 was switched on by service', NOW
+    assert text_of(one).startswith('on: done; off in 12 s')
+    one.news = one.news[0], NOW + 5
+    assert text_of(one).startswith('on: done; was switched on by service; off in 12 s')
+    one.now = one.heard_at = NOW + 5 + NEWS_LIFETIME
     assert text_of(one).startswith('off in 12 s (o: keep on); dimmed because it is hot')
     one.values['connected'] = False
     assert text_of(one).startswith('was ON; dimmed')

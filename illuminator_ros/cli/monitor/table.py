@@ -51,7 +51,8 @@ def report(device: Device) -> list[Cell]:
                 bool(answer) and outcome != shared.DONE)])
     news, noted = device.news
     # The line of that request itself would hide what is wrong.
-    if device.now < noted + shared.NEWS_LIFETIME and not (parts and noted < at + 1):
+    is_own = bool(parts) and noted < at + 1 and news.endswith('by service')
+    if device.now < noted + shared.NEWS_LIFETIME and not is_own:
         # The row has the name.
         parts.append([re.sub(rf'^{device.view.kind} \d+/\d+:? ', '', news)])
     # The diagnosis of its link is last.
