@@ -62,8 +62,8 @@ from visualization_msgs.msg import Marker  # noqa: E402
 TIMEOUT = 30.0
 # Columns and lines of the monitor.
 SIZE = (112, 28)
-# Of a screen of 390 by 844 pixels.
-PHONE_SIZE = (55, 60)
+# A telephone has 390 by 844 pixels, and its browser takes some of them.
+PHONE_SIZE = (55, 47)
 # For each kind of device how to select it, and the keys that operate it; an answer follows each.
 # The camera is first, since it lacks an input.
 KEYS = {'light': (['home', 'down'], ['space enter', '-', '-']),

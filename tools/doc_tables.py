@@ -257,7 +257,8 @@ def ros_tables() -> Tables:
             *([f'{name} ({flag})', levels[FLAG_LEVELS[flag][0]], FLAG_LEVELS[flag][1]]
               for flag, name in short_names('ILLUMINATOR_ERROR_FLAGS').items()),
             ['any other', 'WARN', 'unknown flags, in hexadecimal']],
-        ('monitor', 'key'): [[names(keys), text] for keys, text, _, _ in app.COMMON_KEYS],
+        ('monitor', 'key'): [[names(keys), text] for keys, text, _, _ in (
+            *app.COMMON_KEYS, *app.ALWAYS)],
         **{('monitor', f'key for a {view.kind}'): [
             [names(key.keys), key.text] for key in (*view.keys, *view.steering)]
            for view in views},

@@ -21,4 +21,5 @@ SUBJECTS = {
     'noise': 'receiving', 'memory': 'process', 'startup': 'services', 'overhead': 'link',
     'forward': 'forwarding',
     'lights': 'link', 'nodes': 'process', 'reconnection': 'link', 'loss': 'link',
-    'parallel': 'services', 'floods': 'floods', 'rededge': 'rededge', 'limits': 'services'}
+    'parallel': 'services', 'floods': 'floods', 'rededge': 'rededge', 'limits': 'services',
+    'browsers': 'browsers'}

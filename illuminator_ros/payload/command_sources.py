@@ -17,6 +17,8 @@
 from __future__ import annotations
 
 import math
+import re
+import reprlib
 from typing import NamedTuple
 
 from .arbitration import Arbiter, Cause, HolderChanged, Policy
@@ -29,6 +31,17 @@ _REASONS = {
     Cause.RELEASE: ': {} has released it',
     Cause.SILENCE: ': {} was silent for source_timeout',
 }
+
+
+def source_name(text: str) -> str:
+    """
+    Return the name of a source.
+
+    :raises ValueError: if topics cannot have it; ``cmd`` is the prefix of plain commands.
+    """
+    if not re.fullmatch(r'[A-Za-z](_?[A-Za-z0-9]){0,63}', text) or text == 'cmd':
+        raise ValueError(f'{reprlib.repr(text)} is not a valid name of a source')
+    return text
 
 
 class SourceSettings(NamedTuple):

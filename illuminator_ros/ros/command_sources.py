@@ -19,8 +19,6 @@ from __future__ import annotations
 from collections.abc import Callable
 import functools
 import math
-import re
-import reprlib
 
 from std_msgs.msg import String
 from std_srvs.srv import Trigger
@@ -28,7 +26,7 @@ from std_srvs.srv import Trigger
 from .diagnostics import Value
 from .node import Answer, Endpoint, RequestService
 from .parameters import ParameterError, ParameterSpec, Values
-from ..payload.command_sources import DEFAULT, SourceSettings
+from ..payload.command_sources import DEFAULT, source_name, SourceSettings
 
 SOURCE = Endpoint(
     'source', String, "only with `sources`: the source that holds the device, `''` for none")
@@ -61,9 +59,10 @@ def source_settings(values: Values) -> SourceSettings | None:
             raise ParameterError('source_timeout: is given, but sources is empty')
         return None
     for name in names:
-        # Names that a topic may have, except ``cmd``, which the plain commands use.
-        if not re.fullmatch(r'[A-Za-z](_?[A-Za-z0-9]){0,63}', name) or name == 'cmd':
-            raise ParameterError(f'sources: {reprlib.repr(name)} is not a valid name of a source')
+        try:
+            source_name(name)
+        except ValueError as error:
+            raise ParameterError(f'sources: {error}') from None
         if names.count(name) > 1:
             raise ParameterError(f'sources: {name!r} is given twice')
     ranked = names if DEFAULT in names else [*names, DEFAULT]

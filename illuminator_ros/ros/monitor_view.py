@@ -189,30 +189,22 @@ class Device:
         return age(self.now - self.changed_at[topic]) if topic in self.changed_at else ''
 
 
-class Column(NamedTuple):
-    """A column of the list, with its width in characters."""
-
-    title: str
-    width: int
-    cell: Callable[[Device], Cell]
-
-
 class Key(NamedTuple):
     """
     Keys with one meaning.
 
-    :param text: the meaning, for the help.
-    :param label: the same for the bar, '' for keys that it does not have.
+    :param text: the meaning, in a few words, which is on its button.
     :param request: returns the request for a device and the text that was typed, or why there is
         none, for people.
     :param prompt: what the operator types first, '' for nothing.
+    :param has_button: whether fingers have a button for it, too.
     """
 
     keys: tuple[str, ...]
     text: str
-    label: str
     request: Callable[[Device, str], Request | str]
     prompt: str = ''
+    has_button: bool = True
 
 
 @dataclass(frozen=True)
@@ -222,7 +214,7 @@ class View:
 
     :param kind: of device, such as ``light``.
     :param topics: by name; a node that publishes those of ``signature`` is such a device.
-    :param columns: the most important first: a narrow screen cuts off the others.
+    :param values: returns the values in its row, the most important first.
     :param details: returns the lines below the list.
     :param steering: keys that act only after the operator has begun to steer.
     :param states: the words of :meth:`state` with their styles, in the order of the counts.
@@ -236,7 +228,7 @@ class View:
     kind: str
     topics: Mapping[str, Topic]
     signature: Sequence[str]
-    columns: Sequence[Column]
+    values: Callable[[Device], Iterable[str]]
     details: Callable[[Device], Iterable[Line]]
     keys: Sequence[Key]
     steering: Sequence[Key] = ()
@@ -253,9 +245,9 @@ def trigger(name: str, question: str = '') -> Request:
     return Request(name.replace('_', ' '), name, Trigger, Trigger.Request(), question=question)
 
 
-def trigger_key(key: str, text: str, label: str, name: str) -> Key:
+def trigger_key(key: str, text: str, name: str) -> Key:
     """Return a key that calls a service of std_srvs/Trigger."""
-    return Key((key,), text, label, lambda device, typed: trigger(name))
+    return Key((key,), text, lambda device, typed: trigger(name))
 
 
 def release_source(device: Device, typed: str) -> Request | str:
@@ -264,8 +256,7 @@ def release_source(device: Device, typed: str) -> Request | str:
             trigger(f'{device.source or "default"}/release'))
 
 
-RELEASE_SOURCE = Key(('u',), 'give it back to other sources of commands', 'give back',
-                     release_source)
+RELEASE_SOURCE = Key(('u',), 'give back', release_source)
 
 
 def finite(number: float) -> float | None:

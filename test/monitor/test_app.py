@@ -18,7 +18,7 @@ import asyncio
 from typing import cast
 
 from illuminator_ros.cli.monitor.app import (
-    ACTIONS,
+    ALWAYS,
     COMMON_KEYS,
     INTERVAL,
     MonitorApp,
@@ -27,10 +27,10 @@ from illuminator_ros.cli.monitor.app import (
 from illuminator_ros.cli.monitor.ros_graph import Graph, TREND_POLLS
 from illuminator_ros.ros.monitor_view import Diagnosis, DONE, FAILED, NEWS_LIFETIME, TREND_SIZE
 import pytest
-from support.monitor import camera, FakeGraph, gimbal, light, NOW, Screen, show
+from support.monitor import camera, diagnosed, FakeGraph, gimbal, light, NOW, Screen, show
 from textual.color import Color
-from textual.events import Paste
-from textual.widgets import Button, DataTable
+from textual.events import AppBlur, AppFocus, Paste
+from textual.widgets import DataTable
 
 SIZES = [(500, 500), (200, 50), (80, 24), (40, 44), (20, 6), (12, 3), (5, 2), (1, 1)]
 
@@ -43,12 +43,12 @@ def test_screen_fits_every_terminal_and_shows_the_selected_device(
     width, height = size
 
     async def test(screen: Screen) -> None:
-        for keys in (['end'], ['?'], ['escape', '+'], ['space']):
+        for keys in (['end'], ['escape', '+'], ['space']):
             await screen.press(*keys)
             await screen.wait()
             assert sum(len(line) > width for line in screen.lines) == 0
             assert len(screen.lines) <= height
-            if count and keys != ['?'] and width > 20:
+            if count and width > 20:
                 assert f'/l{count - 1:02}' in screen.text
 
     show(test, *(light(f'/l{number:02}') for number in range(count)), size=size)
@@ -59,7 +59,7 @@ def test_screen_shows_each_kind_with_its_states_values_and_findings() -> None:
         for text in ('2 lights: 1 ON, 1 off; 1 camera: 1 ok; 1 gimbal: 1 ours',
                      '/bow off WARN dimmed because it is hot; 40 % 41.5 C steady internal',
                      '/camera ok WARN nothing received on ~/imu; 7 12 ms fix 47.300000 8.500000',
-                     '/gimbal ours OK 28.6 down 14.3 right primary 1/193',
+                     '/gimbal ours OK primary 1/193 pitch 28.6 down yaw 14.3 right',
                      'lamp WARN: dimmed because it is hot', 'held by safety for 61 s'):
             assert text in screen.text
 
@@ -77,6 +77,15 @@ def test_state_is_a_word_and_not_only_a_colour() -> None:
         assert 'nothing heard for 30 s' in screen.text
 
     show(test, light(), gone, light('/lost', connected=False))
+
+
+def test_values_of_a_lost_light_are_dimmed_but_not_its_name_state_and_level() -> None:
+    async def test(screen: Screen) -> None:
+        name, state, level, report = screen.app.query_one(DataTable).get_row_at(0)
+        assert [any('dim' in str(span.style) for span in cell.spans)
+                for cell in (name, state, level, report)] == [False, False, False, True]
+
+    show(test, light(enabled=True, connected=False))
 
 
 def test_poll_before_the_screen_exists_is_shown_on_it() -> None:
@@ -106,6 +115,7 @@ def test_no_devices_are_a_sentence_and_keys_do_nothing() -> None:
     async def test(screen: Screen) -> None:
         await screen.press('down', 'space', 'm', 'a', '+')
         assert 'no devices in this ROS graph yet' in screen.text
+        assert 'ALL OFF: 0 of 0 confirmed' in screen.text
 
     assert show(test).requests == []
 
@@ -114,7 +124,7 @@ def test_no_devices_are_a_sentence_and_keys_do_nothing() -> None:
 def test_terminal_for_ascii_gets_ascii_only(ascii_only: bool) -> None:
     async def test(screen: Screen) -> None:
         shown = ''
-        for keys in ([], ['end'], ['m'], ['?']):
+        for keys in ([], ['end'], ['m']):
             await screen.press(*keys)
             shown += screen.text
         assert shown.isascii() is ascii_only
@@ -163,9 +173,13 @@ def test_selection_stays_with_its_device_and_moves_up_when_that_is_cleared() -> 
         screen.graph.devices.insert(0, light('/0'))
         await screen.wait()
         await screen.press('r')
+        assert 'clear gone' not in screen.text
+        screen.graph.devices[0].is_gone = True
+        await screen.wait()
+        await screen.click('clear gone')
         del screen.graph.devices[3]
         await screen.wait()
-        await screen.press('r', 'c')
+        await screen.press('r')
 
     graph = show(test, *map(light, ('/a', '/b', '/c')))
     assert graph.asked == [('/c', 'refresh'), ('/b', 'refresh')]
@@ -206,7 +220,22 @@ def test_light_is_switched_on_and_off_by_clicks_on_labels() -> None:
     assert show(test, light()).asked == [('/bow', 'on'), ('/bow', 'off'), ('/bow', 'off')]
 
 
-@pytest.mark.parametrize('before', [[], ['?'], ['space'], ['end', 'p', '4', '7'], ['end', 'm']])
+def test_first_click_acts_in_a_window_without_the_focus() -> None:
+    async def test(screen: Screen) -> None:
+        screen.app.post_message(AppBlur())
+        await screen.settle()
+        await screen.press('end')
+        assert 't take control' in screen.text
+        [button] = [one for one in screen.app.screen.query('FooterKey')
+                    if 'take control' in str(one.render())]
+        screen.app.post_message(AppFocus())
+        await screen.settle()
+        assert button.is_attached
+
+    show(test, light(), gimbal())
+
+
+@pytest.mark.parametrize('before', [[], ['space'], ['end', 'p', '4', '7'], ['end', 'm']])
 def test_all_off_acts_at_once_whatever_is_shown(before: list[str]) -> None:
     gone = light('/gone')
     gone.is_gone = True
@@ -220,7 +249,7 @@ def test_all_off_acts_at_once_whatever_is_shown(before: list[str]) -> None:
 
 
 @pytest.mark.parametrize('size', [(200, 50), (80, 24), (54, 12), (20, 6)])
-@pytest.mark.parametrize('before', [[], ['?'], ['space'], ['end', 'p', '4', '7'], ['end', 'm']])
+@pytest.mark.parametrize('before', [[], ['space'], ['end', 'p', '4', '7'], ['end', 'm']])
 def test_all_off_is_one_touch_away_whatever_is_shown(
     before: list[str], size: tuple[int, int],
 ) -> None:
@@ -268,20 +297,70 @@ def test_80_columns_show_level_and_fault_of_a_device_that_is_not_selected() -> N
 
     async def test(screen: Screen) -> None:
         await screen.press('end')
-        [row] = [line for line in screen.lines if line.startswith(' /uav1')]
+        [row] = [line for line in screen.lines if line.startswith(' …rchlight_of_the_bow ')]
         assert ' ON ERROR! switched off because it is too hot' in ' '.join(row.split())
         assert len(row) <= 80
 
     show(test, light(), ill, light('/z'), size=(80, 24))
 
 
+def test_what_is_wrong_above_the_first_visible_row_is_named() -> None:
+    lost = light('/lost', enabled=True, connected=False)
+
+    async def test(screen: Screen) -> None:
+        assert 'above' not in screen.text
+        await screen.press('end')
+        await screen.wait()
+        assert 'above: /lost LOST WARN!' in screen.text
+
+    fine = [diagnosed(light(f'/l{number:02}'), lamp=0) for number in range(30)]
+    show(test, lost, *fine, size=(80, 24))
+
+
+def test_selected_row_stays_visible_when_the_list_gets_shorter() -> None:
+    async def test(screen: Screen) -> None:
+        await screen.press('end')
+        await screen.press('a')
+        for one in screen.graph.devices:
+            one.off = FAILED, 'no answer, trying again'
+        await screen.wait()
+        await screen.wait()
+        assert any(line.startswith(' /l11') for line in screen.lines)
+
+    show(test, *(light(f'/l{number:02}') for number in range(12)), size=(80, 24))
+
+
+def test_selected_row_may_be_scrolled_out_of_the_list() -> None:
+    async def test(screen: Screen) -> None:
+        for _ in range(3):
+            # Until the buttons have their places.
+            await screen.wait()
+        screen.app.query_one(DataTable).scroll_to(y=10, animate=False, immediate=True)
+        for _ in range(3):
+            await screen.wait()
+        assert 'above: /l00 off WARN' in screen.text
+        assert screen.app.query_one(DataTable).scroll_offset.y == 10
+
+    show(test, *(light(f'/l{number:02}') for number in range(40)), size=(80, 40))
+
+
+def test_80_columns_and_24_rows_show_all_of_twelve_devices_and_the_level_of_the_selected() -> None:
+    async def test(screen: Screen) -> None:
+        await screen.press('end')
+        for number in range(12):
+            assert f' /l{number:02} ' in screen.text
+        assert 'lamp WARN: dimmed because it is hot' in screen.text
+
+    show(test, *(light(f'/l{number:02}') for number in range(12)), size=(80, 24))
+
+
 def test_arrows_move_a_gimbal_only_after_steering_has_begun() -> None:
     async def test(screen: Screen) -> None:
         await screen.press('end', 'up', 'end')
-        assert '←' not in screen.text
+        assert 'by 5 deg' not in screen.text
         await screen.press('m', 'up', 'left')
-        assert '←' in screen.text
-        await screen.press('escape', 'up', 'end', 'm', 'j')
+        assert 'left by 5 deg' in screen.text
+        await screen.press('escape', 'up', 'end', 'm', 't', 'j')
         assert screen.graph.asked == [
             ('/gimbal', 'pitch to 23.6 down'), ('/gimbal', 'yaw to 9.3 right')]
         await screen.press('up', 'm', 'up')
@@ -291,45 +370,52 @@ def test_arrows_move_a_gimbal_only_after_steering_has_begun() -> None:
 
 def test_place_is_typed_or_pasted_corrected_and_sent_with_enter() -> None:
     async def test(screen: Screen) -> None:
-        await screen.press('p', *'47.1', 'backspace', '3', 'left', 'space', *'8.5')
+        await screen.press('p')
+        await screen.press(*'47.1', 'backspace', '3', 'left', 'right', 'space', *'8.5')
         screen.app.post_message(Paste(' 480'))
         await screen.settle()
-        assert '47.3 8.5 480_' in screen.text
+        assert '47.3 8.5 480' in screen.text
+        # As below a question, which a second touch on the same place must not confirm.
+        assert 'escape back enter yes' in screen.text
         await screen.press('enter', 'p', '1', 'escape', 'p', 'enter')
 
     graph = show(test, gimbal())
     assert graph.asked == [('/gimbal', 'point at 47.3 8.5 480')]
     assert graph.devices[0].action is not None
-    assert graph.devices[0].action[2] == "'' is not latitude, longitude and altitude"
+    assert graph.devices[0].action[::2] == (
+        'point at a place', "'' is not latitude, longitude and altitude")
 
 
-def test_help_lists_each_key_and_any_key_goes_back() -> None:
+def test_each_key_of_the_selected_device_has_a_button_with_its_meaning() -> None:
     async def test(screen: Screen) -> None:
-        await screen.press('?')
-        views = (screen.graph.devices[0].view, screen.graph.devices[1].view)
-        for keys in (*(one[0] for one in COMMON_KEYS),
-                     *(key.keys for view in views for key in (*view.keys, *view.steering))):
-            assert '  '.join(keys) in '\n'.join(screen.lines)
-        await screen.press('space')
-        assert '/bow' in screen.text
+        for view in (light().view, camera().view, gimbal().view):
+            # In the order of the view, whatever other devices have the same keys.
+            assert ' '.join(f'{key.keys[0]} {key.text}' for key in view.keys) in screen.text
+            await screen.press('down')
+        await screen.press('m')
+        for key in gimbal().view.steering:
+            assert f'{key.keys[0]} {key.text}' in screen.text
 
-    assert show(test, light(), gimbal(), size=(132, 60)).requests == []
+    show(test, light(), camera(), gimbal(), size=(80, 24))
 
 
-@pytest.mark.parametrize('key', [key for key, action in ACTIONS.items() if action == 'quit'])
-def test_each_key_to_quit_ends_the_monitor_even_from_the_help(key: str) -> None:
+@pytest.mark.parametrize('key', [
+    key for keys, _, _, action in (*ALWAYS, *COMMON_KEYS)
+    if action == 'quit' for key in keys])
+def test_each_key_to_quit_ends_the_monitor(key: str) -> None:
     async def test(screen: Screen) -> None:
-        await screen.press('?', key)
+        await screen.press(key)
         assert not screen.app.is_running or screen.app._exit
 
     show(test, light())
 
 
 def test_labels_of_keys_are_not_keys_of_others() -> None:
-    # A common key that a device has, too, would never reach the device.
+    # A common key that a device has, too, would never act.
+    common = {key for keys, *_ in (*ALWAYS, *COMMON_KEYS) for key in keys}
     for one in (light(), gimbal(), camera()):
         own = {key for entry in one.view.keys for key in entry.keys}
-        assert own & ACTIONS.keys() == set()
+        assert own & common == set()
 
 
 def test_row_of_the_selected_device_alone_is_highlighted() -> None:
@@ -347,7 +433,7 @@ def test_row_of_the_selected_device_alone_is_highlighted() -> None:
 def test_night_is_red_on_black_whatever_is_shown(touch: bool) -> None:
     async def test(screen: Screen) -> None:
         await screen.press('v', 'v')
-        for keys in ([], ['end'], ['space'], ['escape', '?'], ['escape', 'a']):
+        for keys in ([], ['end'], ['space'], ['escape', 'end', 'p'], ['escape', 'a']):
             await screen.press(*keys)
             colours = {(part, colour.get_truecolor().green, colour.get_truecolor().blue)
                        for part in screen.app.screen.query('*') for y in range(part.size.height)
@@ -378,12 +464,19 @@ def test_colours_for_sunlight_contrast_with_their_background() -> None:
 
 def test_buttons_for_fingers_have_three_rows_and_whole_labels_on_a_phone() -> None:
     async def test(screen: Screen) -> None:
-        buttons = [one for one in screen.app.query(Button) if one.display]
-        assert {one.outer_size.height for one in buttons} == {3}
-        shown = '\n'.join(screen.lines)
-        assert [str(one.label) for one in buttons if str(one.label) not in shown] == []
+        for view in (light().view, gimbal().view):
+            buttons = screen.app.screen.query('Button, FooterKey')
+            assert {one.outer_size.height for one in buttons} == {3}
+            assert {one.region.x for one in buttons} == {0, 28}
+            shown = [*screen.lines]
+            for key in view.keys:
+                # Whole in one line, and not behind the end of the screen.
+                label = f'{key.keys[0]} {key.text}'
+                assert any(label in line for line in shown) is (
+                    key.has_button and not key.prompt)
+            await screen.click('down next')
 
-    show(test, light(), size=(54, 56), touch=True)
+    show(test, light(), gimbal(), size=(55, 60), touch=True)
 
 
 def test_view_that_may_only_look_has_no_buttons_to_operate_a_device() -> None:

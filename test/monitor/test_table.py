@@ -29,20 +29,20 @@ from illuminator_ros.ros.monitor_view import (
     NEWS_LIFETIME,
 )
 import pytest
-from support.monitor import camera, gimbal, light, NOW
+from support.monitor import camera, diagnosed, gimbal, light, NOW
 
 
-def test_table_has_a_heading_and_a_row_for_each_device_of_a_kind() -> None:
+def test_table_has_a_heading_and_a_row_for_each_device() -> None:
     lines = plain([light(), light('/stern', connected=False), gimbal(), camera()])
 
-    heading, *rows = [re.split(' {2,}', line) for line in lines[:3]]
-    assert heading == ['LIGHT', 'STATE', 'BRIGHT', 'TEMP', 'STROBE', 'MODE', 'SOURCE', 'LOSS',
-                       'RTT', 'DIAGNOSTICS']
-    assert rows == [[name, state, '40 %', '41.5 C', 'steady', 'internal', '-', '12 %', '3.2 ms',
-                     'WARN: dimmed because it is hot']
-                    for name, state in (('/bow', 'off'), ('/stern', 'LOST'))]
-    assert [line.split()[:2] for line in lines[3:]] == [
-        [], ['GIMBAL', 'STATE'], ['/gimbal', 'ours'], [], ['CAMERA', 'STATE'], ['/camera', 'ok']]
+    assert [re.split(' {2,}', line, maxsplit=3) for line in lines] == [
+        ['DEVICE', 'STATE', 'LEVEL', 'REPORT'],
+        ['/bow', 'off', 'WARN', 'dimmed because it is hot; 40 %  41.5 C  steady  internal'],
+        ['/stern', 'LOST', 'WARN', 'dimmed because it is hot; 40 %  41.5 C  steady  internal'],
+        ['/gimbal', 'ours', 'OK',
+         'primary 1/193  pitch 28.6 down  yaw 14.3 right  base_link_stabilized'],
+        ['/camera', 'ok', 'WARN',
+         'nothing received on ~/imu; 7  12 ms  fix  47.300000 8.500000 480.0 m']]
 
 
 def test_unknown_values_are_dashes() -> None:
@@ -50,7 +50,7 @@ def test_unknown_values_are_dashes() -> None:
     one.values.clear()
     one.diagnoses.clear()
 
-    assert plain([one])[1].split() == ['/bow', '?', *'--------']
+    assert plain([one])[1].split() == ['/bow', '?', *'-----']
 
 
 def test_json_has_all_values_and_null_for_what_is_unknown() -> None:
@@ -62,13 +62,6 @@ def test_json_has_all_values_and_null_for_what_is_unknown() -> None:
     assert first['diagnostics']['lamp']['level'] == 'WARN'
     assert first['diagnostics']['link']['values']['loss_percent'] == '12.3'
     assert second['values']['angles'] == ['base_link_stabilized', 0.0, 0.5, -0.25]
-
-
-def diagnosed(one: Device, **levels: int) -> Device:
-    """Return a device with these diagnoses only."""
-    one.diagnoses = {kind: Diagnosis(level, f'{kind} {level}', {})
-                     for kind, level in levels.items()}
-    return one
 
 
 def gone(one: Device) -> Device:
@@ -101,7 +94,7 @@ def disobeying(one: Device) -> Device:
 def test_level_says_what_needs_attention_and_what_is_dangerous(
     one: Device, attention: int, text: str,
 ) -> None:
-    shown = level(one)
+    [shown] = level(one)
 
     assert (one.attention, shown if isinstance(shown, str) else shown[0]) == (attention, text)
 
@@ -118,10 +111,17 @@ def test_report_begins_with_what_is_new_and_ends_with_the_values() -> None:
     one.diagnoses['lamp'] = Diagnosis(1, 'dimmed because it is hot', {'off_in_s': '12.3'})
 
     assert text_of(one).startswith(
-        'on: done; is switched off by off_after_silence: no request for 30 s; dimmed '
-        'because it is hot; off in 12 s without a request: o keeps it on; 40 %  41.5 C')
-    one.now = one.heard_at = NOW + NEWS_LIFETIME
-    assert text_of(one).startswith('dimmed because it is hot; off in 12 s')
+        'on: done; is switched off by off_after_silence: no request for 30 s; off in 12 s '
+        '(o: keep on); dimmed because it is hot; 40 %  41.5 C')
+    # The request itself is said once.
+    one.news = 'light 1/243 was switched on by service', NOW
+    assert text_of(one).startswith('on: done; off in 12 s')
+    one.news = one.news[0], NOW + 5
+    assert text_of(one).startswith('on: done; was switched on by service; off in 12 s')
+    one.now = one.heard_at = NOW + 5 + NEWS_LIFETIME
+    assert text_of(one).startswith('off in 12 s (o: keep on); dimmed because it is hot')
+    one.values['connected'] = False
+    assert text_of(one).startswith('was ON; dimmed')
 
 
 def test_gone_device_shows_nothing_as_ok() -> None:

@@ -153,17 +153,16 @@ def test_oldest_of_too_many_connections_without_a_credential_gives_way() -> None
     assert serve(test).lines == ['too many connections']
 
 
-def test_log_is_one_line_in_each_interval_with_the_number_of_the_others() -> None:
+def test_log_is_one_line_in_each_interval_with_the_number_of_those_left_out() -> None:
     lines: list[str] = []
-    timers: list[Callable[[], None]] = []
-    handler = web.LineLog(lines.append, lambda seconds, call: timers.append(call))
+    times = [0.0]
+    handler = web.LineLog(lines.append, lambda: times[-1])
 
-    for number in range(4):
+    for number in range(3):
         handler.emit(logging.makeLogRecord({'msg': f'refused {number}\r\n\x1b'}))
-    for _ in range(2):
-        timers.pop(0)()
-    handler.emit(logging.makeLogRecord({'msg': 'refused again'}))
+    for number in range(1, 3):
+        times.append(number * web.LOG_INTERVAL)
+        handler.emit(logging.makeLogRecord({'msg': 'refused again'}))
 
-    assert lines == ['refused 0\\r\\n\\x1b', 'refused 3\\r\\n\\x1b (2 more in 60 s)',
-                     'refused again']
-    assert len(timers) == 1
+    assert lines == [
+        'refused 0\\r\\n\\x1b', 'refused again (2 more before)', 'refused again']

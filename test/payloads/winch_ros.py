@@ -19,7 +19,7 @@ from __future__ import annotations
 import math
 
 from illuminator_ros.payload.confirmed_command import Result
-from illuminator_ros.ros.monitor_view import Column, Device, Key, measured, Request, Topic, View
+from illuminator_ros.ros.monitor_view import Device, Key, measured, Request, Topic, View
 from illuminator_ros.ros.node import CommandTopic, Endpoint, NodeInterface
 from illuminator_ros.ros.payload import Host, RosPayload, ServedPayload
 from payloads.winch import WinchClient
@@ -67,6 +67,7 @@ def release_key(device: Device, typed: str) -> Request | str:
         f'release {metres:g} m', 'cmd/release', Float32, Float32(data=metres))
 
 
-VIEW = View('winch', {'line_length': Topic(Float32)}, ('line_length',), (
-    Column('LINE', 8, length),), lambda device: [('line', [f'{length(device)} released'])], (
-    Key(('p',), 'release line', 'release', release_key, 'length (m, negative winds in)'),))
+VIEW = View(
+    'winch', {'line_length': Topic(Float32)}, ('line_length',), lambda device: [length(device)],
+    lambda device: [('line', [f'{length(device)} released'])],
+    (Key(('p',), 'release line', release_key, 'length (m, negative winds in)'),))

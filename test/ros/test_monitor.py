@@ -152,7 +152,7 @@ def test_off_by_silence_is_announced_can_be_delayed_and_is_reported(
         monitor.wait(left)
         CLOCK.forward(0.8)
         shown = monitor.wait(lambda device: 0 < left(device) < 0.7)
-        assert 'o keeps it on' in shown.view.notice(shown)
+        assert '(o: keep on)' in shown.view.notice(shown)
 
         assert monitor.press('o').startswith('done')
         monitor.wait(lambda device: left(device) > 0.7)

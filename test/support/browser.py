@@ -37,7 +37,7 @@ ARGUMENTS = ('--headless', '--no-sandbox', '--disable-gpu', '--disable-quic', '-
 # The key, as WebDriver names it.
 ENTER = '\ue007'
 RECORDER = """
-window.received = ''; let last = Promise.resolve();
+window.received = window.sent = ''; let last = Promise.resolve();
 window.WebSocket = class extends WebSocket {
   constructor(url) {
     super(url);
@@ -51,11 +51,13 @@ window.WebSocket = class extends WebSocket {
   }
   send(data) {
     if (data.startsWith('["resize"')) window.size = JSON.parse(data)[1];
+    window.sent += data;
     super.send(data);
   }
 };
 """
-_TOKEN = re.compile('\x1b\\[(\\d*);?(\\d*)H|\x1b\\[[^@-~]*[@-~]|\x1b.|[^\x1b]', re.DOTALL)
+_TOKEN = re.compile('\x1b\\[(\\d*);?(\\d*)H|\x1b][^\x1b\x07]*(?:\x1b\\\\|\x07)|'
+                    '\x1b\\[[^@-~]*[@-~]|\x1b.|[^\x1b]', re.DOTALL)
 
 
 def screen(output: str) -> list[str]:
@@ -175,6 +177,16 @@ class Browser:
             'type': 'pointer', 'id': 'mouse', 'actions': [
                 {'type': 'pointerMove', 'duration': 0, **place},
                 {'type': 'pointerDown', 'button': 0}, {'type': 'pointerUp', 'button': 0}]}]})
+
+    def swipe(self, start: tuple[int, int], end: tuple[int, int]) -> None:
+        """Move a finger over the page, between places in pixels."""
+        (x, y), (end_x, end_y) = start, end
+        self._call('POST', '/actions', {'actions': [{
+            'type': 'pointer', 'id': 'finger', 'parameters': {'pointerType': 'touch'}, 'actions': [
+                {'type': 'pointerMove', 'duration': 0, 'x': x, 'y': y},
+                {'type': 'pointerDown', 'button': 0},
+                {'type': 'pointerMove', 'duration': 200, 'x': end_x, 'y': end_y},
+                {'type': 'pointerUp', 'button': 0}]}]})
 
     def close(self) -> None:
         """End the session."""

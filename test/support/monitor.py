@@ -28,7 +28,6 @@ from illuminator_ros.illuminator.ros.monitor_view import VIEW as LIGHT
 from illuminator_ros.rededge.ros.monitor_view import VIEW as CAMERA
 from illuminator_ros.ros.monitor_view import Device, Diagnosis, Request, View
 from textual.pilot import Pilot
-from textual.widgets import Button
 
 NOW = 1000.0
 PRESENT: dict[str, dict[str, Any]] = {
@@ -86,6 +85,13 @@ def camera(name: str = '/camera', fix: Any = (0, 47.3, 8.5, 480.0)) -> FakeDevic
     return made
 
 
+def diagnosed(one: FakeDevice, **levels: int) -> FakeDevice:
+    """Return a device with these diagnoses only."""
+    one.diagnoses = {kind: Diagnosis(level, f'{kind} {level}', {})
+                     for kind, level in levels.items()}
+    return one
+
+
 class FakeGraph:
     """A graph with given devices, whose time the test sets."""
 
@@ -93,6 +99,7 @@ class FakeGraph:
         self.now = NOW
         self.devices = list(devices)
         self.requests: list[tuple[str, Request]] = []
+        self.views = [LIGHT, CAMERA, GIMBAL]
         self.cleared = 0
         self.answers_polled = 0
         self.may_request = may_request
@@ -161,7 +168,8 @@ class Screen:
 
     async def settle(self) -> None:
         """Wait until the events so far have gone from the application to its parts and back."""
-        for one in (self.app, self.app.screen, *self.app.screen.query(Button), self.app):
+        for one in (self.app, self.app.screen, *self.app.screen.query('Button, FooterKey'),
+                    self.app):
             handled = asyncio.Event()
             if one.call_later(handled.set):
                 await handled.wait()

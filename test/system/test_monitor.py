@@ -138,12 +138,12 @@ def test_bytes_that_are_not_utf_8_do_not_end_the_monitor(own_ros: Ros) -> None:
 
         screen.type(b'\xff\xe4 ')
 
-        def helped() -> bool:
+        def acts() -> bool:
             # Keys that come with such a byte are lost.
-            screen.type('h')
-            return 'this help' in screen.raw
+            screen.type('a')
+            return 'ALL OFF: 0 of 0' in screen.raw
 
-        eventually(helped)
+        eventually(acts)
 
 
 def test_without_a_terminal_monitor_prints_a_table(own_ros: Ros) -> None:
@@ -159,8 +159,8 @@ def test_without_a_terminal_monitor_prints_a_table(own_ros: Ros) -> None:
     [one] = json.loads(loaded.stdout)
     assert (one['name'], one['values']['brightness']) == ('/illuminator', 30.0)
     heading, row = outcome.stdout.splitlines()
-    assert heading.split()[:3] == ['LIGHT', 'STATE', 'BRIGHT']
-    assert row.split()[:4] == ['/illuminator', 'off', '30', '%']
+    assert heading.split() == ['DEVICE', 'STATE', 'LEVEL', 'REPORT']
+    assert row.split()[:5] == ['/illuminator', 'off', 'OK', '30', '%']
     assert (outcome.returncode, outcome.stderr) == (0, '')
     assert (failed.returncode, failed.stderr) == (
         1, 'monitor: standard output: No space left on device\n')
@@ -176,3 +176,12 @@ def test_failure_is_one_line_with_status_1(own_ros: Ros, redirection: str, error
 
     assert (outcome.returncode, outcome.stdout, outcome.stderr) == (
         1, '', error.format(domain=own_ros.domain))
+
+
+@pytest.mark.parametrize('name', ['a b', '/bow', 'cmd', ''])
+def test_source_that_cannot_be_is_refused_in_one_line_with_status_2(name: str) -> None:
+    outcome = run(MONITOR, '--source', name)
+
+    assert (outcome.returncode, outcome.stdout, outcome.stderr) == (
+        2, '', f'monitor: argument --source: {name!r} is not a valid name of a source; '
+               'see monitor --help\n')

@@ -18,82 +18,101 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
 import functools
+from operator import itemgetter
 import os
-from typing import ClassVar, NamedTuple
+from typing import Any, ClassVar, NamedTuple
 
 from rich.text import Text
 from textual import events
 from textual.app import App, ComposeResult
 from textual.binding import Binding, BindingType
-from textual.containers import ItemGrid
+from textual.containers import Vertical
 from textual.coordinate import Coordinate
+from textual.geometry import Size
+from textual.layout import Layout
+from textual.layouts.grid import GridLayout
 from textual.theme import Theme
-from textual.widgets import Button, DataTable, Sparkline, Static
+from textual.widgets import Button, DataTable, Footer, Input, Sparkline, Static
 
+from . import table
 from .ros_graph import Graph, GraphDevice
-from .table import by_kind, counts, last, level, off_report, report, state
-from ...ros.monitor_view import age, BY_SEVERITY, Cell, FAILED, Key, LEVELS, Line, Request
+from ...ros.monitor_view import BY_SEVERITY, Cell, FAILED, FINE, Request
 
 # s between updates of the screen, and between looks for answers to requests.
 INTERVAL, ANSWER_INTERVAL = 0.1, 0.05
-# s without a key after which a question is dropped; characters that the operator may type.
+# s after which a question is dropped; characters that the operator may type.
 QUESTION_LIFETIME, MAX_TYPED = 15.0, 100
-NORMAL, HELP, STEERING = 'normal', 'help', 'steering'
+NORMAL, STEERING = 'normal', 'steering'
 NO_DEVICES = 'no devices in this ROS graph yet; is a bridge running, with this ROS_DOMAIN_ID?'
-MOVES = {'up': -1, 'k': -1, 'down': 1, 'j': 1, 'pageup': -10, 'pagedown': 10,
-         'home': -10**6, 'end': 10**6}
-# Keys, text, label of the button or '', and action, in the order of the help.
-COMMON_KEYS: tuple[tuple[tuple[str, ...], str, str, str], ...] = (
-    (tuple(MOVES), 'select a device, as a click on it does', '', 'move'),
-    (('m',), 'move a gimbal with the arrow keys; any other key ends that', '', 'steer'),
-    (('enter',), 'yes, where a request asks first; escape is no', '', ''),
-    (('a',), 'ALL lights off, and again where one does not confirm', '', 'all off'),
-    (('c',), 'clear devices that are gone', '', 'clear'),
-    (('v',), 'colours: dark, for sunlight, for the night (red on black)', 'colours', 'colours'),
-    (('?', 'h'), 'this help', 'help', 'help'),
-    (('q', 'ctrl+c', 'ctrl+d', 'ctrl+backslash'), 'quit', 'quit', 'quit'),
-    (('ctrl+z',), 'stop; fg continues', '', 'stop'))
-ACTIONS = {key: action for keys, _, _, action in COMMON_KEYS for key in keys}
-# For terminals that show ASCII only; other characters become question marks.
-ASCII = str.maketrans('…←→↑↓', '~<>^v')
+LOOKING = 'to look only; '
+# The buttons: none, everywhere, only small ones, only those for fingers.
+NONE, ALL, SMALL, LARGE = range(4)
+Keys = tuple[tuple[tuple[str, ...], str, int, str], ...]
+# Keys, text, button, and action. The first keys act while the operator types, too.
+ALWAYS: Keys = (
+    (('a',), 'ALL OFF', NONE, 'all_off'),
+    (('ctrl+c', 'ctrl+d', 'ctrl+backslash'), 'quit', NONE, 'quit'),
+    (('ctrl+z',), 'stop; fg continues', NONE, 'suspend_process'),
+    (('escape',), 'back', ALL, 'answer(False)'), (('enter',), 'yes', ALL, 'answer(True)'))
+COMMON_KEYS: Keys = (
+    (('m',), 'move', ALL, 'steer'), (('c',), 'clear gone', ALL, 'clear'),
+    (('k', 'up'), 'previous', LARGE, 'move(-1)'), (('j', 'down'), 'next', LARGE, 'move(1)'),
+    (('pageup',), '10 devices up', NONE, 'move(-10)'),
+    (('pagedown',), '10 devices down', NONE, 'move(10)'),
+    (('home',), 'first device', NONE, f'move({-10**6})'),
+    (('end',), 'last device', NONE, f'move({10**6})'),
+    (('v',), 'colours', ALL, 'colours'), (('q',), 'quit', SMALL, 'quit'))
 # Eyes that are used to the dark keep that under red light only.
 RED, DARK_RED = '#e00000', '#400000'
-THEMES = (
-    Theme('dark', '#5fafff', foreground='#e0e0e0', background='#121212', surface='#121212',
-          panel='#303030', error='#ff5f5f'),
-    Theme('sunlight', '#000000', foreground='#000000', background='#ffffff', surface='#ffffff',
-          panel='#d0d0d0', error='#a00000', dark=False),
-    Theme('night', RED, foreground=RED, background='#000000', surface='#000000', panel=DARK_RED,
-          error=RED, secondary=RED, warning=RED, success=RED, accent=RED))
+THEMES = {
+    'dark': Theme('dark', '#5fafff', foreground='#e0e0e0', background='#121212',
+                  surface='#121212', panel='#303030', error='#ff5f5f'),
+    'sunlight': Theme('sunlight', '#000000', foreground='#000000', background='#ffffff',
+                      surface='#ffffff', panel='#d0d0d0', error='#a00000', dark=False),
+    'night': Theme('night', RED, foreground=RED, background='#000000', surface='#000000',
+                   panel=DARK_RED, error=RED, secondary=RED, warning=RED, success=RED, accent=RED)}
 COLOURS = {
     'dark': {},
-    'sunlight': {'green': '#005f00', 'yellow': '#704000', 'red': '#a00000', 'cyan': '#004f6f'},
-    'night': dict.fromkeys(('green', 'yellow', 'red', 'cyan'), RED)}
-# Widths of the columns but the last, and the width of each beside its text.
-STATE_WIDTH, LEVEL_WIDTH, PADDING = 6, 6, 2
-# The buttons that any device needs at most.
-BUTTONS = 16
+    'sunlight': {'green': '#005f00', 'yellow': '#704000', 'red': '#a00000'},
+    'night': dict.fromkeys(('green', 'yellow', 'red'), RED)}
+# Of the columns; the last is as wide as any terminal.
+WIDTHS = {'STATE': 6, 'LEVEL': 6, 'REPORT': 500}
 
 
 class Question(NamedTuple):
     """
     A question to the operator.
 
+    :param label: of the key.
     :param answer: returns the request for the typed text, or why there is none, for people.
-    :param typed: the text, None where the operator types nothing.
     :param deadline: when it is dropped, s.
     """
 
     text: str
+    label: str
     answer: Callable[[str], Request | str]
-    typed: str | None
     deadline: float
 
-    def edited(self, key: str) -> str | None:
-        """Return the typed text after a key."""
-        if self.typed is None or key == 'backspace':
-            return self.typed and self.typed[:-1]
-        return self.typed + (' ' if key == 'space' else key * (len(key) == 1))
+
+class Typed(Input):
+    """The text that the operator types; ALL OFF acts all the same."""
+
+    def check_consume_key(self, key: str, character: str | None) -> bool:
+        """See :meth:`Input.check_consume_key`."""
+        return key != 'a' and super().check_consume_key(key, character)
+
+    def check_action(self, action: str, parameters: tuple[object, ...]) -> bool:
+        """Leave "yes" to the application, whose button has a place of its own."""
+        return action != 'submit'
+
+
+class KeyButtons(Footer):
+    """Buttons in rows, as many in each as there is space for their labels."""
+
+    def pre_layout(self, layout: Layout) -> None:
+        """See :meth:`Widget.pre_layout`."""
+        assert isinstance(layout, GridLayout)
+        layout.min_column_width = 24 if self.screen.has_class('-touch') else 18
 
 
 class MonitorApp(App[None], inherit_bindings=False):
@@ -107,16 +126,16 @@ class MonitorApp(App[None], inherit_bindings=False):
     ENABLE_COMMAND_PALETTE = ALLOW_SELECT = False
     # Keys are for the application.
     AUTO_FOCUS = None
-    # Textual has other uses for these.
     BINDINGS: ClassVar[list[BindingType]] = [
-        Binding(key, f'press("{key}")', priority=True) for key in ('ctrl+c', 'escape', 'tab')]
+        Binding(key, action, text, key_display=key, show=button == ALL, priority=True)
+        for keys, text, button, action in ALWAYS for key in keys]
 
     def __init__(self, graph: Graph, *, ascii_only: bool = False, touch: bool = False) -> None:
         # Without colours textual draws shades of grey, unless colours are those of the terminal.
         super().__init__(ansi_color=True if 'NO_COLOR' in os.environ else None)
-        for theme in THEMES:
+        for theme in THEMES.values():
             self.register_theme(theme)
-        self.theme = THEMES[0].name
+        self.theme = 'dark'
         self._graph = graph
         self._ascii_only = ascii_only
         self._touch = touch
@@ -124,18 +143,30 @@ class MonitorApp(App[None], inherit_bindings=False):
         self._at = 0
         self._mode: str | Question = NORMAL
         self._devices: list[GraphDevice] = []
-        self._table = DataTable[Text](id='devices', cursor_type='row')
-        self._off = Button('a ALL OFF', id='off', action='app.press("a")', compact=not touch)
-        self._buttons = [Button(compact=not touch) for _ in range(BUTTONS)]
-        self._trend = Sparkline(id='trend')
-        self._off.visible = graph.may_request
-        for one in (self._table, self._trend, *self._buttons):
-            # Until the first values come.
-            one.display = False
-        for button in (self._off, *self._buttons):
-            # Textual ignores a press during the effect of the one before.
-            button.active_effect_duration = 0.0
         self._shown: dict[str, object] = {}
+        # The size of the table with which the selected row was visible.
+        self._visible_with: Size | None = None
+        self._table = DataTable[Text](id='devices', cursor_type='row')
+        self._trend = Sparkline(id='trend')
+        self._typed = Typed(id='typed', max_length=MAX_TYPED, compact=True)
+        # Buttons are in the order in which keys are bound, whatever device binds a key first.
+        own = [(number + 100 * is_steering, key, f'press({view.kind!r}, {is_steering}, {number})')
+               for view in graph.views
+               for is_steering, keys in ((False, view.keys), (True, view.steering))
+               for number, key in enumerate(keys)]
+        last = {name: place for place, key, _ in sorted(own, key=itemgetter(0))
+                for name in key.keys}
+        for _, key, action in sorted(own, key=lambda one: last[one[1].keys[0]]):
+            self._bind(key.keys, key.text, ALL if key.has_button and not key.prompt else SMALL,
+                       action)
+        for common in COMMON_KEYS:
+            self._bind(*common)
+
+    def _bind(self, keys: Iterable[str], text: str, button: int, action: str) -> None:
+        for key in keys:
+            for one in Binding.make_bindings([(key, action)]):
+                self.bind(one.key, action, description=text, key_display=key,
+                          show=button in (ALL, LARGE if self._touch else SMALL))
 
     def restore(self) -> None:
         """Restore the terminal in a hurry; called in another thread if the end hangs."""
@@ -144,16 +175,22 @@ class MonitorApp(App[None], inherit_bindings=False):
         """See :meth:`App.compose`."""
         yield Static(id='head')
         yield self._table
-        yield Static(id='details')
-        yield self._trend
+        yield Vertical(Static(id='details'), self._trend, id='selected')
         yield Static(id='question')
-        yield self._off
-        yield ItemGrid(*self._buttons, id='keys', min_column_width=24 if self._touch else 14)
+        yield self._typed
+        yield KeyButtons(id='keys', show_command_palette=False)
+        yield Button('a ALL OFF', id='off', action='app.all_off', compact=not self._touch)
 
     def on_mount(self) -> None:
         """Begin to poll."""
         for one in self.query('*'):
-            one.can_focus = False
+            one.can_focus = one is self._typed
+        # Until the first values come.
+        self._table.display = self._trend.display = False
+        off = self.query_one(Button)
+        off.visible = self._graph.may_request
+        # Textual ignores a press during the effect of the one before.
+        off.active_effect_duration = 0.0
         self.screen.set_class(self._touch, '-touch')
         self.set_interval(INTERVAL, self.poll)
         self.set_interval(ANSWER_INTERVAL, self._graph.poll_answers)
@@ -166,16 +203,11 @@ class MonitorApp(App[None], inherit_bindings=False):
             self._mode = NORMAL
         self.draw()
 
-    def on_key(self, event: events.Key) -> None:
-        """Act on a key."""
-        shown = event.character or ''
-        self.action_press(shown if shown.isprintable() and shown > ' ' else event.key)
+    def on_app_focus(self, event: events.AppFocus | events.AppBlur) -> None:
+        """Keep the buttons: textual makes them again, and loses the first click on one."""
+        event.prevent_default()
 
-    def on_paste(self, event: events.Paste) -> None:
-        """Take text while the operator types."""
-        if isinstance(self._mode, Question) and self._mode.typed is not None:
-            self._ask(self._mode.text, self._mode.answer, self._mode.typed + event.text)
-        self.draw()
+    on_app_blur = on_app_focus
 
     def on_mouse_down(self, event: events.MouseDown) -> None:
         """Select the device of a row."""
@@ -184,71 +216,93 @@ class MonitorApp(App[None], inherit_bindings=False):
             self._select(self._devices[row])
             self.draw()
 
-    def action_press(self, key: str) -> None:
-        """Act on a key, or on a click on its button."""
-        device, action = self._selected, ACTIONS.get(key)
-        mode, self._mode = self._mode, NORMAL
-        if action == 'quit':
-            self.exit()
-        elif action == 'all off':
-            # The help names this key, and it acts there and while the operator types, too.
-            self._graph.all_off()
-        elif isinstance(mode, Question) and device is not None:
-            if key == 'enter':
-                self._request(device, mode.text, mode.answer(mode.typed or ''), is_confirmed=True)
-            elif key != 'escape':
-                self._ask(mode.text, mode.answer, mode.edited(key))
-        elif action == 'help' and mode != HELP:
-            self._mode = HELP
-        elif action == 'colours':
-            names = [theme.name for theme in THEMES]
-            self.theme = names[(names.index(self.theme) + 1) % len(names)]
-            self._shown.clear()
-        elif action == 'stop':
-            self.action_suspend_process()
-        elif mode != HELP and device is not None:
-            self._press(device, key, action, device.view.steering if mode == STEERING else ())
+    async def run_action(self, *arguments: Any, **options: Any) -> bool:
+        """See :meth:`App.run_action`; draw what it has changed."""
+        is_done = await super().run_action(*arguments, **options)
         self.draw()
+        return is_done
 
-    def _press(
-        self, device: GraphDevice, key: str, action: str | None, steering: Sequence[Key],
-    ) -> None:
-        chosen = next((one for one in (*steering, *device.view.keys) if key in one.keys), None)
-        if chosen in steering or action == 'steer' and device.view.steering:
-            self._mode = STEERING
-        if chosen is not None:
-            make = functools.partial(chosen.request, device)
-            if chosen.prompt:
-                self._ask(chosen.prompt, make, '')
-            else:
-                self._request(device, chosen.label, make(''))
-        elif action == 'clear':
-            self._graph.clear_gone()
-        elif action == 'move':
-            devices = self._devices
-            at = min(max(devices.index(device) + MOVES[key], 0), len(devices) - 1)
-            self._select(devices[at])
+    def check_action(self, action: str, parameters: tuple[object, ...]) -> bool:
+        """Return whether an action is possible now: its key has a button then."""
+        is_asking = isinstance(self._mode, Question)
+        view = self._selected.view if self._selected and self._graph.may_request else None
+        match action, parameters:
+            case 'answer', (is_yes,):
+                return is_asking if is_yes else self._mode != NORMAL
+            case 'press', (kind, is_steering, _):
+                return view is not None and view.kind == kind and not is_asking and (
+                    is_steering is (self._mode == STEERING))
+            case 'steer', _:
+                return view is not None and bool(view.steering) and self._mode == NORMAL
+            case 'clear', _:
+                return not is_asking and any(one.is_gone for one in self._devices)
+        return not (is_asking and action in ('move', 'colours'))
 
-    def _request(
-        self, device: GraphDevice, label: str, request: Request | str, is_confirmed: bool = False,
-    ) -> None:
-        if isinstance(request, str):
-            device.note(label, FAILED, request)
-        elif request.question and not is_confirmed:
-            self._ask(request.question, lambda _: request)
+    def action_move(self, step: int) -> None:
+        """Select another device."""
+        self._mode = NORMAL
+        if self._devices:
+            self._select(self._devices[min(max(self._at + step, 0), len(self._devices) - 1)])
+
+    def action_steer(self) -> None:
+        """Let the arrow keys move the selected device."""
+        self._mode = STEERING
+
+    def action_colours(self) -> None:
+        """Take the next colours."""
+        names = list(THEMES)
+        self.theme = names[(names.index(self.theme) + 1) % len(names)]
+        self._shown.clear()
+
+    def action_all_off(self) -> None:
+        """Switch off every device that can be switched off."""
+        self._mode = NORMAL
+        self._graph.all_off()
+
+    def action_clear(self) -> None:
+        """Remove the devices that are gone."""
+        self._graph.clear_gone()
+
+    def action_press(self, kind: str, is_steering: bool, number: int) -> None:
+        """Act on a key of the selected device."""
+        assert self._selected is not None
+        view, self._mode = self._selected.view, STEERING if is_steering else NORMAL
+        key = (view.steering if is_steering else view.keys)[number]
+        make = functools.partial(key.request, self._selected)
+        if key.prompt:
+            self._ask(key.prompt, key.text, make, is_typed=True)
         else:
-            device.submit(request)
+            self._request(key.text, make(''))
+
+    def action_answer(self, is_yes: bool) -> None:
+        """Answer a question, or end to move a gimbal."""
+        mode, self._mode = self._mode, NORMAL
+        if is_yes and isinstance(mode, Question):
+            self._request(mode.label, mode.answer(self._typed.value), is_confirmed=True)
+
+    def _request(self, label: str, made: Request | str, is_confirmed: bool = False) -> None:
+        assert self._selected is not None
+        if isinstance(made, str):
+            self._selected.note(label, FAILED, made)
+        elif made.question and not is_confirmed:
+            self._ask(made.question, label, lambda _: made)
+        else:
+            self._selected.submit(made)
 
     def _ask(
-        self, text: str, answer: Callable[[str], Request | str], typed: str | None = None,
+        self, text: str, label: str, answer: Callable[[str], Request | str],
+        is_typed: bool = False,
     ) -> None:
-        self._mode = Question(text, answer, typed and typed[:MAX_TYPED],
-                              self._graph.clock() + QUESTION_LIFETIME)
+        self._mode = Question(text, label, answer, self._graph.clock() + QUESTION_LIFETIME)
+        if is_typed:
+            self._typed.value = ''
+            self._typed.display = True
+            self._typed.focus()
 
     def _select(self, device: GraphDevice | None) -> None:
         if device is not self._selected:
             # A question belongs to the other device.
-            self._selected, self._mode = device, HELP if self._mode == HELP else NORMAL
+            self._selected, self._mode = device, NORMAL
 
     def draw(self) -> None:
         """Draw what has changed."""
@@ -259,30 +313,34 @@ class MonitorApp(App[None], inherit_bindings=False):
             device.attention, -BY_SEVERITY.index(device.level or 0)))
         if self._selected not in devices:
             self._select(devices[min(self._at, len(devices) - 1)] if devices else None)
-        self._at = 0 if self._selected is None else devices.index(self._selected)
         device, mode = self._selected, self._mode
-        self._table.display = bool(devices) and mode != HELP
-        self.screen.set_class(mode == HELP, '-help')
+        self._at = 0 if device is None else devices.index(device)
         self._draw_table(devices)
-        self._show('head', self._help() if mode == HELP else self._head())
-        self._show('details', [] if device is None or mode == HELP or self.size.height < 12 else [
-            [(f'{label:8}', 'bold'), *cells] for label, cells in _details(device)])
-        values = [] if device is None else [one for one in device.trend if one is not None]
-        self._trend.display = len(values) > 1 and self.size.height >= 16 and mode != HELP and (
-            not self._ascii_only)
+        self._table.display = bool(devices)
+        self._show('head', self._head())
+        self._show('details', [] if device is None or self.size.height < 12 else [
+            [(f'{label:8}', 'bold'), *cells] for label, cells in table.details(device)])
         # A tenth of a degree is not a peak.
-        self._trend.data = [round(one) for one in values]
-        self._show('question', [[(mode.text, 'bold yellow'), ' ', (
-            '' if mode.typed is None else f'{mode.typed}_', 'reverse')]]
-            if isinstance(mode, Question) else [])
-        self._draw_buttons()
+        self._trend.data = [] if device is None else [
+            round(one) for one in device.trend if one is not None]
+        self._trend.display = len(self._trend.data) > 1 and self.size.height >= 16 and (
+            not self._ascii_only)
+        question = mode.text if isinstance(mode, Question) else ''
+        self._show('question', [[(question, 'bold yellow')]] if question else [])
+        if self._typed.display and not question:
+            self._typed.display = False
+            self.set_focus(None)
+        keys = device and device.view, bool(question) or mode, self.check_action('clear', ())
+        if self._shown.get('keys') != keys:
+            self._shown['keys'] = keys
+            self.refresh_bindings()
 
     def _text(self, cells: Iterable[Cell]) -> Text:
         """Return a line, in the colours of the theme."""
         text, colours = Text(end=''), COLOURS[self.theme]
         for shown, style in ((one, '') if isinstance(one, str) else one for one in cells):
             if self._ascii_only:
-                shown = shown.translate(ASCII).encode('ascii', 'replace').decode()
+                shown = shown.encode('ascii', 'replace').decode()
             text.append(shown, ' '.join(colours.get(word, word) for word in style.split()))
         return text
 
@@ -295,86 +353,43 @@ class MonitorApp(App[None], inherit_bindings=False):
             part.update(text)
 
     def _head(self) -> Iterable[Iterable[Cell]]:
-        if answers := self._graph.off_answers:
-            yield off_report(answers)
-        yield [('; '.join(map(counts, by_kind(self._graph.devices))) or NO_DEVICES, 'bold')]
+        if (answers := self._graph.off_answers) is not None:
+            yield table.off_report(answers)
+        for device in self._devices[:self._table.scroll_offset.y]:
+            if device.attention != FINE:
+                yield [f'above: {device.name} ', *table.state(device), ' ', *table.level(device)]
+        yield [(LOOKING * (not self._graph.may_request) + (
+            table.counts(self._graph.devices) or NO_DEVICES), 'bold')]
 
     def _draw_table(self, devices: Sequence[GraphDevice]) -> None:
-        width = self.size.width
-        names = max(min(max((len(one.name) for one in devices), default=0), width // 4), 8)
-        widths = {'DEVICE': names, 'STATE': STATE_WIDTH, 'LEVEL': LEVEL_WIDTH}
-        widths['REPORT'] = max(width - sum(widths.values()) - PADDING * 4, 1)
-        rows = [self._row(device, names) for device in devices]
-        if self._shown.get('widths') != widths or len(devices) != len(self._devices):
-            self._shown['widths'] = widths
+        width = max(min(max((len(one.name) for one in devices), default=0),
+                        self.size.width // 4), 8)
+        rows = [self._row(device, width) for device in devices]
+        if self._shown.get('table') != (width, len(rows)):
+            self._shown['table'] = width, len(rows)
             self._table.clear(columns=True)
-            for title, size in widths.items():
-                self._table.add_column(title, width=size)
+            for title, columns in {'DEVICE': width, **WIDTHS}.items():
+                self._table.add_column(title, width=columns)
             self._table.add_rows(rows)
         for y, row in enumerate(rows):
             for x, cell in enumerate(row):
                 if self._table.get_cell_at(Coordinate(y, x)) != cell:
                     self._table.update_cell_at(Coordinate(y, x), cell)
         self._devices = list(devices)
-        if self._table.cursor_row != self._at:
+        self._table.styles.max_height = len(rows) + 1
+        # Where the list gets shorter the selected row stays visible, unless it was scrolled away.
+        top, size = self._table.scroll_offset.y, self._table.size
+        if self._table.cursor_row != self._at or self._visible_with not in (None, size):
             self._table.move_cursor(row=self._at)
+        self._visible_with = size if top <= self._at < top + size.height - 1 else None
 
     def _row(self, device: GraphDevice, width: int) -> list[Text]:
-        row = [self._text(cells) for cells in (
-            [device.name], [state(device)], [level(device)], report(device))]
-        row[0].truncate(width, overflow='crop' if self._ascii_only else 'ellipsis')
+        # Names differ at their ends.
+        name = device.name if len(device.name) <= width else f'…{device.name[1 - width:]}'
+        row = [self._text([name]), *(self._text(column(device)) for column in (
+            table.state, table.level, table.report))]
         for cell in row:
             cell.no_wrap, cell.overflow = True, 'crop'
-            if device.is_stale:
-                cell.stylize('dim')
+        if device.is_stale:
+            row[-1].stylize('dim')
         return row
-
-    def _draw_buttons(self) -> None:
-        labels = list(self._labels())
-        if self._shown.get('buttons') == labels:
-            return
-        self._shown['buttons'] = labels
-        for number, button in enumerate(self._buttons):
-            button.display = number < len(labels)
-            if button.display:
-                key, label = labels[number]
-                button.label = self._text([f'{key} {label}']).plain
-                button.action = f'app.press({key!r})'
-
-    def _labels(self) -> Iterable[tuple[str, str]]:
-        """Return key and label of each button."""
-        view, mode = None if self._selected is None else self._selected.view, self._mode
-        if isinstance(mode, Question):
-            # "no" is where a second tap on the button that asked may fall.
-            yield from (('escape', 'no'), ('enter', 'yes'))
-        elif mode == HELP:
-            yield 'escape', 'back'
-        else:
-            if view is not None and self._graph.may_request:
-                keys = view.steering if mode == STEERING else view.keys
-                yield from ((one.keys[0], one.label) for one in keys if one.label)
-                if view.steering:
-                    yield ('m', 'move') if mode == NORMAL else ('escape', 'ends')
-            yield from ((names[0], label) for names, _, label, _ in COMMON_KEYS if label)
-
-    def _help(self) -> Iterable[Iterable[Cell]]:
-        views = {device.view.kind: device.view for device in self._graph.devices}
-        for keys, text in [*((keys, text) for keys, text, _, _ in COMMON_KEYS), *(
-                (key.keys, f'{kind}: {key.text}') for kind, one in views.items()
-                for key in (*one.keys, *one.steering))]:
-            yield [(f'{"  ".join(keys):22}', 'bold'), f' {text}']
-
-
-def _details(device: GraphDevice) -> Iterable[Line]:
-    yield device.name, []
-    if device.action is not None:
-        yield 'last', [*last(device), (f' ({age(device.now - device.action[3])} ago)', 'dim')]
-    for kind, one in device.diagnoses.items():
-        held = device.number(kind, 'held_s')
-        yield kind, [LEVELS[device.level_of(one)], f': {one.message}', '' if held is None else (
-            f'; held by {device.diagnosed(kind, "holder")} for {age(held)}')]
-    if notice := device.view.notice(device):
-        yield 'soon', [notice]
-    yield from device.view.details(device)
-    if device.now - device.heard_at > 2:
-        yield 'silent', [f'nothing heard for {age(device.now - device.heard_at)}']

@@ -272,6 +272,7 @@ class Graph:
     :param source: of commands, see :class:`Device`.
     :param may_request: whether requests are sent, or refused here.
     :ivar clock: returns the time, s.
+    :ivar views: of all payloads.
     :ivar devices: in the order of the views, then by name.
     """
 
@@ -280,7 +281,7 @@ class Graph:
         clock: Callable[[], float] = time.monotonic, *, may_request: bool = True,
     ) -> None:
         self._node = node
-        self._views = views
+        self.views = views
         self._source = source
         self.clock = clock
         self.may_request = may_request
@@ -303,13 +304,13 @@ class Graph:
                 device.require_off(device.view.off(device))
 
     @property
-    def off_answers(self) -> list[tuple[str, tuple[str, str], str]]:
-        """Return name, outcome and answer of each device until ALL OFF is over."""
+    def off_answers(self) -> list[tuple[str, tuple[str, str], str]] | None:
+        """Return name, outcome and answer of each device, None if ALL OFF is over."""
         answers = [(device.name, *device.off) for device in self.devices if device.off]
         is_over = self.clock() > self._off_at + (
             shared.NEWS_LIFETIME if all(outcome == shared.DONE for _, outcome, _ in answers)
             else 2 * OFF_LIMIT)
-        return [] if is_over else answers
+        return None if is_over else answers
 
     def clear_gone(self) -> None:
         """Remove the devices that are gone."""
@@ -347,14 +348,14 @@ class Graph:
                 known.log(sane(line.msg))
 
     def _query(self, now: float) -> None:
-        found = devices_among(self._node.get_topic_names_and_types(), self._views,
+        found = devices_among(self._node.get_topic_names_and_types(), self.views,
                               self._node.count_publishers)
         for device in self.devices:
             device.is_gone = found.pop(device.name, None) is not device.view
         for name in sorted(found)[:MAX_DEVICES - len(self.devices)]:
             self.devices.append(GraphDevice(
                 self._node, name, found[name], now, self._source, may_request=self.may_request))
-        self.devices.sort(key=lambda device: (self._views.index(device.view), device.name))
+        self.devices.sort(key=lambda device: (self.views.index(device.view), device.name))
 
 
 def _taken(subscription: Subscription, limit: int = 1) -> Iterator[Any]:

@@ -35,6 +35,7 @@ from .table import as_json, plain
 from .. import entry_point
 from ..arguments import option, Parser
 from ..termination import Termination
+from ...payload.command_sources import source_name
 from ...payload.payload_type import PayloadType
 from ...ros.monitor_view import Device, LOST, NOT_KNOWN
 
@@ -43,7 +44,7 @@ SETTLING = 1.0
 DEFAULT_WEB = '127.0.0.1:8000'
 DESCRIPTION = """\
 Shows the lights, gimbals and cameras of all bridges in a ROS graph, in a terminal or a browser,
-with keys and clicks to operate the selected one; ? lists them. If standard input or output is not
+with keys and clicks to operate the selected one. If standard input or output is not
 a terminal, it prints one table and ends.
 """
 EPILOG = """\
@@ -72,7 +73,7 @@ def address(text: str) -> tuple[str, int]:
 def parser() -> argparse.ArgumentParser:
     """Return the parser of the command line."""
     made = Parser('monitor', DESCRIPTION, EPILOG)
-    made.add_argument('--source', default='', metavar='NAME',
+    made.add_argument('--source', type=option(source_name), metavar='NAME',
                       help='source of commands to use for devices that have sources')
     made.add_argument('--web', type=option(address), nargs='?', const=address(DEFAULT_WEB),
                       metavar='HOST:PORT', help=f'serve a browser (default: {DEFAULT_WEB})')
@@ -80,7 +81,7 @@ def parser() -> argparse.ArgumentParser:
                       help='admit a browser only by a one-time token: of the printed URLs, one is '
                            'to look only; every address except loopback needs it')
     made.add_argument('--look', action='store_true', help='show devices, and request nothing')
-    made.add_argument('--once', action='store_true', help='print one table and end')
+    made.add_argument('--once', action='store_true', help='print the list and end')
     made.add_argument('--json', action='store_true', help='print all values as JSON and end')
     made.add_argument('--wait', type=float, default=6.0, metavar='S',
                       help='longest search for devices before that table, s (default: 6)')
@@ -110,7 +111,7 @@ def run(
         node = Node(f'illuminator_monitor_{uuid.uuid4().hex[:8]}', enable_rosout=False,
                     start_parameter_services=False)
     views = [one.load('view') for one in payloads.values() if one.view]
-    graph = Graph(node, views, options.source, may_request=not options.look)
+    graph = Graph(node, views, options.source or '', may_request=not options.look)
     is_terminal = os.environ.get('TERM', 'dumb') not in ('dumb', 'unknown') and all(
         stream is not None and stream.isatty() for stream in (sys.stdin, sys.stdout))
     try:

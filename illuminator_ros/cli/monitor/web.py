@@ -27,10 +27,12 @@ import functools
 import hmac
 import ipaddress
 import logging
+import math
 from pathlib import Path
 import secrets
 import shlex
 import sys
+import time
 from weakref import WeakKeyDictionary
 
 from aiohttp import web
@@ -73,6 +75,7 @@ class Gate:
     loopback answers to names of loopback only.
 
     :param announce: takes the query of a URL with a token.
+    :ivar rights: of connections with an admitted request.
     """
 
     def __init__(self, needs_token: bool, is_local: bool, announce: Complain) -> None:
@@ -84,7 +87,7 @@ class Gate:
         self._cookies = {right: secrets.token_urlsafe(32) for right in RIGHTS}
         self._tabs = 0
         # Of the last admitted request of each connection.
-        self._rights: WeakKeyDictionary[asyncio.BaseTransport, str] = WeakKeyDictionary()
+        self.rights: WeakKeyDictionary[asyncio.BaseTransport, str] = WeakKeyDictionary()
 
     def open(self) -> None:  # noqa: A003
         """Announce a URL, or one with a token for each right."""
@@ -107,7 +110,7 @@ class Gate:
             raise _refusal(request, web.HTTPBadRequest(
                 text='not an address, a cookie or a token')) from None
         if request.transport is not None:
-            self._rights[request.transport] = right
+            self.rights[request.transport] = right
         if is_socket and self._tabs >= MAX_TABS:
             raise _refusal(request, web.HTTPServiceUnavailable(text='too many tabs'))
         self._tabs += is_socket
@@ -115,11 +118,6 @@ class Gate:
             return await handler(request)
         finally:
             self._tabs -= is_socket
-
-    def right(self, request: web.Request) -> str:
-        """Return the right of an admitted request."""
-        assert request.transport is not None
-        return self._rights[request.transport]
 
     def _admit(self, request: web.Request, is_socket: bool) -> str:
         """Return the right of a request."""
@@ -146,7 +144,7 @@ class Gate:
     def connect(self, server: web.Server) -> asyncio.Protocol:
         """Return the protocol of a new connection; drop strangers if there are too many."""
         transports = [one.transport for one in server.connections if one.transport is not None]
-        strangers = [one for one in transports if one not in self._rights]
+        strangers = [one for one in transports if one not in self.rights]
         for one in strangers[:max(len(strangers) + 1 - MAX_STRANGERS, 0)]:
             log.warning('too many connections')
             one.abort()
@@ -155,38 +153,29 @@ class Gate:
 
 class LineLog(logging.Handler):
     """
-    Writes one line in each :data:`LOG_INTERVAL`, however much is logged.
+    Writes one line at most in each :data:`LOG_INTERVAL`, however much is logged.
 
     :param write: takes a line.
-    :param later: calls a function after a time, s.
+    :param clock: returns the time, s.
     """
 
-    def __init__(
-        self, write: Complain, later: Callable[[float, Callable[[], None]], object],
-    ) -> None:
+    def __init__(self, write: Complain, clock: Callable[[], float] = time.monotonic) -> None:
         super().__init__()
         self._write = write
-        self._later = later
-        self._last, self._count = '', 0
-        self._is_waiting = False
+        self._clock = clock
+        self._due, self._left_out = -math.inf, 0
 
     def emit(self, record: logging.LogRecord) -> None:
         """See :meth:`logging.Handler.emit`."""
+        if self._clock() < self._due:
+            self._left_out += 1
+            return
         error = record.exc_info and record.exc_info[1]
         text = record.getMessage() + (f': {error}' if error else '')
         # Others choose a part of the text.
-        self._last = text[:MAX_LINE].encode('unicode_escape').decode()
-        self._count += 1
-        if not self._is_waiting:
-            self._flush()
-
-    def _flush(self) -> None:
-        self._is_waiting = self._count > 0
-        if self._is_waiting:
-            more = f' ({self._count - 1} more in {LOG_INTERVAL:g} s)' * (self._count > 1)
-            self._write(self._last + more)
-            self._count = 0
-            self._later(LOG_INTERVAL, self._flush)
+        self._write(text[:MAX_LINE].encode('unicode_escape').decode() + (
+            f' ({self._left_out} more before)' if self._left_out else ''))
+        self._due, self._left_out = self._clock() + LOG_INTERVAL, 0
 
 
 def _refusal(request: web.Request, answer: web.HTTPException) -> web.HTTPException:
@@ -214,13 +203,13 @@ async def listening(
     :param commands: what a tab runs, by the right of its browser.
     :raises OSError: if it cannot listen.
     """
-    loop = asyncio.get_running_loop()
     # The logs of all parts: aiohttp logs tracebacks of requests, asyncio each failed accept().
-    lines = LineLog(complain, loop.call_later)
+    lines = LineLog(complain)
     tabs = {right: Server(command) for right, command in commands.items()}
 
     async def socket(request: web.Request) -> web.WebSocketResponse:
-        return await tabs[gate.right(request)].handle_websocket(request)
+        assert request.transport is not None
+        return await tabs[gate.rights[request.transport]].handle_websocket(request)
 
     app = web.Application(middlewares=[gate.check])
     app.add_routes([web.get('/', _page), web.get('/ws', socket),
@@ -231,7 +220,7 @@ async def listening(
     assert runner.server is not None
     logging.getLogger().addHandler(lines)
     try:
-        listener = await loop.create_server(
+        listener = await asyncio.get_running_loop().create_server(
             functools.partial(gate.connect, runner.server), host, port)
         yield
         listener.close()

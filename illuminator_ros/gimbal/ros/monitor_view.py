@@ -25,7 +25,7 @@ from sensor_msgs.msg import NavSatFix
 from std_msgs.msg import Bool, Header, String
 
 from ...ros import monitor_view as shared
-from ...ros.monitor_view import Column, Device, Key, Request, Topic, UNKNOWN
+from ...ros.monitor_view import Device, Key, Request, Topic, UNKNOWN
 
 # Degrees for one press of an arrow key.
 STEP = 5.0
@@ -113,11 +113,6 @@ def _details(device: Device) -> Iterable[shared.Line]:
                       device.values.get('controller', 'unknown'), f' for {since}' * bool(since)]
 
 
-def _arrow(key: str, label: str, axis: str, step: float) -> Key:
-    return Key((key,), f'after m: {key} by {STEP:g} degrees', label,
-               functools.partial(nudge, axis=axis, step=step))
-
-
 VIEW = shared.View(
     'gimbal', {
         'connected': Topic(Bool), 'in_control': Topic(Bool), 'controller': Topic(String),
@@ -126,23 +121,20 @@ VIEW = shared.View(
             message.header.frame_id, message.vector.x, message.vector.y, message.vector.z),
             is_state=False)},
     ('in_control', 'controller', 'angles', 'connected'),
-    (*(Column(axis.upper(), 11, functools.partial(described, axis=axis))
-       for axis in ('pitch', 'yaw')),
-     Column('CONTROL', 30, lambda device: device.values.get('controller', UNKNOWN)),
-     Column('LOCK', 4, lambda device: {True: 'yaw', False: 'no', None: UNKNOWN}[
-         device.values.get('yaw_lock')]),
-     Column('FRAME', 20, lambda device: device.values.get('angles', (UNKNOWN,))[0]),
-     Column('ROLL', 11, functools.partial(described, axis='roll'))),
+    lambda device: (
+        device.values.get('controller', UNKNOWN), f'pitch {described(device, "pitch")}',
+        f'yaw {described(device, "yaw")}', 'yaw locked' * bool(device.values.get('yaw_lock')),
+        device.values.get('angles', (UNKNOWN,))[0]),
     _details,
-    (Key(('t',), 'take control, which asks first if another component has it', 'take control',
-         take_control),
-     shared.trigger_key('l', 'release control', 'release', 'release_control'),
-     Key(('n',), 'turn to the neutral position, which asks first', 'neutral', neutral),
-     Key(('p',), 'point at a place', 'point', point,
+    (Key(('t',), 'take control', take_control),
+     shared.trigger_key('l', 'release control', 'release_control'),
+     Key(('n',), 'neutral position', neutral),
+     Key(('p',), 'point at a place', point,
          'latitude, longitude (degrees) and altitude (m above the ellipsoid)'),
      shared.RELEASE_SOURCE),
-    steering=(_arrow('left', '←', 'yaw', STEP), _arrow('right', '→', 'yaw', -STEP),
-              _arrow('up', '↑', 'pitch', -STEP), _arrow('down', '↓', 'pitch', STEP)),
+    steering=[Key((key,), f'by {STEP:g} deg', functools.partial(nudge, axis=axis, step=step))
+              for key, axis, step in (('left', 'yaw', STEP), ('right', 'yaw', -STEP),
+                                      ('up', 'pitch', -STEP), ('down', 'pitch', STEP))],
     states={'ours': 'bold green', 'ok': 'green'},
     state=lambda device: 'ours' if device.values.get('in_control') else (
         'ok' if device.values else shared.NOT_KNOWN))

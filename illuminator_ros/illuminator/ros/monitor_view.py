@@ -27,7 +27,7 @@ from std_msgs.msg import Bool, Float32, Float64, String, UInt32
 from std_srvs.srv import SetBool
 
 from ...ros import monitor_view as shared
-from ...ros.monitor_view import Column, Device, Key, measured, Request, Topic, UNKNOWN
+from ...ros.monitor_view import Device, Key, measured, Request, Topic, UNKNOWN
 
 # Brightness steps, %; strobe for a light that has none, s and %.
 STEP, FINE_STEP = 10.0, 1.0
@@ -89,8 +89,9 @@ def is_dangerous(device: Device) -> bool:
 
 def _notice(device: Device) -> str:
     seconds = device.number('lamp', 'off_in_s')
-    return '' if seconds is None or device.is_stale else (
-        f'off in {shared.age(seconds)} without a request: o keeps it on')
+    if device.is_stale:
+        return 'was ON' * bool(device.values.get('enabled'))
+    return '' if seconds is None else f'off in {shared.age(seconds)} (o: keep on)'
 
 
 def strobe(device: Device, typed: str) -> Request | str:
@@ -140,21 +141,18 @@ VIEW = shared.View(
         'strobe_duty_cycle': Topic(Float32), 'uptime': Topic(Float64), 'source': Topic(String),
         'temperature': Topic(Temperature, lambda message: message.temperature, is_state=False)},
     ('error_flags', 'brightness', 'enabled', 'connected'),
-    (Column('BRIGHT', 6, lambda device: measured(device.values.get('brightness'), '%')),
-     Column('TEMP', 8, lambda device: measured(temperature(device), 'C', '.1f')),
-     Column('STROBE', 11, _strobe),
-     Column('MODE', 8, lambda device: device.values.get('mode', UNKNOWN).partition('_')[0])),
+    lambda device: (
+        measured(device.values.get('brightness'), '%'),
+        measured(temperature(device), 'C', '.1f'), _strobe(device),
+        device.values.get('mode', UNKNOWN).partition('_')[0]),
     _details,
-    (Key(('space',), 'switch it on, which asks first, or off', 'on/off', switch),
-     Key(('0',), 'switch it off', 'off', switch_off),
-     Key(('+', '=', 'right'), 'brighter by 10 %', 'brighter', functools.partial(dim, step=STEP)),
-     Key(('-', '_', 'left'), 'darker by 10 %', 'darker', functools.partial(dim, step=-STEP)),
-     Key(('.', '>'), 'brighter by 1 %', '', functools.partial(dim, step=FINE_STEP)),
-     Key((',', '<'), 'darker by 1 %', '', functools.partial(dim, step=-FINE_STEP)),
-     Key(('o',), 'keep it on: off_after_silence begins again', 'keep on', keep_on),
-     Key(('s',), 'strobe, which asks first, or no strobe', 'strobe', strobe),
-     shared.trigger_key('r', 'ask for identity and status again', 'refresh', 'refresh'),
-     shared.RELEASE_SOURCE),
+    (Key(('space',), 'on/off', switch), Key(('0',), 'off', switch_off),
+     Key(('+', '=', 'right'), 'brighter 10 %', functools.partial(dim, step=STEP)),
+     Key(('-', '_', 'left'), 'darker 10 %', functools.partial(dim, step=-STEP)),
+     Key(('.', '>'), 'brighter 1 %', functools.partial(dim, step=FINE_STEP), has_button=False),
+     Key(('comma', '<'), 'darker 1 %', functools.partial(dim, step=-FINE_STEP), has_button=False),
+     Key(('o',), 'keep on', keep_on), Key(('s',), 'strobe', strobe),
+     shared.trigger_key('r', 'refresh', 'refresh'), shared.RELEASE_SOURCE),
     states={'ON': 'bold green', 'off': ''},
     state=lambda device: {True: 'ON', False: 'off', None: shared.NOT_KNOWN}[
         device.values.get('enabled')],

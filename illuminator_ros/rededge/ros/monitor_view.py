@@ -23,7 +23,7 @@ from sensor_msgs.msg import NavSatFix
 from std_msgs.msg import Bool, UInt32
 
 from ...ros import monitor_view as shared
-from ...ros.monitor_view import Column, Device, Topic, trigger_key, UNKNOWN
+from ...ros.monitor_view import Device, Topic, trigger_key, UNKNOWN
 
 # The inputs, as /diagnostics names them, and the styles of their states.
 INPUTS = ('fix', 'velocity', 'velocity_with_covariance', 'odometry', 'satellites', 'imu',
@@ -70,11 +70,9 @@ VIEW = shared.View(
             message.status.status, message.latitude, message.longitude, message.altitude),
             is_state=False)},
     ('image/index', 'image/fix', 'connected'),
-    (Column('IMAGE', 14, _image),
-     Column('PING', 8, lambda device: shared.measured(
-         device.number('camera', 'round_trip_ms'), 'ms')),
-     Column('INPUTS', 24, _inputs), Column('POSITION', 30, place)),
+    lambda device: (
+        _image(device), shared.measured(device.number('camera', 'round_trip_ms'), 'ms'),
+        _inputs(device), place(device)),
     _details,
-    (trigger_key('space', 'take an image', 'capture', 'capture'),
-     trigger_key('b', 'take an image of the calibration panel', 'panel', 'capture_panel'),
-     trigger_key('p', 'measure the round trip through the camera', 'ping', 'ping')))
+    (trigger_key('space', 'capture', 'capture'),
+     trigger_key('b', 'capture panel', 'capture_panel'), trigger_key('p', 'ping', 'ping')))
