@@ -130,6 +130,17 @@ def test_a_takeover_leaves_the_commands_to_another_gimbal_of_the_manager() -> No
     assert [one.success for one in rig.results] == [False, True]
 
 
+def test_a_stream_leaves_the_call_of_its_own_source_under_way() -> None:
+    rig = shared()
+    rig.managers[0].answers = False
+    rig.gimbal.begin_call('operator', rig.now)
+    rig.gimbal.clear_roi(rig.now, rig.done)
+    rig.gimbal.claim('operator', rig.now)
+    rig.run(0.1)
+
+    assert (holder(rig), rig.results) == ('operator', [])
+
+
 def test_a_takeover_ends_the_commands_of_the_lower_source_and_their_resends() -> None:
     rig = shared()
     rig.managers[0].answers = False
