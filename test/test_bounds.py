@@ -26,7 +26,7 @@ from unittest.mock import Mock
 
 from illuminator_ros.cli.discover.port import Port
 from illuminator_ros.gimbal.manager_state import MAX_OTHER_DEVICES
-from illuminator_ros.illuminator.light import Settings
+from illuminator_ros.illuminator.light import LightSettings
 from illuminator_ros.illuminator.mount_orientation import MAX_MOUNTS, MountOrientations
 from illuminator_ros.illuminator.simulated import SimulatedIlluminator
 from illuminator_ros.illuminator.simulated_properties import (
@@ -53,7 +53,7 @@ from illuminator_ros.payload.discovery import MAX_CANDIDATES, MAX_DEVICES, MAX_I
 from illuminator_ros.payload.messages import Attitude, GimbalDeviceAttitudeStatus
 from illuminator_ros.payload.simulated import SimulatedComponents
 from illuminator_ros.rededge.client import RedEdgeClient
-from illuminator_ros.rededge.input_states import Settings as InputSettings
+from illuminator_ros.rededge.input_states import CameraSettings
 from illuminator_ros.rededge.messages import CameraFeedback
 import pytest
 from support.client import Client
@@ -92,22 +92,22 @@ def linked(
 
 
 def bridge(message: Message, *, pause: float = 0.003, **options: Any) -> object:
-    return linked(Client(OURS, Settings(), **options),
+    return linked(Client(OURS, LightSettings(), **options),
                   *(frame_of(message, 0, one) for one in senders()), pause=pause)
 
 
 def beginnings_of_frames() -> object:
-    return linked(Client(OURS, Settings()), *[frame_of()[:9]] * COUNT)
+    return linked(Client(OURS, LightSettings()), *[frame_of()[:9]] * COUNT)
 
 
 def signed_streams() -> object:
     frames = (signed_frame(ticks(1.7e9 + 1000.0), link_id=number % 256, source=source)
               for number, source in enumerate(senders()))
-    return linked(Client(OURS, Settings()), *frames, signing=checker())
+    return linked(Client(OURS, LightSettings()), *frames, signing=checker())
 
 
 def own_frames() -> object:
-    link = linked(Client(OURS, Settings()), signing=checker())
+    link = linked(Client(OURS, LightSettings()), signing=checker())
     for _ in range(3 * frame_writer.MAX_STAMPS):
         link.endpoint.outgoing.append((OURS, heartbeat(18)))
     link.run(0.1)
@@ -115,7 +115,7 @@ def own_frames() -> object:
 
 
 def requests() -> object:
-    client = Client(OURS, Settings())
+    client = Client(OURS, LightSettings())
     link = linked(client, frame_of(status_message(100)))
     light = client.lights[LIGHT]
     link.ask(lambda now: [light.enable(True, now, lambda result, now: None)
@@ -176,7 +176,7 @@ def mounts(message: Message) -> object:
 
 def camera(message: Message) -> object:
     commands = CommandSender(OURS)
-    return linked(Component(commands, [RedEdgeClient(commands, InputSettings())]),
+    return linked(Component(commands, [RedEdgeClient(commands, CameraSettings())]),
                   *(frame_of(message, 0, source) for source in senders()), mavlink_version=1)
 
 

@@ -25,7 +25,7 @@ import tempfile
 import time
 
 from illuminator_ros.illuminator.events import LightEvent, StatusReceived
-from illuminator_ros.illuminator.light import Settings
+from illuminator_ros.illuminator.light import LightSettings
 from illuminator_ros.illuminator.messages import IlluminatorStatus
 from illuminator_ros.mavlink.dialect import mavlink
 from illuminator_ros.mavlink.messages import Address, heartbeat
@@ -167,7 +167,7 @@ class Lights:
 
     def __init__(self, number: int, warm_up: int) -> None:
         # The lights do not answer, and the client soon gives up its first requests.
-        client = Client(Address(1, 193), Settings(), command_timeout=0.05, command_retries=0)
+        client = Client(Address(1, 193), LightSettings(), command_timeout=0.05, command_retries=0)
         client.events.subscribe(self._count)
         self._link = SimulatedLink(client, lambda data, peer: None)
         self._frames = frames(number)

@@ -22,7 +22,7 @@ from typing import NamedTuple
 
 from .axes import LEVEL
 from .messages import GimbalManagerStatus, REMOVE_SENDER, UNCHANGED
-from ..mavlink.command_sender import Position
+from ..mavlink.command_sender import CommandPosition
 from ..mavlink.dialect import flag_names, mavlink
 from ..mavlink.messages import Address
 from ..payload.messages import GeoPoint, GimbalDeviceAttitudeStatus
@@ -139,4 +139,4 @@ def point(device_id: int, place: GeoPoint | None) -> PlainChange[None]:
     return PlainChange(
         mavlink.MAV_CMD_DO_SET_ROI_LOCATION, (float(device_id),),
         f'point at {latitude:.7g}, {longitude:.7g}, {altitude:.4g} m',
-        Position(MAV_FRAME_GLOBAL, *place))
+        CommandPosition(MAV_FRAME_GLOBAL, *place))

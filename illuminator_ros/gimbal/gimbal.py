@@ -34,7 +34,7 @@ from .remote_managers import (
     SILENCE_LIMIT,
     STOP_LIMIT,
 )
-from .setpoint_stream import Request, SetpointStream
+from .setpoint_stream import SetpointStream, SuspendedBy
 from .yaw_lock import YawLock
 from ..mavlink.command_sender import CommandResult, CommandSender
 from ..mavlink.dialect import mavlink, short_names
@@ -47,7 +47,7 @@ from ..payload.device_events import DeviceConnected, DeviceDisconnected, DeviceH
 from ..payload.device_property import answer, Caller, Desired, Outcome, Property
 from ..payload.liveness import Liveness
 from ..payload.messages import GeoPoint, GimbalDeviceAttitudeStatus
-from ..payload.mount_attitude import Components, MountAttitude, YawFrame
+from ..payload.mount_attitude import MountAttitude, Wxyz, YawFrame
 from ..payload.rotation import Quaternion, Vector
 
 S = TypeVar('S')
@@ -386,9 +386,9 @@ class Gimbal:
         """Return the result of a request, for its callers."""
         result = outcome.result
         if changes is manager.pose_changes:
-            self._setpoints.request_ended(Request.POSE, result)
+            self._setpoints.request_ended(SuspendedBy.POSE, result)
         elif changes is manager.place_changes:
-            self._setpoints.request_ended(Request.PLACE, result)
+            self._setpoints.request_ended(SuspendedBy.PLACE, result)
         elif outcome.desired.change.params[0] == gimbal.REMOVE_SENDER:
             result = self._released(self._control.ended(False, result, manager))
         else:
@@ -508,7 +508,7 @@ class Gimbal:
             return
         self._end_place_changes(flag.goal, now)
         self._yaw_lock.cancel(f'superseded by {flag.goal}', now, superseded=True)
-        self._setpoints.suspend(now, Request.POSE)
+        self._setpoints.suspend(now, SuspendedBy.POSE)
         self._manager.pose_changes.want(
             Desired(flag.change(self.key.device_id), limit=REQUEST_LIMIT), now,
             Caller(done, now, detail=flag.wish))
@@ -543,7 +543,7 @@ class Gimbal:
             done(Result(False, reason), now)
             return
         change = point(self.key.device_id, place)
-        self._setpoints.suspend(now, Request.PLACE, is_place=place is not None)
+        self._setpoints.suspend(now, SuspendedBy.PLACE, is_place=place is not None)
         self._manager.request_place(
             Desired(change, limit=REQUEST_LIMIT), now,
             Caller(done, now, is_stream=is_stream, detail=change.goal))
@@ -616,7 +616,7 @@ class Gimbal:
         self._manager.cancel_places(f'superseded by {newer}', now, superseded=True)
 
     def _message(
-        self, frame: YawFrame, q: Components, rates: Vector,
+        self, frame: YawFrame, q: Wxyz, rates: Vector,
     ) -> gimbal.GimbalManagerSetAttitude:
         flags = setpoint_flags(frame)
         if self._missing(mavlink.GIMBAL_DEVICE_CAP_FLAGS_HAS_YAW_LOCK):

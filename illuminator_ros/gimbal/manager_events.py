@@ -34,7 +34,7 @@ class RequestRefused:
 
 
 @dataclass(frozen=True)
-class SetpointClipped:
+class AnglesClipped:
     """Angles beyond the ranges of the device are clipped; once for an axis and a setpoint."""
 
     clipped: tuple[Clipped, ...]
@@ -77,5 +77,5 @@ class RateStopped:
 
 
 ManagerEvent: TypeAlias = (
-    StateChanged | RoleHolderChanged | RequestRefused | SetpointClipped | SetpointSent
+    StateChanged | RoleHolderChanged | RequestRefused | AnglesClipped | SetpointSent
     | AddressShared | ReferenceLost | RateStopped)

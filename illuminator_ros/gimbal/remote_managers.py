@@ -25,8 +25,8 @@ from .commands import Control
 from .messages import GimbalManagerInformation, GimbalManagerStatus, REMOVE_SENDER
 from ..mavlink.command_sender import (
     Command,
+    CommandDone,
     CommandSender,
-    Done,
     format_seconds,
     request_message,
 )
@@ -113,7 +113,8 @@ class RemoteManager:
         self._commands.start(request_message(to or self.address, message_id), now)
 
     def send(
-        self, command: int, params: tuple[float, ...], now: float, done: Done, *, to: Address,
+        self, command: int, params: tuple[float, ...], now: float, done: CommandDone, *,
+        to: Address,
     ) -> None:
         """Send a command to another component."""
         self._commands.start(Command(to, command, params), now, done)

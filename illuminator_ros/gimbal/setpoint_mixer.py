@@ -304,7 +304,7 @@ class SetpointMixer:
                           if request == requests[axis]}
         if new := tuple(one for one in self.clipped if one.axis not in self._reported):
             self._reported |= {one.axis: requests[one.axis] for one in new}
-            self._emit(events.SetpointClipped(new))
+            self._emit(events.AnglesClipped(new))
 
     def _note_lost(self, name: str, *, is_lost: bool) -> None:
         """Report once that a value of the vehicle, which the setpoint needs, is unknown."""

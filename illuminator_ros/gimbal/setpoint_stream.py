@@ -27,12 +27,12 @@ from ..mavlink.dialect import mavlink
 from ..payload.confirmed_command import Result
 from ..payload.messages import GimbalDeviceAttitudeStatus
 from ..payload.mount_attitude import (
-    Components,
     MountAttitude,
     STILL,
     to_mavlink,
     UNSET_QUATERNION,
     UNSET_VECTOR,
+    Wxyz,
     YawFrame,
 )
 from ..payload.rotation import flu_frd, Quaternion, Vector
@@ -43,7 +43,7 @@ REPEATS = (0.2, 0.4, 0.8)
 LOCK_DELAY = 1.0
 
 
-class Request(Enum):
+class SuspendedBy(Enum):
     """The requests that a gimbal follows instead of a setpoint."""
 
     POSE = 'pose'
@@ -106,7 +106,7 @@ class SetpointStream:
     """
 
     def __init__(
-        self, make: Callable[[YawFrame, Components, Vector], GimbalManagerSetAttitude],
+        self, make: Callable[[YawFrame, Wxyz, Vector], GimbalManagerSetAttitude],
         send: Callable[[GimbalManagerSetAttitude], None], timeout: float,
         requested_frame: Callable[[], tuple[YawFrame | None, float]],
     ) -> None:
@@ -117,7 +117,7 @@ class SetpointStream:
         self._requested_frame = requested_frame
         self._last: _Setpoint | None = None
         # The setpoint that the last request of each kind has suspended, and its place.
-        self._suspended: dict[Request, tuple[_Setpoint | None, _Setpoint]] = {}
+        self._suspended: dict[SuspendedBy, tuple[_Setpoint | None, _Setpoint]] = {}
         self._reported_frame = YawFrame.VEHICLE
         self._attitude_frame, self._attitude_at = YawFrame.VEHICLE, -math.inf
         self._detector = TurningDetector()
@@ -161,7 +161,7 @@ class SetpointStream:
             return self._attitude_frame
         return requested or self._reported_frame
 
-    def suspend(self, now: float, kind: Request, *, is_place: bool = False) -> None:
+    def suspend(self, now: float, kind: SuspendedBy, *, is_place: bool = False) -> None:
         """
         End a rate with a zero, and send no attitude again: a request follows.
 
@@ -179,7 +179,7 @@ class SetpointStream:
             self._last = place
         self._suspended[kind] = before, place
 
-    def request_ended(self, kind: Request, result: Result) -> None:
+    def request_ended(self, kind: SuspendedBy, result: Result) -> None:
         """Take the result of the last request: the setpoint counts again if it was refused."""
         before, place = self._suspended.get(kind, (None, None))
         if result.success and before is not None:

@@ -22,7 +22,7 @@ import itertools
 
 from .commands import SWITCHES
 from .events import LightEvent
-from .light import Light, Settings
+from .light import Light, LightSettings
 from .messages import IlluminatorStatus
 from .model import Status
 from .mount_orientation import MountOrientations
@@ -66,7 +66,7 @@ class IlluminatorClient(Payload):
     """
 
     def __init__(
-        self, commands: CommandSender, settings: Settings, *,
+        self, commands: CommandSender, settings: LightSettings, *,
         wanted: Callable[[Address], bool] = lambda address: True, needs_mounts: bool = False,
     ) -> None:
         self.mounts = MountOrientations()
@@ -88,7 +88,7 @@ class IlluminatorClient(Payload):
         """Return the announced lights in the order of their addresses."""
         return [self.lights[address] for address in sorted(self.lights)]
 
-    def change_settings(self, settings: Settings, now: float) -> None:
+    def change_settings(self, settings: LightSettings, now: float) -> None:
         """Take other settings, see :meth:`Light.change_settings`."""
         self.settings = settings
         for light in self.discovery:

@@ -33,7 +33,7 @@ def _with_flags(shown: str, status: Status) -> str:
     return ', '.join(filter(None, (shown, *flag_names(status.error_flags))))
 
 
-class Switch(NamedTuple):
+class OnOff(NamedTuple):
     """Switches all lights of a component on or off; the command cannot select one of them."""
 
     on: bool
@@ -78,7 +78,7 @@ class Switch(NamedTuple):
 
 
 # Made once, since each request needs one before its command is sent.
-SWITCHES = {on: Switch(on) for on in (False, True)}
+SWITCHES = {on: OnOff(on) for on in (False, True)}
 
 
 class Configure(NamedTuple):

@@ -41,7 +41,7 @@ from ..payload.liveness import Liveness
 
 
 @dataclass(frozen=True)
-class Settings:
+class LightSettings:
     """
     The settings of each light.
 
@@ -78,7 +78,7 @@ class Light:
     """
 
     def __init__(
-        self, address: Address, commands: CommandSender, settings: Settings,
+        self, address: Address, commands: CommandSender, settings: LightSettings,
         emit: Callable[[events.LightEvent], None],
     ) -> None:
         self.address = address
@@ -231,7 +231,7 @@ class Light:
             self._changing.are_changing, self.unreachable(now), self._sources.shown_holder,
             self._sources.since, self._switch.off_at)
 
-    def change_settings(self, settings: Settings, now: float) -> None:
+    def change_settings(self, settings: LightSettings, now: float) -> None:
         """
         Take other settings.
 

@@ -65,7 +65,7 @@ class CommandStatus(Enum):
 
 
 @dataclass(frozen=True)
-class Position:
+class CommandPosition:
     """
     The position of a COMMAND_INT.
 
@@ -94,7 +94,7 @@ class Position:
 
 
 # A kind of commands: see :attr:`Command.key`.
-Key = tuple[Address, int, float]
+CommandKind = tuple[Address, int, float]
 
 
 class Command(NamedTuple):
@@ -111,10 +111,10 @@ class Command(NamedTuple):
     command: int
     params: tuple[float, ...] = ()
     unset: float = 0.0
-    position: Position | None = None
+    position: CommandPosition | None = None
 
     @property
-    def key(self) -> Key:
+    def key(self) -> CommandKind:
         """Return the kind: a command replaces another one of its kind."""
         # As in MAVSDK: requests for two messages do not exclude each other.
         is_request = self.command == mavlink.MAV_CMD_REQUEST_MESSAGE and self.params
@@ -184,7 +184,7 @@ class CommandResult(NamedTuple):
         return f'{self.describe()} ({timing(self.tries, self.elapsed)})'
 
 
-Done = Callable[[CommandResult, float], None]
+CommandDone = Callable[[CommandResult, float], None]
 
 
 def format_seconds(seconds: float) -> str:
@@ -237,7 +237,7 @@ class Transmission:
     """
 
     command: Command
-    done: Done
+    done: CommandDone
     deadline: float
     retries: int
     as_int: bool
@@ -291,7 +291,7 @@ class CommandSender:
     unanswering: dict[Address, None] = field(default_factory=dict)
     round_trips: dict[Address, float] = field(default_factory=dict)
     _may_send: Callable[[Command | Message], bool] | None = None
-    _pending: dict[Key, Transmission] = field(default_factory=dict)
+    _pending: dict[CommandKind, Transmission] = field(default_factory=dict)
     # For how long the process was stopped, and until when, s.
     _stall: tuple[float, float] = 0.0, -math.inf
 
@@ -353,7 +353,7 @@ class CommandSender:
         self.outgoing.append((self.address, command.message(0, command.position is not None)))
 
     def start(
-        self, command: Command, now: float, done: Done = lambda result, now: None, *,
+        self, command: Command, now: float, done: CommandDone = lambda result, now: None, *,
         deadline: float = math.inf, retries: int | None = None, tried: int = 0,
         follow_up: Command | None = None,
     ) -> Transmission:

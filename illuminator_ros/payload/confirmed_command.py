@@ -34,11 +34,11 @@ from typing import Generic, NamedTuple, Protocol, TypeVar
 
 from ..mavlink.command_sender import (
     Command,
+    CommandPosition,
     CommandResult,
     CommandSender,
     CommandStatus,
     format_seconds,
-    Position,
     request_message,
     timing,
 )
@@ -111,7 +111,7 @@ class Change(Protocol[S_contra]):
         """Return the params of the command."""
 
     @property
-    def position(self) -> Position | None:
+    def position(self) -> CommandPosition | None:
         """Return the position of the command, which makes it a COMMAND_INT; None for none."""
 
     @property

@@ -30,11 +30,11 @@ import math
 from typing import Generic, NamedTuple, TypeVar
 
 from .confirmed_command import Change, ConfirmedCommand, Done, FENCE, Result, Target, Terms
-from ..mavlink.command_sender import Position
+from ..mavlink.command_sender import CommandPosition
 
 S = TypeVar('S')
 # The values that a command sets: MAV_CMD, params and position.
-Value = tuple[int, tuple[float, ...], Position | None]
+CommandedValue = tuple[int, tuple[float, ...], CommandPosition | None]
 # Callers that may wait for one value.
 MAX_CALLERS = 32
 # s in which a command that ended unconfirmed may still take effect.
@@ -83,7 +83,7 @@ class Desired(Generic[S]):
                 == (_value(other.change), other.insists, other.is_last))
 
 
-def _value(change: Change[S]) -> Value:
+def _value(change: Change[S]) -> CommandedValue:
     return change.command, change.params, change.position
 
 
@@ -138,7 +138,7 @@ class Property(Generic[S]):
         self._next_callers: list[Caller] = []
         self._unconfirmed: Change[S] | None = None
         # The values whose frames may be under way, and until when, s.
-        self._under_way: dict[Value, float] = {}
+        self._under_way: dict[CommandedValue, float] = {}
 
     def want(self, desired: Desired[S], now: float, caller: Caller | None = None) -> None:
         """Move the property to a value; callable again with the same one."""

@@ -39,7 +39,7 @@ MAX_IGNORED = 8
 FORGET_AFTER = 60.0
 
 
-class Device(Protocol):
+class DiscoveredDevice(Protocol):
     """The part of a device that the discovery uses."""
 
     @property
@@ -58,7 +58,7 @@ class Device(Protocol):
 
 
 K = TypeVar('K', bound=Hashable)
-D = TypeVar('D', bound=Device)
+D = TypeVar('D', bound=DiscoveredDevice)
 
 
 class Discovery(Generic[K, D]):

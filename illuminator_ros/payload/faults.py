@@ -28,7 +28,7 @@ import math
 import random
 from typing import Any, NamedTuple, TypeVar
 
-from .simulated_settings import integer, number, Values
+from .simulated_settings import integer, number, SettingValues
 from ..mavlink import messages
 from ..mavlink.dialect import mavlink, short_names
 
@@ -231,7 +231,7 @@ class FaultTable(dict[str, Fault]):
             raise FaultError(f'no fault {name!r}; there are {", ".join(self)}')
         return self[name]
 
-    def parse(self, text: str) -> Values:
+    def parse(self, text: str) -> SettingValues:
         """
         Return the field of the behaviour that a fault sets, with its value.
 

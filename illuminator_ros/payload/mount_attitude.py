@@ -33,10 +33,10 @@ from .rotation import enu_flu, flip, flu_frd, ned_frd, Quaternion, Vector
 from ..mavlink.dialect import mavlink
 
 # w, x, y, z of a message.
-Components = tuple[float, float, float, float]
+Wxyz = tuple[float, float, float, float]
 # Fields of a setpoint that the receiver must ignore. NaN is their only value for that ("set to NaN
 # according to use case", GIMBAL_MANAGER_SET_ATTITUDE and GIMBAL_DEVICE_SET_ATTITUDE).
-UNSET_QUATERNION: Components = (math.nan,) * 4
+UNSET_QUATERNION: Wxyz = (math.nan,) * 4
 UNSET_VECTOR: Vector = (math.nan,) * 3
 # The order of angles and rates, and rates of a mount that does not turn.
 AXES = ('roll', 'pitch', 'yaw')
@@ -110,7 +110,7 @@ def from_mavlink(q: Sequence[float], frame: YawFrame) -> Quaternion:
     return enu_flu(rotation) if frame is YawFrame.EARTH else flip(rotation)
 
 
-def to_mavlink(rotation: Quaternion, frame: YawFrame) -> Components:
+def to_mavlink(rotation: Quaternion, frame: YawFrame) -> Wxyz:
     """Return the quaternion in MAVLink of a rotation in ROS."""
     return ned_frd(rotation) if frame is YawFrame.EARTH else flip(rotation)
 

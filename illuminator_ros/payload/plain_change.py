@@ -20,7 +20,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Generic, TypeVar
 
-from ..mavlink.command_sender import Position
+from ..mavlink.command_sender import CommandPosition
 
 S = TypeVar('S')
 
@@ -36,7 +36,7 @@ class PlainChange(Generic[S]):
     command: int
     params: tuple[float, ...]
     goal: str
-    position: Position | None = None
+    position: CommandPosition | None = None
     status_name: str = ''
     shown_by: Callable[[S], bool | None] = lambda status: None
     actual: Callable[[S], str] = lambda status: ''

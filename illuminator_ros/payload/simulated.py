@@ -28,7 +28,7 @@ from typing import Any, ClassVar, Generic, NamedTuple, TypeVar
 
 from .faults import Behaviour, FaultInjector, FAULTS, FaultTable
 from .listeners import Listeners
-from .simulated_settings import integer, one_of, Setting, settings_of, Values
+from .simulated_settings import integer, one_of, Setting, settings_of, SettingValues
 from ..mavlink import messages
 from ..mavlink.component import Endpoint
 from ..mavlink.dialect import mavlink
@@ -263,15 +263,15 @@ class SimulatedType(Generic[D]):
             self.device.faults.parse(name)
         return names
 
-    def _normal(self, settings: Values) -> Properties:
+    def _normal(self, settings: SettingValues) -> Properties:
         return (self.profiles[settings['profile']].properties if 'profile' in settings
                 else self.properties)
 
-    def address(self, settings: Values) -> Address:
+    def address(self, settings: SettingValues) -> Address:
         """Return the address by default."""
         return self._normal(settings).address
 
-    def make(self, settings: Values, address: Address, name: str = '') -> D:
+    def make(self, settings: SettingValues, address: Address, name: str = '') -> D:
         """
         Return the device that settings describe.
 

@@ -23,7 +23,7 @@ from typing import Any, TypeVar
 from .messages import GeoPoint
 
 # The values of settings by name, untyped: each is what its Setting.read returns.
-Values = Mapping[str, Any]
+SettingValues = Mapping[str, Any]
 T = TypeVar('T')
 
 

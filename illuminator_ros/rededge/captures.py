@@ -22,7 +22,7 @@ from dataclasses import dataclass
 import math
 
 from . import messages as rededge
-from .pings import Done
+from .pings import PingDone
 from ..mavlink.command_sender import format_seconds
 from ..mavlink.dialect import entry_names, mavlink
 from ..mavlink.messages import Address, Message
@@ -45,7 +45,7 @@ MAX_LATE = 32
 @dataclass
 class _Capture:
     sent_at: float
-    done: Done
+    done: PingDone
     index: int | None = None
     # Why its CAMERA_FEEDBACK does not confirm the image, '' while none has come.
     doubt: str = ''
@@ -77,7 +77,7 @@ class Captures:
         # CAMERA_FEEDBACK may still come, s.
         self._triggered = 0, -math.inf
 
-    def request(self, shot: rededge.Shot, target: Address, now: float, done: Done) -> None:
+    def request(self, shot: rededge.Shot, target: Address, now: float, done: PingDone) -> None:
         """Take an image; succeed only after its CAMERA_FEEDBACK."""
         if self._capture is not None:
             done(False, 'another capture is under way')

@@ -276,20 +276,20 @@ def _place(feedback: rededge.CameraFeedback) -> str:
     return f'{feedback.lat / 1e7:.7f}, {feedback.lng / 1e7:.7f}, {feedback.alt_msl:.2f} m'
 
 
-Check: TypeAlias = Callable[[CameraSession], Awaitable['str | None']]
+CameraCheck: TypeAlias = Callable[[CameraSession], Awaitable['str | None']]
 
 
 def requires(
     name: str, title: str, section: str, *, since: rededge.Firmware | None = None,
     needs_consent: bool = False, whole_run: bool = False,
-) -> Callable[[Check], Requirement[CameraSession]]:
+) -> Callable[[CameraCheck], Requirement[CameraSession]]:
     """
     Return a decorator that makes a requirement of a check.
 
     :param since: the firmware that brought what is required, None for the first.
     :param needs_consent: whether it takes images, which a camera without captures does not.
     """
-    def complete(check: Check) -> Requirement[CameraSession]:
+    def complete(check: CameraCheck) -> Requirement[CameraSession]:
         @wraps(check)
         async def checked(camera: CameraSession) -> str | None:
             if needs_consent:

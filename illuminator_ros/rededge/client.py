@@ -24,8 +24,8 @@ import random
 from . import messages as rededge
 from .captures import Captures
 from .feeder import Feeder
-from .input_states import Settings
-from .pings import Done, Pings
+from .input_states import CameraSettings
+from .pings import PingDone, Pings
 from ..mavlink.command_sender import CommandSender
 from ..mavlink.component import Payload
 from ..mavlink.dialect import mavlink
@@ -105,7 +105,7 @@ class RedEdgeClient(Payload):
                (Attitude, rededge.MountStatus), (rededge.GpsStatus,))
 
     def __init__(
-        self, commands: CommandSender, settings: Settings, *, sequence: int | None = None,
+        self, commands: CommandSender, settings: CameraSettings, *, sequence: int | None = None,
     ) -> None:
         self.settings = settings
         self.events: Listeners[CameraEvent] = Listeners()
@@ -178,14 +178,14 @@ class RedEdgeClient(Payload):
 
     # Requests, and messages of the camera
 
-    def ping(self, now: float, done: Done) -> None:
+    def ping(self, now: float, done: PingDone) -> None:
         """Measure the round trip through the camera."""
         if refusal := self._commands.refusal or self._liveness.link_failure:
             done(False, refusal)
         else:
             self._pings.request(now, done)
 
-    def capture(self, shot: rededge.Shot, now: float, done: Done) -> None:
+    def capture(self, shot: rededge.Shot, now: float, done: PingDone) -> None:
         """Take an image; succeed only after its CAMERA_FEEDBACK."""
         if self._commands.refusal or not self._liveness.connected:
             done(False, self._commands.refusal or self._loss(now)

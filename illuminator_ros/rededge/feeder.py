@@ -29,12 +29,12 @@ from typing import NamedTuple
 from . import conversions
 from .conversions import FIRST_UTC, LAST_UTC, Position
 from .input_states import (
+    CameraSettings,
     Input,
     InputSnapshot,
     InputState,
     InputStates,
     PositionSource,
-    Settings,
     Stamp,
     TIME_REFERENCE_LIFETIME,
     VELOCITIES,
@@ -90,7 +90,7 @@ class Feeder:
     """
 
     def __init__(
-        self, settings: Settings, send: Callable[[Message], None],
+        self, settings: CameraSettings, send: Callable[[Message], None],
         target: Callable[[], Address],
     ) -> None:
         self._settings = settings

@@ -69,7 +69,7 @@ class PositionSource(Enum):
 
 
 @dataclass(frozen=True)
-class Settings:
+class CameraSettings:
     """
     The settings of the client of a camera.
 
@@ -163,7 +163,7 @@ class _Tracker:
 class InputStates:
     """The states of all inputs."""
 
-    def __init__(self, settings: Settings) -> None:
+    def __init__(self, settings: CameraSettings) -> None:
         self._trackers = {name: _Tracker(settings.timeout(name)) for name in Input}
 
     @contextlib.contextmanager

@@ -23,7 +23,7 @@ from typing import NamedTuple
 
 from . import conversions
 from .conversions import MountParent
-from .input_states import Input, InputStates, Settings, Stamp, UNKNOWN
+from .input_states import CameraSettings, Input, InputStates, Stamp, UNKNOWN
 from ..mavlink.messages import Address, Message, time_boot_ms
 from ..payload.rotation import Quaternion, Vector
 
@@ -71,7 +71,7 @@ class OrientationFeeder:
     """
 
     def __init__(
-        self, settings: Settings, send: Callable[[Message], None],
+        self, settings: CameraSettings, send: Callable[[Message], None],
         target: Callable[[], Address], inputs: InputStates,
     ) -> None:
         self._settings = settings

@@ -28,12 +28,12 @@ from ..mavlink.retries import PING
 PING_INTERVAL = 2.0
 
 # Takes success and a message for people, once.
-Done = Callable[[bool, str], None]
+PingDone = Callable[[bool, str], None]
 
 
 class _Request(NamedTuple):
     since: float
-    done: Done
+    done: PingDone
 
     @property
     def until(self) -> float:
@@ -76,7 +76,7 @@ class Pings:
         for request in requests:
             request.done(False, reason)
 
-    def request(self, now: float, done: Done) -> None:
+    def request(self, now: float, done: PingDone) -> None:
         """Measure the round trip."""
         self._requests.append(_Request(now, done))
         self._ping(now)

@@ -35,7 +35,7 @@ from ..payload import simulated
 from ..payload.faults import Behaviour, COUNT, fault, FaultTable, SECONDS
 from ..payload.messages import Attitude, GeoPoint, GlobalPositionInt, is_plausible, SystemTime
 from ..payload.rotation import Quaternion
-from ..payload.simulated_settings import geo_point, number, setting, Values
+from ..payload.simulated_settings import geo_point, number, setting, SettingValues
 
 # Until the camera hears a host.
 DEFAULT_SYSTEM_ID = 255
@@ -205,7 +205,7 @@ def _hundredths(value: int) -> float | None:
     return None if value == UNKNOWN else value / 100
 
 
-def _position(message: rededge.GpsRawInt | GlobalPositionInt) -> Values:
+def _position(message: rededge.GpsRawInt | GlobalPositionInt) -> SettingValues:
     """Return the columns of an injected position."""
     place = {'latitude_deg': message.lat / 1e7, 'longitude_deg': message.lon / 1e7,
              'altitude_m': message.alt / 1e3}
@@ -220,14 +220,14 @@ def _position(message: rededge.GpsRawInt | GlobalPositionInt) -> Values:
             'satellites': None if satellites == UNKNOWN_SATELLITES else satellites}
 
 
-def _own_position(place: GeoPoint | None) -> Values:
+def _own_position(place: GeoPoint | None) -> SettingValues:
     """Return the columns of the position of its own GPS."""
     return {} if place is None else {
         'fix_type': FIX_3D, 'latitude_deg': place.latitude, 'longitude_deg': place.longitude,
         'altitude_m': place.altitude}
 
 
-def _orientation(attitude: Attitude | None, mount: rededge.MountStatus | None) -> Values:
+def _orientation(attitude: Attitude | None, mount: rededge.MountStatus | None) -> SettingValues:
     """Return the columns of the angles of vehicle, mount and camera."""
     pitch, roll, yaw = (angle / 100 for angle in (
         mount.pointing_a, mount.pointing_b, mount.pointing_c)) if mount else (0.0, 0.0, 0.0)

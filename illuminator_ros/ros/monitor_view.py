@@ -51,7 +51,7 @@ BY_SEVERITY = (0, 3, 1, 2)
 # A text, or a text with its style.
 Cell = str | tuple[str, str]
 # A line of the details: a label, and its parts.
-Line = tuple[str, Sequence[Cell]]
+DetailLine = tuple[str, Sequence[Cell]]
 
 
 class Topic(NamedTuple):
@@ -229,7 +229,7 @@ class View:
     topics: Mapping[str, Topic]
     signature: Sequence[str]
     values: Callable[[Device], Iterable[str]]
-    details: Callable[[Device], Iterable[Line]]
+    details: Callable[[Device], Iterable[DetailLine]]
     keys: Sequence[Key]
     steering: Sequence[Key] = ()
     states: Mapping[str, str] = field(default_factory=lambda: {'ok': 'green'})

@@ -46,7 +46,7 @@ SWITCH_QOS = QoSProfile(depth=10, reliability=ReliabilityPolicy.RELIABLE)
 SERVICE_QOS = QoSProfile(depth=1000, reliability=ReliabilityPolicy.RELIABLE)
 
 
-class Endpoint(NamedTuple):
+class Interface(NamedTuple):
     """
     A topic or service ``~/name``; the tables of the pages are written from it.
 
@@ -62,7 +62,7 @@ class Endpoint(NamedTuple):
     meaning: str
     qos: QoSProfile | None = None
 
-    def of(self, prefix: str) -> Endpoint:
+    def of(self, prefix: str) -> Interface:
         """Return the same topic or service of a source, with the prefix of its names."""
         return self._replace(name=f'{prefix}{self.name}')
 
@@ -78,7 +78,7 @@ class RequestService:
         answered at once.
     """
 
-    endpoint: Endpoint
+    endpoint: Interface
     start: Callable[[Any, float, Answer], None]
     limit: int = MAX_PENDING
 
@@ -105,14 +105,14 @@ class CommandTopic(Generic[T]):
     :param read: returns the value of a message, in any thread; a ValueError is logged.
     """
 
-    endpoint: Endpoint
+    endpoint: Interface
     take: Callable[[T, float], None]
     # Untyped: of the class that the endpoint names.
     read: Callable[[Any], T] = finite_data
 
 
 # Of any type of value.
-AnyCommand = CommandTopic[Any]
+AnyCommandTopic = CommandTopic[Any]
 
 
 class NodeInterface:
@@ -120,8 +120,8 @@ class NodeInterface:
 
     def __init__(
         self, node: Node, link: Link, log: NodeLog, *,
-        publications: Iterable[Endpoint] = (), services: Iterable[RequestService] = (),
-        commands: Iterable[AnyCommand] = (),
+        publications: Iterable[Interface] = (), services: Iterable[RequestService] = (),
+        commands: Iterable[AnyCommandTopic] = (),
     ) -> None:
         self._publishers = {
             one.name: node.create_publisher(one.type, f'~/{one.name}', one.qos or STATE_QOS)

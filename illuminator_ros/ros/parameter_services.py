@@ -55,11 +55,11 @@ QUEUE_DEPTH = 100
 
 # Sets values in the device, in the link's thread, given the time (s); calls its last argument
 # once with '' or why the values were not set.
-Configure = Callable[[Values, float, Callable[[str], None]], None]
+ConfigureDevice = Callable[[Values, float, Callable[[str], None]], None]
 # Changes the node or its device, in the link's thread, given the time (s).
-Change = Callable[[float], None]
+ApplyChange = Callable[[float], None]
 # Raises ValueError if a parameter cannot have a value, given its name.
-Check = Callable[[str, object], object]
+CheckValue = Callable[[str, object], object]
 
 
 class ParameterServices:
@@ -75,8 +75,8 @@ class ParameterServices:
 
     def __init__(
         self, node: Node, link: Link, log: NodeLog, device: DeviceParameters | None = None,
-        check: Check | None = None, check_by_device: Check = lambda name, value: None,
-        configure: Configure = lambda changes, now, answer: answer(''),
+        check: CheckValue | None = None, check_by_device: CheckValue = lambda name, value: None,
+        configure: ConfigureDevice = lambda changes, now, answer: answer(''),
         changeable: ChangeableParameters | None = None,
     ) -> None:
         self._node = node
@@ -209,7 +209,7 @@ class ParameterServices:
 
     def _set_own(
         self, parameters: Sequence[Parameter], atomically: bool,
-    ) -> tuple[dict[str, str], Change, Change]:
+    ) -> tuple[dict[str, str], ApplyChange, ApplyChange]:
         """
         Set parameters of the node itself.
 
@@ -234,8 +234,8 @@ class ParameterServices:
     # In the link's thread
 
     def _make(
-        self, change: Change, undo: Change, of_device: Values, atomically: bool, now: float,
-        answer: Callable[[Mapping[str, str]], None],
+        self, change: ApplyChange, undo: ApplyChange, of_device: Values, atomically: bool,
+        now: float, answer: Callable[[Mapping[str, str]], None],
     ) -> None:
         """Change the node and the device; answer by name why the device's were not set."""
         change(now)

@@ -24,7 +24,7 @@ from illuminator_ros.illuminator.simulated_properties import (
 )
 from illuminator_ros.mavlink.dialect import mavlink
 from illuminator_ros.mavlink.messages import Address
-from illuminator_ros.payload.checks.requirement import Verdict
+from illuminator_ros.payload.checks.requirement import CheckVerdict
 from illuminator_ros.payload.simulated import CommandReply, Effect
 import pytest
 from support.checks_run import ChecksRun, KINDS, start
@@ -110,7 +110,7 @@ def test_without_consent_a_light_that_cannot_be_dimmed_is_not_switched_on(
     one.finish()
     assert seen == []
     for name in ('on', 'off', 'on-off-values', 'other-target', 'command-int', 'repeated'):
-        assert one.result(name).verdict is Verdict.SKIPPED
+        assert one.result(name).verdict is CheckVerdict.SKIPPED
         assert 'cannot be changed: not agreed to; see --yes' in one.result(name).detail
     assert {'mode-internal', 'brightness', 'brightness-values'} <= one.failed
 
@@ -123,7 +123,7 @@ def test_a_light_that_dazzles_without_consent_is_switched_off_and_ends_the_run(
     one.finish()
     assert one.failed == {'on-configuration'}
     assert not one.runner.passed
-    assert one.result('strobe').verdict is (Verdict.PASS if consent else Verdict.SKIPPED)
+    assert one.result('strobe').verdict is (CheckVerdict.PASS if consent else CheckVerdict.SKIPPED)
     if not consent:
         assert one.result('on-configuration').detail == one.runner.restored.partition('; the')[0]
         assert one.runner.restored == (

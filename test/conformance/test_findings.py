@@ -28,14 +28,14 @@ from illuminator_ros.illuminator.model import Mode
 from illuminator_ros.illuminator.simulated_properties import PROFILES
 from illuminator_ros.mavlink.dialect import mavlink, replaced
 from illuminator_ros.mavlink.messages import Address, CommandAck, CommandInt, CommandLong
-from illuminator_ros.payload.checks.requirement import Verdict
+from illuminator_ros.payload.checks.requirement import CheckVerdict
 from illuminator_ros.payload.messages import GimbalDeviceAttitudeStatus as AttitudeStatus
 from illuminator_ros.payload.simulated import CommandReply, Effect
 from illuminator_ros.rededge.messages import Firmware
 import pytest
 from support.checks_run import ChecksRun, KINDS, run, start
 
-PASS, FAIL, SKIPPED = Verdict
+PASS, FAIL, SKIPPED = CheckVerdict
 REQUIREMENTS = {kind: PAYLOADS[kind].load('checks').requirements for kind in KINDS}
 every_kind = pytest.mark.parametrize('kind', KINDS)
 
@@ -397,7 +397,7 @@ ARDUSUB = PROFILES['ardusub'].properties
      '47.3977420, 8.5455940, 488.00 m instead of -48.8766667', ''),
 ])
 def test_a_result_has_its_reason_and_the_messages_that_show_it(
-    kind: str, fault: str, name: str, verdict: Verdict, detail: str, line: str,
+    kind: str, fault: str, name: str, verdict: CheckVerdict, detail: str, line: str,
 ) -> None:
     # The comparison of statuses needs commands of other checks.
     only = (name, 'on', 'on-off-values')

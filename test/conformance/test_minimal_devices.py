@@ -26,7 +26,7 @@ from illuminator_ros.illuminator.checks import requirements as illuminator
 from illuminator_ros.illuminator.messages import IlluminatorStatus
 from illuminator_ros.mavlink.dialect import replaced
 from illuminator_ros.mavlink.messages import Address, Message
-from illuminator_ros.payload.checks.requirement import PayloadChecks, Verdict
+from illuminator_ros.payload.checks.requirement import CheckVerdict, PayloadChecks
 from illuminator_ros.rededge import checks as rededge
 from illuminator_ros.rededge.messages import DigicamControl
 import pytest
@@ -113,12 +113,12 @@ RIGHT: dict[str, tuple[PayloadChecks[Any], Callable[[], MinimalDevice]]] = {
 def test_a_device_that_does_what_its_protocol_demands_passes(name: str) -> None:
     checks, make = RIGHT[name]
     done = run(checks, make())
-    assert [one for one in done.runner.results if one.verdict is Verdict.FAIL] == []
+    assert [one for one in done.runner.results if one.verdict is CheckVerdict.FAIL] == []
     assert done.runner.passed
 
 
 def test_a_camera_has_captures_if_one_of_three_requests_is_confirmed() -> None:
-    assert run(CAMERA, MissingCamera()).result('capture-status').verdict is Verdict.PASS
+    assert run(CAMERA, MissingCamera()).result('capture-status').verdict is CheckVerdict.PASS
 
 
 def test_checks_of_a_camera_without_captures_end_within_20_s() -> None:

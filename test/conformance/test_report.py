@@ -22,7 +22,7 @@ from illuminator_ros.illuminator.checks.requirements import REQUIREMENTS
 from illuminator_ros.mavlink.messages import Address
 from illuminator_ros.payload.checks import report as reports
 from illuminator_ros.payload.checks.report import lines, RunReport, unreached
-from illuminator_ros.payload.checks.requirement import Verdict
+from illuminator_ros.payload.checks.requirement import CheckVerdict
 import pytest
 from support.checks_run import ChecksRun, run, start
 
@@ -72,7 +72,7 @@ def test_the_junit_report_of_a_run_without_exit_status_0_has_a_failure_or_an_err
     report: RunReport, passed: bool, errors: int,
 ) -> None:
     assert ElementTree.fromstring(reports.as_junit(report)).get('errors') == '0'
-    no_fault = tuple(one for one in report.results if one.verdict is not Verdict.FAIL)
+    no_fault = tuple(one for one in report.results if one.verdict is not CheckVerdict.FAIL)
     suite = ElementTree.fromstring(reports.as_junit(dataclasses.replace(
         report, results=no_fault, restored='THE LIGHT IS NOT AS IT WAS', passed=passed)))
 

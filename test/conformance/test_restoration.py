@@ -25,7 +25,7 @@ from illuminator_ros.illuminator.model import Configuration, Mode
 from illuminator_ros.illuminator.simulated_properties import FAULTS
 from illuminator_ros.mavlink.dialect import mavlink
 from illuminator_ros.mavlink.messages import Address, CommandLong
-from illuminator_ros.payload.checks.requirement import Requirement, Verdict
+from illuminator_ros.payload.checks.requirement import CheckVerdict, Requirement
 import pytest
 from support.checks_run import ChecksRun, start
 
@@ -113,7 +113,7 @@ def test_a_light_that_reports_no_status_is_not_changed() -> None:
         replace(one.component.behaviour, status_on_change=False), one.link.now)
     one.finish()
     assert is_restored(one)
-    assert one.result('on').verdict is Verdict.SKIPPED
+    assert one.result('on').verdict is CheckVerdict.SKIPPED
     assert 'could not be restored' in one.result('on').detail
 
 

@@ -34,7 +34,7 @@ from illuminator_ros.illuminator.simulated import SIMULATED
 from illuminator_ros.illuminator.thermal import ThermalProperties
 from illuminator_ros.mavlink.url import parse_url
 from illuminator_ros.payload.checks.report import as_json, RunReport
-from illuminator_ros.payload.checks.requirement import Requirement, Result, Verdict
+from illuminator_ros.payload.checks.requirement import CheckResult, CheckVerdict, Requirement
 from illuminator_ros.rededge.checks import REQUIREMENTS as CAMERA_REQUIREMENTS
 from payloads.winch import WINCH
 import pytest
@@ -64,7 +64,8 @@ def test_the_keys_of_a_json_report_are_listed_in_order_for_each_kind_of_device()
 
     for device_key in devices:
         content = json.loads(as_json(RunReport(
-            'name', device_key, '', '', (Result(REQUIREMENTS[0], Verdict.PASS),), '', 0.0, True)))
+            'name', device_key, '', '', (CheckResult(REQUIREMENTS[0], CheckVerdict.PASS),), '',
+            0.0, True)))
         others = {*devices} - {device_key}
         assert list(content) == [key for key in report_keys if key not in others]
         assert list(content['results'][0]) == result_keys

@@ -33,9 +33,9 @@ from illuminator_ros.gimbal.manager_control import (
 )
 from illuminator_ros.gimbal.manager_events import (
     AddressShared,
+    AnglesClipped,
     ReferenceLost,
     RequestRefused,
-    SetpointClipped,
     SetpointSent,
 )
 from illuminator_ros.gimbal.manager_state import ManagerState
@@ -132,7 +132,7 @@ def refusals(rig: ManagerRig) -> list[str]:
 def clipped(rig: ManagerRig) -> list[tuple[str, float, float]]:
     """Return each clipped angle that was reported, rad."""
     return [(one.axis, round(one.requested, 4), round(one.limit, 4))
-            for event in of(SetpointClipped, rig.events) for one in event.clipped]
+            for event in of(AnglesClipped, rig.events) for one in event.clipped]
 
 
 # GM-10, GM-27: INFORMATION is static and on request, STATUS names the players in control

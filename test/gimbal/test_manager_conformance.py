@@ -22,7 +22,7 @@ from illuminator_ros.gimbal.axes import Range
 from illuminator_ros.gimbal.checks import manager
 from illuminator_ros.gimbal.manager_control import ControlSettings, Role
 from illuminator_ros.payload.arbitration import Policy
-from illuminator_ros.payload.checks.requirement import Verdict
+from illuminator_ros.payload.checks.requirement import CheckVerdict
 import pytest
 from support.checks_run import ChecksRun
 from support.gimbal_manager import OURS
@@ -41,5 +41,5 @@ def test_the_manager_conforms_with_and_without_a_mavlink_device(
     done = ChecksRun(manager.CHECKS, vehicle, target=OURS).finish()
     assert done.failed == set()
     assert {'take', 'one-player', 'set-attitude', 'roi', 'no-control-messages'} <= (
-        done.names(Verdict.PASS))
+        done.names(CheckVerdict.PASS))
     assert controller.control.holder(Role.PRIMARY) is None

@@ -23,7 +23,7 @@ from illuminator_ros.illuminator.events import (
     LightSwitched,
     StatesChanging,
 )
-from illuminator_ros.illuminator.light import Settings
+from illuminator_ros.illuminator.light import LightSettings
 from illuminator_ros.illuminator.model import SafetyLimits
 from illuminator_ros.mavlink.dialect import mavlink
 from illuminator_ros.payload.command_sources import SourceSettings
@@ -38,7 +38,7 @@ SILENCE = 5.0
 
 
 def silenced(light: FakeLight | None = None, **faults: float) -> Pair:
-    return Pair(light or FakeLight(), settings=Settings(off_after_silence=SILENCE),
+    return Pair(light or FakeLight(), settings=LightSettings(off_after_silence=SILENCE),
                 there=Faults(**faults)).settle()
 
 
@@ -106,7 +106,7 @@ def test_a_light_without_status_that_may_have_executed_an_on_goes_off_after_sile
 def test_an_on_under_way_ends_at_the_silence_with_an_off(
         results: list[int | None], silence: float) -> None:
     light = FakeLight()
-    pair = Pair(light, settings=Settings(off_after_silence=silence)).settle()
+    pair = Pair(light, settings=LightSettings(off_after_silence=silence)).settle()
     light.results[ON_OFF] = [*results]
     answer = pair.ask_enable(True)
     silent_at = pair.now + silence
@@ -177,7 +177,7 @@ def test_an_off_while_heat_keeps_a_light_off_is_repeated_until_it_is_accepted(
     cause: Callable[[Pair], None], is_accepted: bool, on_while_hot: bool,
 ) -> None:
     light = FakeLight()
-    pair = Pair(light, settings=Settings(
+    pair = Pair(light, settings=LightSettings(
         off_after_silence=SILENCE if cause is _is_silent else 0.0, off_on_release=True,
         sources=SourceSettings(('default',), 60.0))).settle()
     if on_while_hot:
@@ -243,7 +243,7 @@ def test_calls_that_are_refused_do_not_postpone_the_off_after_silence(
 def test_a_light_that_shows_on_again_after_each_off_gets_four_offs_a_second() -> None:
     on, off = FakeLight(enable=1), FakeLight()
     on.applies = False
-    pair = Pair(SharedAddress(off, on), settings=Settings(off_after_silence=SILENCE)).settle()
+    pair = Pair(SharedAddress(off, on), settings=LightSettings(off_after_silence=SILENCE)).settle()
     pair.run(SILENCE + 10.0)
 
     # The silence has lasted for 10 to 15 s.
@@ -304,7 +304,7 @@ def test_a_brightness_from_before_an_off_is_not_sent_after_it_where_that_is_the_
     assert light.fields['enable'] == 0
 
 
-def learned(light: FakeLight, settings: Settings | None = None) -> Pair:
+def learned(light: FakeLight, settings: LightSettings | None = None) -> Pair:
     """Return a client that has learned that brightness is the switch of a light, which is on."""
     light.brightness_is_switch = True
     pair = Pair(light, settings=settings).settle()
@@ -374,7 +374,7 @@ def limited_off(case: str) -> tuple[FakeLight, Pair, float]:
     :return: the light, its client, and the time of the OFF.
     """
     light = FakeLight(brightness=50.0)
-    pair = learned(light, Settings(limits=SafetyLimits(max_brightness=60.0)))
+    pair = learned(light, LightSettings(limits=SafetyLimits(max_brightness=60.0)))
     light.apply_after = 0.5
     if case == 'restarted':
         light.restart(pair.now, enable=1, brightness=40.0)
@@ -415,7 +415,7 @@ def test_a_light_with_a_brightness_while_off_is_configured_while_offs_are_repeat
     light = FakeLight(brightness=50.0)
     # It sends a status each second, and none on request.
     light.answers.clear()
-    pair = Pair(light, settings=Settings(limits=SafetyLimits(max_brightness=60.0))).settle()
+    pair = Pair(light, settings=LightSettings(limits=SafetyLimits(max_brightness=60.0))).settle()
     assert pair.enable(False).success
     if case == 'restarted':
         light.restart(pair.now, brightness=40.0)

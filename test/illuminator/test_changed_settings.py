@@ -18,7 +18,7 @@ from dataclasses import replace
 from typing import Any
 
 from illuminator_ros.illuminator.events import SetpointFailed
-from illuminator_ros.illuminator.light import Settings
+from illuminator_ros.illuminator.light import LightSettings
 from illuminator_ros.illuminator.model import SafetyLimits
 from illuminator_ros.mavlink.dialect import mavlink
 from illuminator_ros.payload.command_sources import SourceSettings
@@ -31,7 +31,7 @@ ON_OFF, CONFIGURE = mavlink.MAV_CMD_ILLUMINATOR_ON_OFF, mavlink.MAV_CMD_DO_ILLUM
 LOWER = SafetyLimits(max_brightness=50.0)
 
 
-def served(settings: Settings | None = None, **fields: Any) -> tuple[FakeLight, Pair]:
+def served(settings: LightSettings | None = None, **fields: Any) -> tuple[FakeLight, Pair]:
     how: dict[str, Any] = {'brightness': 80.0, **fields}
     light = FakeLight(**how)
     return light, Pair(light, settings=settings).settle()
@@ -84,7 +84,7 @@ def test_a_limit_that_is_removed_before_the_light_has_answered_is_not_sent_again
 
 
 def test_a_limit_that_is_removed_ends_the_warning_and_changes_no_light() -> None:
-    light, pair = served(Settings(limits=LOWER))
+    light, pair = served(LightSettings(limits=LOWER))
     light.applies, light.fields['brightness'] = False, 80.0
     pair.run(10.0)
     assert pair.snapshot.limit_exceeded.excess
@@ -150,7 +150,7 @@ def test_off_after_silence_that_is_set_later_counts_from_then_on() -> None:
 
 def test_nothing_that_was_requested_before_a_silence_follows_its_change() -> None:
     sources = SourceSettings(('safety', 'operator', 'default'))
-    light, pair = served(Settings(sources=sources, off_after_silence=5.0))
+    light, pair = served(LightSettings(sources=sources, off_after_silence=5.0))
     request(pair, 'operator', True)
     request(pair, 'safety', False)
     # The silence ends before the next status.
@@ -165,7 +165,7 @@ def test_nothing_that_was_requested_before_a_silence_follows_its_change() -> Non
 
 def test_a_source_that_is_silent_for_longer_than_a_shorter_timeout_loses_the_light_at_once(
 ) -> None:
-    _, pair = served(Settings(sources=SourceSettings(('safety', 'default'))))
+    _, pair = served(LightSettings(sources=SourceSettings(('safety', 'default'))))
     request(pair, 'safety', False)
     pair.run(10.0)
     assert pair.snapshot.holder == 'safety'

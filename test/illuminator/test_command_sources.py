@@ -21,7 +21,7 @@ import random
 
 from illuminator_ros.illuminator.client import enable_all
 from illuminator_ros.illuminator.events import AutomaticSwitch, DesiredStateFailed
-from illuminator_ros.illuminator.light import Settings
+from illuminator_ros.illuminator.light import LightSettings
 from illuminator_ros.illuminator.model import SafetyLimits
 from illuminator_ros.mavlink.dialect import mavlink
 from illuminator_ros.payload.arbitration import Cause
@@ -44,7 +44,7 @@ class Shared:
     def __init__(self, *, light: FakeLight | None = None, timeout: float = TIMEOUT,
                  off_on_release: bool = False, seed: int = 0, **faults: float) -> None:
         self.light = light or FakeLight(brightness=50.0)
-        self.pair = Pair(self.light, seed=seed, there=Faults(**faults), settings=Settings(
+        self.pair = Pair(self.light, seed=seed, there=Faults(**faults), settings=LightSettings(
             sources=SourceSettings(NAMES, timeout), off_on_release=off_on_release,
             limits=SafetyLimits(max_brightness=80.0), off_after_silence=SILENCE))
         self.pair.run_until(lambda: self.pair.controller.lights)

@@ -20,7 +20,7 @@ from dataclasses import astuple, replace
 from typing import Any
 
 from illuminator_ros.illuminator.events import ChangeCause
-from illuminator_ros.illuminator.light import Settings
+from illuminator_ros.illuminator.light import LightSettings
 from illuminator_ros.illuminator.model import Configuration, float32, Mode, SafetyLimits
 from illuminator_ros.mavlink.dialect import mavlink
 from illuminator_ros.mavlink.messages import CommandAck, result_name
@@ -411,7 +411,7 @@ def test_a_stream_does_not_keep_overrides_from_being_sent(fake: FakeLight, faked
 
 # Overrides
 
-def overriding(fake: FakeLight, settings: Settings | None = None, **values: Any) -> Pair:
+def overriding(fake: FakeLight, settings: LightSettings | None = None, **values: Any) -> Pair:
     """Return a pair whose light must be configured as soon as it is found."""
     return Pair(fake, settings=settings,
                 on_light=lambda light: light.set_desired(values, START))
@@ -692,7 +692,7 @@ def test_a_light_that_refuses_the_restored_configuration_is_followed(
 def test_values_within_the_limits_that_a_restart_makes_obsolete_leave_no_discrepancy(
     fake: FakeLight,
 ) -> None:
-    pair = Pair(fake, settings=Settings(
+    pair = Pair(fake, settings=LightSettings(
         restore_configuration=False, limits=SafetyLimits(max_brightness=50.0)))
     fake.results[CONFIGURE] = None
     pair.run(5.0)
@@ -705,7 +705,7 @@ def test_values_within_the_limits_that_a_restart_makes_obsolete_leave_no_discrep
 def test_a_light_that_restarts_is_followed_where_restoring_is_switched_off(
     fake: FakeLight,
 ) -> None:
-    pair = overriding(fake, Settings(restore_configuration=False), brightness=30.0).settle()
+    pair = overriding(fake, LightSettings(restore_configuration=False), brightness=30.0).settle()
     fake.restart(pair.now)
     pair.run(10.0)
     assert len(sent(pair)) == 1

@@ -19,7 +19,7 @@ from __future__ import annotations
 from typing import Any
 
 from illuminator_ros.illuminator import events
-from illuminator_ros.illuminator.light import Settings
+from illuminator_ros.illuminator.light import LightSettings
 from illuminator_ros.mavlink import messages as mav
 from illuminator_ros.mavlink.dialect import mavlink
 from illuminator_ros.payload.device_events import DeviceConnected, DeviceForgotten, DeviceFound
@@ -38,7 +38,7 @@ class Heard(Client):
     """A client with an open link, which keeps the events."""
 
     def __init__(self, **options: Any) -> None:
-        super().__init__(BRIDGE, Settings(), **options)
+        super().__init__(BRIDGE, LightSettings(), **options)
         self.heard: list[events.LightEvent] = []
         self.events.subscribe(self.heard.append)
         self.link_opened(0.0)

@@ -27,7 +27,7 @@ from illuminator_ros.illuminator.events import (
     LightSwitched,
     SetpointFailed,
 )
-from illuminator_ros.illuminator.light import Light, Settings
+from illuminator_ros.illuminator.light import Light, LightSettings
 from illuminator_ros.illuminator.model import SafetyLimits
 from illuminator_ros.illuminator.simulated_properties import (
     IlluminatorBehaviour,
@@ -106,7 +106,7 @@ def test_whatever_is_under_way_and_comes_an_off_is_the_last_change_and_reports_a
 ) -> None:
     draw = random.Random(seed)
     faults = Faults(drop=draw.choice((0.0, 0.3)))
-    pair = Pair(lights(draw), seed=seed, there=faults, uptime=0.0, settings=Settings(
+    pair = Pair(lights(draw), seed=seed, there=faults, uptime=0.0, settings=LightSettings(
         off_after_silence=draw.choice((0.0, 0.5)),
         limits=SafetyLimits(max_brightness=80.0), off_on_release=draw.random() < 0.5,
         sources=draw.choice((None, SourceSettings(SOURCES, draw.choice((0.3, 60.0)))))))

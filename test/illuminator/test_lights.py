@@ -19,7 +19,7 @@ from __future__ import annotations
 import functools
 from typing import Any
 
-from illuminator_ros.illuminator.light import Settings
+from illuminator_ros.illuminator.light import LightSettings
 from illuminator_ros.illuminator.light_queries import SETTLING_TIME
 from illuminator_ros.illuminator.messages import STATUS_ID
 from illuminator_ros.illuminator.simulated_properties import IlluminatorProperties
@@ -51,7 +51,7 @@ def without_clock(stream: float = 1.0) -> FakeLight:
 def test_a_light_is_lost_after_the_heartbeat_timeout_and_found_again(
     fake: FakeLight, timeout: float,
 ) -> None:
-    pair = Pair(fake, settings=Settings(heartbeat_timeout=timeout)).settle()
+    pair = Pair(fake, settings=LightSettings(heartbeat_timeout=timeout)).settle()
     light, heard_at = pair.light, pair.light.liveness.heard_at
     fake.silent = True
     pair.run_until(lambda: not light.connected, within=100.0)
@@ -149,7 +149,7 @@ def test_a_light_that_sends_no_status_is_asked_for_one_at_a_limited_rate(
 def test_the_interval_of_the_settings_is_requested_at_first_and_after_a_restart(
     fake: FakeLight, interval: float,
 ) -> None:
-    pair = Pair(fake, settings=Settings(status_interval=interval)).settle(30.0)
+    pair = Pair(fake, settings=LightSettings(status_interval=interval)).settle(30.0)
     expected = [(STATUS_ID, pytest.approx(interval * 1e6))] if interval else []
     assert [(command.param1, command.param2) for command in pair.commands(
         mavlink.MAV_CMD_SET_MESSAGE_INTERVAL)] == expected
@@ -164,7 +164,7 @@ def test_the_interval_of_the_settings_is_requested_at_first_and_after_a_restart(
 @pytest.mark.parametrize('timeout', [10.0, 3.0, 2.0, 1.1])
 def test_a_light_without_heartbeat_and_with_rare_statuses_is_not_lost(timeout: float) -> None:
     light = FakeLight(heartbeat_type=None)
-    pair = Pair(light, settings=Settings(timeout, status_interval=60.0)).settle(300.0)
+    pair = Pair(light, settings=LightSettings(timeout, status_interval=60.0)).settle(300.0)
     assert light.stream == 60.0
     assert pair.recorder.events == ['connected']
 
@@ -268,6 +268,6 @@ def test_a_light_that_supports_its_own_two_commands_only_is_served() -> None:
     pair = Pair(FakeLight(stream=0.5, results={
         REQUEST: mavlink.MAV_RESULT_UNSUPPORTED,
         mavlink.MAV_CMD_SET_MESSAGE_INTERVAL: mavlink.MAV_RESULT_UNSUPPORTED}),
-        settings=Settings(status_interval=0.1)).settle()
+        settings=LightSettings(status_interval=0.1)).settle()
     assert pair.enable(True).success
     assert pair.configure(brightness=50).success

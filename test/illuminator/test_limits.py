@@ -18,7 +18,7 @@ from typing import Any
 
 from hypothesis import given, settings, strategies
 from illuminator_ros.illuminator.events import LimitExceeded, SetpointClipped
-from illuminator_ros.illuminator.light import Settings
+from illuminator_ros.illuminator.light import LightSettings
 from illuminator_ros.illuminator.light_configuration import LIMIT_INTERVAL
 from illuminator_ros.illuminator.model import float32, SafetyLimits
 from illuminator_ros.mavlink.dialect import mavlink
@@ -29,7 +29,7 @@ from support.faulty_wire import Faults
 
 CONFIGURE = mavlink.MAV_CMD_DO_ILLUMINATOR_CONFIGURE
 LIMITS = SafetyLimits(max_brightness=60.0, min_strobe_period=0.34)
-LIMITED = Settings(limits=LIMITS)
+LIMITED = LightSettings(limits=LIMITS)
 percent = strategies.floats(0, 100)
 period = strategies.one_of(strategies.just(0.0), strategies.floats(0.01, 2))
 EXCEEDED = ('brightness 80 % is above max_brightness 60 %',

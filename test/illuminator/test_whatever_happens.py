@@ -18,7 +18,7 @@ from __future__ import annotations
 
 import random
 
-from illuminator_ros.illuminator.light import Settings
+from illuminator_ros.illuminator.light import LightSettings
 from illuminator_ros.illuminator.model import Mode
 from illuminator_ros.illuminator.simulated_properties import IlluminatorProperties
 from illuminator_ros.illuminator.thermal import ThermalProperties
@@ -45,8 +45,8 @@ def test_random_schedules_end_with_one_answer_each_and_the_true_state(seed: int)
     faults = Faults(**{kind: draw.choice((0.0, 0.1, 0.3)) for kind in (
         'drop', 'duplicate', 'reorder', 'delay', 'corrupt')})
     pair = Pair(LIGHTS, there=faults, seed=seed, uptime=draw.choice((0.0, 1000.0)),
-                settings=Settings(status_interval=draw.choice((0.0, 0.2)),
-                                  restore_configuration=draw.random() < 0.7))
+                settings=LightSettings(status_interval=draw.choice((0.0, 0.2)),
+                                       restore_configuration=draw.random() < 0.7))
     users = RandomUsers(pair, draw, DEFAULT)
     end = pair.now + SECONDS
     while pair.now < end:

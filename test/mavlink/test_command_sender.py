@@ -23,12 +23,12 @@ from typing import Any
 from illuminator_ros.mavlink.command_sender import (
     CLOSING_TIMEOUT,
     Command,
+    CommandPosition,
     CommandResult,
     CommandSender,
     CommandStatus,
     format_seconds,
     MAX_TARGETS,
-    Position,
     PROGRESS_TIMEOUT,
     request_message,
 )
@@ -281,12 +281,13 @@ def test_callback_may_start_the_same_command_again_and_end_all_others(by: str) -
     (Command(LIGHT, 1, (1.0,), math.nan), False, CommandLong(*LIGHT, 1, 2, 1.0, *[math.nan] * 6)),
     (Command(LIGHT, 1, (1.0,), math.nan), True, CommandInt(
         *LIGHT, 0, 1, 0, 0, 1.0, math.nan, math.nan, math.nan, 0x7FFFFFFF, 0x7FFFFFFF, math.nan)),
-    (Command(LIGHT, 195, (1.0,), 0.0, Position(0, 47.3977418, -8.5455938, 488.25)), False,
+    (Command(LIGHT, 195, (1.0,), 0.0, CommandPosition(0, 47.3977418, -8.5455938, 488.25)), False,
      CommandInt(*LIGHT, 0, 195, 0, 0, 1.0, 0.0, 0.0, 0.0, 473977418, -85455938, 488.25)),
-    (Command(LIGHT, 195, (), 0.0, Position(1, 12.5, -0.0001, -3.5)), False,
+    (Command(LIGHT, 195, (), 0.0, CommandPosition(1, 12.5, -0.0001, -3.5)), False,
      CommandInt(*LIGHT, 1, 195, 0, 0, 0.0, 0.0, 0.0, 0.0, 125000, -1, -3.5)),
-    (Command(LIGHT, 195, (), 0.0, Position(5, math.nan, math.nan, math.nan)), False, CommandInt(
-        *LIGHT, 5, 195, 0, 0, 0.0, 0.0, 0.0, 0.0, 0x7FFFFFFF, 0x7FFFFFFF, math.nan))])
+    (Command(LIGHT, 195, (), 0.0, CommandPosition(5, math.nan, math.nan, math.nan)), False,
+     CommandInt(
+         *LIGHT, 5, 195, 0, 0, 0.0, 0.0, 0.0, 0.0, 0x7FFFFFFF, 0x7FFFFFFF, math.nan))])
 def test_message_has_unset_params_and_position_as_the_command_says(
         command: Command, as_int: bool, message: CommandLong | CommandInt) -> None:
     # As text, because NaN differs from itself.
@@ -295,7 +296,7 @@ def test_message_has_unset_params_and_position_as_the_command_says(
 
 def test_position_timeout_and_retries_out_of_range_are_refused() -> None:
     with pytest.raises(ValueError, match='position of 300, 0'):
-        Position(0, 300.0, 0.0, 0.0)
+        CommandPosition(0, 300.0, 0.0, 0.0)
     for timeout in (0.0, -0.5, math.nan, math.inf):
         with pytest.raises(ValueError, match='timeout'):
             CommandSender(OURS, timeout)

@@ -21,7 +21,7 @@ from illuminator_ros.cli.simulator.components import components, Scenario, scena
 from illuminator_ros.cli.simulator.console import execute
 from illuminator_ros.cli.simulator.options import parser, payload_types
 from illuminator_ros.illuminator.client import IlluminatorClient
-from illuminator_ros.illuminator.light import Settings
+from illuminator_ros.illuminator.light import LightSettings
 from illuminator_ros.mavlink.command_sender import CommandSender
 from illuminator_ros.mavlink.component import Component, Endpoint
 from illuminator_ros.mavlink.dialect import mavlink
@@ -56,7 +56,7 @@ class Vehicle:
     def __init__(self) -> None:
         self.devices = simulated()
         commands = CommandSender(BRIDGE)
-        self.lights = IlluminatorClient(commands, Settings())
+        self.lights = IlluminatorClient(commands, LightSettings())
         self.winches = WinchClient(commands)
         self.reports: list[WinchReport] = []
         self.results: list[Result] = []

@@ -20,13 +20,13 @@ import math
 
 from illuminator_ros.payload.confirmed_command import Result
 from illuminator_ros.ros.monitor_view import Device, Key, measured, Request, Topic, View
-from illuminator_ros.ros.node import CommandTopic, Endpoint, NodeInterface
+from illuminator_ros.ros.node import CommandTopic, Interface, NodeInterface
 from illuminator_ros.ros.payload import Host, RosPayload, ServedPayload
 from payloads.winch import WinchClient
 from std_msgs.msg import Float32
 
-LINE_LENGTH = Endpoint('line_length', Float32, 'length of the line that is out, m')
-RELEASE = Endpoint('cmd/release', Float32, 'length of line to release, m')
+LINE_LENGTH = Interface('line_length', Float32, 'length of the line that is out, m')
+RELEASE = Interface('cmd/release', Float32, 'length of line to release, m')
 
 
 class WinchNode(ServedPayload):

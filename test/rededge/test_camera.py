@@ -25,7 +25,7 @@ from illuminator_ros.payload.device_events import DeviceConnected, DeviceDisconn
 from illuminator_ros.payload.rotation import Quaternion
 from illuminator_ros.rededge import messages as rededge
 from illuminator_ros.rededge.client import ImageTaken, RedEdgeClient
-from illuminator_ros.rededge.input_states import Input, Settings, Stamp
+from illuminator_ros.rededge.input_states import CameraSettings, Input, Stamp
 import pytest
 
 OWN, NEW, ADOPTED = Address(1, 191), Address(255, 100), Address(1, 100)
@@ -49,7 +49,7 @@ class Rig:
     def __init__(self, *, connected: bool = True) -> None:
         self.now = 100.0
         commands = CommandSender(OWN)
-        self.client = RedEdgeClient(commands, Settings(), sequence=0xFFFFFFFE)
+        self.client = RedEdgeClient(commands, CameraSettings(), sequence=0xFFFFFFFE)
         self.component = Component(commands, [self.client])
         self.events: list[Any] = []
         self.sent: list[Message] = []

@@ -29,10 +29,10 @@ from illuminator_ros.payload.rotation import Quaternion, Vector
 from illuminator_ros.rededge.conversions import mount_angles, MountFrame, Position
 from illuminator_ros.rededge.feeder import ENU, Feeder
 from illuminator_ros.rededge.input_states import (
+    CameraSettings,
     Input,
     InputState,
     PositionSource,
-    Settings,
     Stamp,
     VELOCITIES,
 )
@@ -57,7 +57,7 @@ class Rig:
         self.clock = EPOCH - self.now
         self.simulated = False
         self.sent: list[Message] = []
-        self.feeder = Feeder(replace(Settings(), **settings), self.sent.append,
+        self.feeder = Feeder(replace(CameraSettings(), **settings), self.sent.append,
                              lambda: CAMERA)
 
     def stamp(self, age: float = 0.0) -> Stamp:

@@ -31,9 +31,9 @@ from illuminator_ros.payload.simulated import SimulatedComponents
 from illuminator_ros.rededge.client import RedEdgeClient
 from illuminator_ros.rededge.conversions import interpolate, Position
 from illuminator_ros.rededge.input_states import (
+    CameraSettings,
     Input,
     PositionSource,
-    Settings,
     Stamp,
     UNKNOWN,
 )
@@ -76,7 +76,7 @@ class PullableLink(VirtualLink):
 class Rig:
     """The client of a camera, and the camera, during a flight at its real speed."""
 
-    def __init__(self, flight: Flight, settings: Settings) -> None:
+    def __init__(self, flight: Flight, settings: CameraSettings) -> None:
         self.flight = flight
         commands = CommandSender(Address(1, 191))
         self.client = RedEdgeClient(commands, settings)
@@ -135,7 +135,7 @@ class Rig:
 @pytest.mark.parametrize('source', PositionSource)
 def test_images_of_a_flight_have_the_true_position_and_attitude(source: PositionSource) -> None:
     flight = Flight(60.0, 1.0)
-    result = Rig(flight, Settings(source, GEOID, attitude_rate=ATTITUDE_RATE)).fly()
+    result = Rig(flight, CameraSettings(source, GEOID, attitude_rate=ATTITUDE_RATE)).fly()
 
     assert result.failures == []
     assert max(abs(flight.truth(time / 10).vehicle.euler()[0]) for time in range(600)) > 0.69
@@ -143,7 +143,7 @@ def test_images_of_a_flight_have_the_true_position_and_attitude(source: Position
 
 def test_comparison_finds_wrong_positions_wrong_angles_and_old_data() -> None:
     flight = Flight(36.0, 1.0)
-    rig = Rig(flight, Settings(geoid_separation=GEOID))
+    rig = Rig(flight, CameraSettings(geoid_separation=GEOID))
     assert rig.fly().failures == []
     images = [Image.read(row, UTC, 1.0) for row in rig.rows]
     turned = Quaternion.from_euler(0.0, 0.002, 0.0)
@@ -161,7 +161,7 @@ def test_comparison_finds_wrong_positions_wrong_angles_and_old_data() -> None:
     assert 'instead of 72' in failures(images[5:])
     assert 'did not fall back' in failures(
         [replace(one, position_age=1.0) if one.position_age is None else one for one in images])
-    wrong = Rig(flight, Settings(geoid_separation=GEOID - 0.6)).fly()
+    wrong = Rig(flight, CameraSettings(geoid_separation=GEOID - 0.6)).fly()
     assert wrong.failures[0].startswith('a position is wrong by 0.')
 
 

@@ -23,7 +23,7 @@ from unittest.mock import Mock
 
 from diagnostic_msgs.msg import DiagnosticStatus
 from illuminator_ros.illuminator.events import LightSnapshot
-from illuminator_ros.illuminator.light import Settings
+from illuminator_ros.illuminator.light import LightSettings
 from illuminator_ros.illuminator.ros.diagnostics import (
     FLAG_PAUSE,
     FlagLog,
@@ -52,7 +52,7 @@ class Reported:
     """A client on a link, and the statuses of its node."""
 
     def __init__(self, mode: SigningMode = SigningMode.OFF) -> None:
-        self.client = Client(BRIDGE, Settings())
+        self.client = Client(BRIDGE, LightSettings())
         self.link = SimulatedLink(
             self.client, lambda data, peer: None, signing=Signing(mode, KEY))
         self._started = self.link.now

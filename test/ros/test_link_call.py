@@ -22,7 +22,7 @@ from unittest.mock import Mock
 
 from illuminator_ros.ros.deferred_service import DeferredService
 from illuminator_ros.ros.link_call import LinkCalls, MAX_PENDING
-from illuminator_ros.ros.node import Endpoint, NodeInterface, RequestService
+from illuminator_ros.ros.node import Interface, NodeInterface, RequestService
 from rclpy.node import Node
 from std_srvs.srv import SetBool
 from support.ros import Ros
@@ -58,7 +58,8 @@ def test_off_is_asked_however_many_requests_of_an_on_wait(ros: Ros) -> None:
     # Any: a link that calls functions at once.
     link: Any = Mock(call=lambda function: function(0.0))
     NodeInterface(node, link, Mock(), services=[RequestService(
-        Endpoint('enable', SetBool, ''), lambda request, now, answer: asked.append(request.data))])
+        Interface('enable', SetBool, ''),
+        lambda request, now, answer: asked.append(request.data))])
     [enable] = [one.callback for one in node.services if one.service_name == '/switched/enable']
     assert isinstance(enable, DeferredService)
 

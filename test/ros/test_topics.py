@@ -19,7 +19,7 @@ from typing import Any
 from unittest.mock import Mock
 
 from diagnostic_msgs.msg import DiagnosticArray
-from illuminator_ros.ros.node import Endpoint, NodeInterface
+from illuminator_ros.ros.node import Interface, NodeInterface
 import pytest
 from rclpy.node import Node
 from rosgraph_msgs.msg import Clock
@@ -192,7 +192,7 @@ def test_all_names_follow_namespace_node_name_and_remapping(
 def test_node_that_has_left_publishes_nothing(own_ros: Ros) -> None:
     node = Node('leaving', context=own_ros.node.context)
     interface = NodeInterface(
-        node, Mock(), Mock(), publications=[Endpoint('enabled', Bool, '')])
+        node, Mock(), Mock(), publications=[Interface('enabled', Bool, '')])
     enabled = own_ros.subscribe(Bool, '/leaving/enabled')
     interface.publish('enabled', True)
     enabled.wait_value(True)

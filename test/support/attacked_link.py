@@ -21,7 +21,7 @@ import math
 import random
 from typing import Any, cast
 
-from illuminator_ros.illuminator.light import Settings
+from illuminator_ros.illuminator.light import LightSettings
 from illuminator_ros.illuminator.simulated import SimulatedIlluminator
 from illuminator_ros.illuminator.simulated_properties import FAULTS, IlluminatorProperties
 from illuminator_ros.mavlink.dialect import mavlink
@@ -119,7 +119,7 @@ class AttackedBridge(AttackedLink):
 
     def make_endpoint(self) -> Any:
         self.results: list[list[Result]] = []
-        return Client(BRIDGE, Settings(status_interval=1.0))
+        return Client(BRIDGE, LightSettings(status_interval=1.0))
 
     @property
     def controller(self) -> Client:

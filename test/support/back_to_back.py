@@ -21,7 +21,7 @@ import math
 from typing import Any
 
 from illuminator_ros.illuminator.events import LightEvent, LightSnapshot
-from illuminator_ros.illuminator.light import Light, Settings
+from illuminator_ros.illuminator.light import Light, LightSettings
 from illuminator_ros.illuminator.simulated import SimulatedIlluminator
 from illuminator_ros.illuminator.simulated_properties import IlluminatorProperties
 from illuminator_ros.mavlink import messages as mav
@@ -90,7 +90,7 @@ class Pair:
 
     def __init__(
         self, lights: Sequence[IlluminatorProperties] | Endpoint = ONE_LIGHT, *,
-        settings: Settings | None = None, there: Faults | None = None,
+        settings: LightSettings | None = None, there: Faults | None = None,
         back: Faults | None = None, seed: int | str = 0, uptime: float = 100.0,
         command_timeout: float = 0.25, command_retries: int = 3,
         on_light: Callable[[Light], None] = lambda light: None,
@@ -99,7 +99,7 @@ class Pair:
         self.recorders: dict[mav.Address, Recorder] = {}
         self._on_light = on_light
         self.controller = Client(
-            BRIDGE, settings or Settings(), command_timeout=command_timeout,
+            BRIDGE, settings or LightSettings(), command_timeout=command_timeout,
             command_retries=command_retries)
         self.controller.events.subscribe(self._take)
         self.other = (lights if isinstance(lights, Endpoint)

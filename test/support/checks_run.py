@@ -27,7 +27,12 @@ from illuminator_ros.mavlink.component import Endpoint
 from illuminator_ros.mavlink.dialect import mavlink
 from illuminator_ros.mavlink.messages import Address, CommandLong
 from illuminator_ros.payload.checks.coroutines import Interrupted
-from illuminator_ros.payload.checks.requirement import PayloadChecks, Requirement, Result, Verdict
+from illuminator_ros.payload.checks.requirement import (
+    CheckResult,
+    CheckVerdict,
+    PayloadChecks,
+    Requirement,
+)
 from illuminator_ros.payload.checks.runner import absence, CheckRunner
 from illuminator_ros.payload.checks.session import Conditions, Session
 from illuminator_ros.payload.simulated import Properties, SimulatedComponents
@@ -110,16 +115,16 @@ class ChecksRun:
             next(iter(self.device.streams())), seconds if seconds < 0 else 1e6 * seconds,
             0, 0, 0, 0, 0), self.link.now)
 
-    def names(self, verdict: Verdict) -> set[str]:
+    def names(self, verdict: CheckVerdict) -> set[str]:
         """Return the names of the requirements with a verdict."""
         return {one.requirement.name for one in self.runner.results if one.verdict is verdict}
 
     @property
     def failed(self) -> set[str]:
         """Return the names of the requirements that the device does not meet."""
-        return self.names(Verdict.FAIL)
+        return self.names(CheckVerdict.FAIL)
 
-    def result(self, name: str) -> Result:
+    def result(self, name: str) -> CheckResult:
         """Return the result of a requirement."""
         (result,) = [one for one in self.runner.results if one.requirement.name == name]
         return result

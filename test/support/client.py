@@ -17,7 +17,7 @@
 from typing import Any
 
 from illuminator_ros.illuminator.client import IlluminatorClient
-from illuminator_ros.illuminator.light import Settings
+from illuminator_ros.illuminator.light import LightSettings
 from illuminator_ros.mavlink.command_sender import CommandSender
 from illuminator_ros.mavlink.component import Component
 from illuminator_ros.mavlink.messages import Address
@@ -31,7 +31,7 @@ class Client(Component):
     """
 
     def __init__(
-        self, address: Address, settings: Settings, *, command_timeout: float = 0.25,
+        self, address: Address, settings: LightSettings, *, command_timeout: float = 0.25,
         command_retries: int = 3, **options: Any,
     ) -> None:
         commands = CommandSender(address, command_timeout, command_retries)

@@ -23,7 +23,7 @@ import time
 from typing import Any, Generic, TypeVar
 
 from illuminator_ros.illuminator.events import LightEvent
-from illuminator_ros.illuminator.light import Light, Settings
+from illuminator_ros.illuminator.light import Light, LightSettings
 from illuminator_ros.illuminator.simulated import SimulatedIlluminator
 from illuminator_ros.illuminator.simulated_properties import IlluminatorProperties
 from illuminator_ros.mavlink.component import Endpoint, HeartbeatTimer
@@ -170,10 +170,10 @@ class Bridge(EndpointLink[Client]):
     :ivar lights: ``connected`` or ``lost``, and the light, in order.
     """
 
-    def __init__(self, url: str, settings: Settings | None = None, **options: Any) -> None:
+    def __init__(self, url: str, settings: LightSettings | None = None, **options: Any) -> None:
         self.lights: Log[tuple[str, Light]] = Log()
         client = Client(
-            BRIDGE, settings or Settings(), command_timeout=PATIENCE / 10, command_retries=9)
+            BRIDGE, settings or LightSettings(), command_timeout=PATIENCE / 10, command_retries=9)
         client.events.subscribe(self._take)
         super().__init__(url, client, **options)
 

@@ -21,7 +21,7 @@ import contextlib
 from pathlib import Path
 import socket
 
-from illuminator_ros.illuminator.light import Settings
+from illuminator_ros.illuminator.light import LightSettings
 from illuminator_ros.mavlink import component, line, link_state
 from illuminator_ros.mavlink import connector as connector_module
 from illuminator_ros.mavlink.retries import CONNECTION
@@ -257,7 +257,7 @@ def test_light_that_comes_goes_and_returns_is_found_commanded_and_reported_once_
     clock, port = live_link.Jump(), free_port(socket.SOCK_STREAM)
     ours, theirs = (url.format(port=port, path=tmp_path / 'ttyLIGHT') for url in URLS[kind])
 
-    bridge = run(live_link.Bridge(ours, Settings(heartbeat_timeout=SILENCE), clock=clock))
+    bridge = run(live_link.Bridge(ours, LightSettings(heartbeat_timeout=SILENCE), clock=clock))
     for count in (1, 2, 3):
         with live_link.Lights(theirs, clock=clock):
             light = bridge.wait_connected(count)

@@ -46,7 +46,7 @@ from ...mavlink.url import parse_url, Url
 from ...payload.checks.components import names
 from ...payload.checks.coroutines import Main
 from ...payload.checks.report import as_json, as_junit, catalogue, lines, RunReport, unreached
-from ...payload.checks.requirement import AnyChecks, Result, Verdict
+from ...payload.checks.requirement import AnyChecks, CheckResult, CheckVerdict
 from ...payload.checks.runner import absence, CheckRunner
 from ...payload.checks.session import Conditions, Session
 from ...payload.payload_type import PayloadType
@@ -226,7 +226,7 @@ class Conformance:
             checks.payload, checks.device, options.url, self._describe_device(),
             tuple(runner.results), runner.restored, self._link.clock() - begun, runner.passed)
         # A failed check has already given the reason why there is no device.
-        explained = missing and any(one.verdict is Verdict.FAIL for one in report.results)
+        explained = missing and any(one.verdict is CheckVerdict.FAIL for one in report.results)
         self._write_line(*unreached(report.results), '', *(() if explained else (report.device,)),
                          report.summary)
         for path, text in ((options.junit, as_junit(report)), (options.json, as_json(report))):
@@ -271,7 +271,7 @@ class Conformance:
         elif self._is_finding:
             self._texts.put(str(event))
 
-    def _show(self, result: Result) -> None:
+    def _show(self, result: CheckResult) -> None:
         if result.reached:
             self._texts.put('\n'.join(lines(result, verbose=self._options.verbose)))
 

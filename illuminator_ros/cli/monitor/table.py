@@ -63,7 +63,7 @@ def report(device: Device) -> list[Cell]:
     return [cell for part in parts for cell in ('; ', *part)][1:]
 
 
-def details(device: Device) -> Iterable[shared.Line]:
+def details(device: Device) -> Iterable[shared.DetailLine]:
     """Return labels and texts of everything about a device."""
     yield device.name, []
     if device.action is not None:

@@ -26,7 +26,7 @@ from typing import Any
 from ..options import address
 from ...mavlink.messages import Address
 from ...payload.simulated import SimulatedDevice, SimulatedType
-from ...payload.simulated_settings import Setting, Values
+from ...payload.simulated_settings import Setting, SettingValues
 
 MAX_COMPONENTS = 200
 # MAX_COMPONENTS with all their settings need a tenth of it.
@@ -56,7 +56,7 @@ class Listed:
     kind: Type
     address: Address
     name: str = ''
-    settings: Values = field(default_factory=dict)
+    settings: SettingValues = field(default_factory=dict)
 
 
 @dataclass(frozen=True)
@@ -69,7 +69,7 @@ class Scenario:
     """
 
     url: str = ''
-    common: Mapping[str, Values] = field(default_factory=dict)
+    common: Mapping[str, SettingValues] = field(default_factory=dict)
     listed: Sequence[Listed] = ()
 
 
@@ -137,7 +137,7 @@ def _settings(
                                + ', '.join([*others, *known]))
 
 
-def _read(settings: Iterable[tuple[str, str, str]], types: Types) -> Mapping[str, Values]:
+def _read(settings: Iterable[tuple[str, str, str]], types: Types) -> Mapping[str, SettingValues]:
     """
     Return the values of settings for each type that accepts them, by its noun.
 
@@ -207,7 +207,7 @@ def _option(name: str) -> str:
 
 
 def _of_type(
-    options: argparse.Namespace, file: Scenario, kind: Type, given: Values,
+    options: argparse.Namespace, file: Scenario, kind: Type, given: SettingValues,
 ) -> Sequence[Listed]:
     named = getattr(options, kind.noun)
     listed = ([_named(kind, text) for text in named] if named else
@@ -254,7 +254,7 @@ def _faults(
     return result
 
 
-def _merged(settings: Mapping[str, Setting], *layers: Values) -> Values:
+def _merged(settings: Mapping[str, Setting], *layers: SettingValues) -> SettingValues:
     """Return the values of several layers; later layers take precedence."""
     result: dict[str, Any] = {}
     for layer in layers:

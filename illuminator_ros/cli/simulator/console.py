@@ -21,10 +21,10 @@ from typing import Any
 
 from ...payload.simulated import ConsoleCommand, SimulatedComponent, SimulatedDevice
 
-Component = SimulatedComponent[SimulatedDevice]
+AnySimulated = SimulatedComponent[SimulatedDevice]
 
 
-def _fault(component: Component, words: list[str], now: float) -> None:
+def _fault(component: AnySimulated, words: list[str], now: float) -> None:
     # Without an interval, the fault "reboot" is a single restart.
     if words == ['reboot']:
         component.restart(now)
@@ -32,21 +32,21 @@ def _fault(component: Component, words: list[str], now: float) -> None:
         component.behave(component.device.faults.add(component.behaviour, words[0]), now)
 
 
-def _clear(component: Component, words: list[str], now: float) -> None:
+def _clear(component: AnySimulated, words: list[str], now: float) -> None:
     device = component.device
     component.behave(
         device.faults.remove(device.behaviour, device.normal, words[0]) if words
         else device.normal, now)
 
 
-def _faults(component: Component, words: list[str], now: float) -> str:
+def _faults(component: AnySimulated, words: list[str], now: float) -> str:
     device = component.device
     texts = device.faults.as_typed(device.behaviour, device.normal)
     return f'{component.address}: {", ".join(texts) or "no fault"}'
 
 
 # The commands of every component.
-COMMANDS: Sequence[ConsoleCommand[Component, str | None]] = (
+COMMANDS: Sequence[ConsoleCommand[AnySimulated, str | None]] = (
     ConsoleCommand('reboot', 'restart, as after a power cycle',
                    lambda component, words, now: component.restart(now)),
     ConsoleCommand('fault NAME[=VALUE]', 'start a fault', _fault),
@@ -65,12 +65,12 @@ def describe_commands(devices: Iterable[type[SimulatedDevice]]) -> str:
     return '\n'.join(f'  {usage:20} {text}' for usage, text in rows.items())
 
 
-def _commands(component: Component) -> dict[str, ConsoleCommand[Any, Any]]:
+def _commands(component: AnySimulated) -> dict[str, ConsoleCommand[Any, Any]]:
     return {one.name: one for one in (*component.device.commands, *COMMANDS)}
 
 
 def _execute(
-    component: Component, command: ConsoleCommand[Any, Any], words: list[str], now: float,
+    component: AnySimulated, command: ConsoleCommand[Any, Any], words: list[str], now: float,
 ) -> str | None:
     """Execute a command of a component, and return the answer."""
     if command in COMMANDS:
@@ -80,7 +80,7 @@ def _execute(
     return None
 
 
-def execute(line: str, components: Sequence[Component], now: float) -> str:
+def execute(line: str, components: Sequence[AnySimulated], now: float) -> str:
     """
     Execute a line, and return the answer.
 

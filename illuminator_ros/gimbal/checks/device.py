@@ -38,7 +38,7 @@ from ...payload.checks.requirement import Option, PayloadChecks, Requirement, re
 from ...payload.checks.session import Conditions, Session
 from ...payload.checks.specifications import MESSAGES, ROUTING
 from ...payload.messages import GimbalDeviceAttitudeStatus as AttitudeStatus
-from ...payload.mount_attitude import Components, UNSET_VECTOR
+from ...payload.mount_attitude import UNSET_VECTOR, Wxyz
 from ...payload.rotation import Quaternion, Vector
 
 INFORMATION = gimbal.GimbalDeviceInformation
@@ -103,7 +103,7 @@ class DeviceSession(GimbalSession):
             await self.sleep(min(ANNOUNCE_INTERVAL, left))
 
     def setpoint(
-        self, target: Address, device_id: int | None, flags: int, q: Components, rates: Vector,
+        self, target: Address, device_id: int | None, flags: int, q: Wxyz, rates: Vector,
     ) -> Message:
         """See :class:`GimbalSession`."""
         return gimbal.GimbalDeviceSetAttitude(*target, flags, q, *rates)

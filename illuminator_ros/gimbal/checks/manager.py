@@ -49,7 +49,7 @@ from ...payload.checks.session import Conditions, Session, Transaction
 from ...payload.checks.specifications import MESSAGES, ROUTING
 from ...payload.messages import Attitude, GlobalPositionInt
 from ...payload.messages import GimbalDeviceAttitudeStatus as AttitudeStatus
-from ...payload.mount_attitude import Components
+from ...payload.mount_attitude import Wxyz
 from ...payload.rotation import Vector
 
 INFORMATION, MANAGER_STATUS = gimbal.GimbalManagerInformation, gimbal.GimbalManagerStatus
@@ -71,11 +71,11 @@ HEADING = 15.0
 PLACE = (47.401, 8.5, 470.0)
 AT_PLACE = (-15.1, -HEADING)
 # The components with primary and with secondary control.
-Control = tuple[Address, Address]
-Setpoint = gimbal.GimbalManagerSetPitchyaw | gimbal.GimbalManagerSetManualControl
+ControlPair = tuple[Address, Address]
+SetpointMessage = gimbal.GimbalManagerSetPitchyaw | gimbal.GimbalManagerSetManualControl
 
 
-def control_text(control: Control) -> str:
+def control_text(control: ControlPair) -> str:
     """Return the components in control, for people."""
     return ', '.join(f'{name} {one if any(one) else "none"}'
                      for name, one in zip(('primary', 'secondary'), control, strict=True))
@@ -96,7 +96,7 @@ class ManagerSession(GimbalSession):
     def __init__(self, conditions: Conditions) -> None:
         super().__init__(conditions)
         self.vehicle: Address | None = None
-        self._control_before: Control | None = None
+        self._control_before: ControlPair | None = None
 
     def is_device(self, message: Message) -> bool:
         """See :class:`Session`."""
@@ -121,7 +121,7 @@ class ManagerSession(GimbalSession):
 
     # Control
 
-    async def control(self) -> Control:
+    async def control(self) -> ControlPair:
         """Return the players in control; raise Skipped if the manager does not report them."""
         status = await self.newest(MANAGER_STATUS, 'who has control')
         return (Address(status.primary_control_sysid, status.primary_control_compid),
@@ -136,7 +136,7 @@ class ManagerSession(GimbalSession):
         one = await self.configure(*primary, *secondary)
         await self.leads_to(one, lambda control: control == (primary, secondary))
 
-    async def leads_to(self, one: Transaction, wanted: Callable[[Control], bool]) -> None:
+    async def leads_to(self, one: Transaction, wanted: Callable[[ControlPair], bool]) -> None:
         """Raise Failed if a command is refused or does not lead to the wanted control."""
         end = self.now + SHOWN_TIMEOUT
         while not wanted(control := await self.control()) and self.now < end:
@@ -170,15 +170,15 @@ class ManagerSession(GimbalSession):
     # Setpoints
 
     def setpoint(
-        self, target: Address, device_id: int | None, flags: int, q: Components, rates: Vector,
+        self, target: Address, device_id: int | None, flags: int, q: Wxyz, rates: Vector,
     ) -> Message:
         """See :class:`GimbalSession`."""
         return gimbal.GimbalManagerSetAttitude(
             *target, flags, self.device_id if device_id is None else device_id, q, *rates)
 
     async def send_angles(
-        self, cls: type[Setpoint], pitch: float = NAN, yaw: float = NAN, pitch_rate: float = NAN,
-        yaw_rate: float = NAN, source: Address | None = None,
+        self, cls: type[SetpointMessage], pitch: float = NAN, yaw: float = NAN,
+        pitch_rate: float = NAN, yaw_rate: float = NAN, source: Address | None = None,
     ) -> None:
         """Send SET_PITCHYAW (rad) or SET_MANUAL_CONTROL."""
         self.send(cls(*self.device, FORWARD, self.device_id, pitch, yaw, pitch_rate, yaw_rate),

@@ -32,10 +32,10 @@ from ...payload.checks.session import Conditions, Session
 from ...payload.checks.specifications import Specification
 from ...payload.messages import GimbalDeviceAttitudeStatus as AttitudeStatus
 from ...payload.mount_attitude import (
-    Components,
     names_frame,
     UNSET_QUATERNION,
     UNSET_VECTOR,
+    Wxyz,
     yaw_frame,
     YawFrame,
 )
@@ -227,7 +227,7 @@ class GimbalSession(Session):
 
     @abstractmethod
     def setpoint(
-        self, target: Address, device_id: int | None, flags: int, q: Components, rates: Vector,
+        self, target: Address, device_id: int | None, flags: int, q: Wxyz, rates: Vector,
     ) -> Message:
         """Return the message of a setpoint, rad/s; a device ignores the ``device_id``."""
 

@@ -42,7 +42,7 @@ from ...ros.command_sources import prefixes, release_services, SOURCE
 from ...ros.conversions import quaternion_message
 from ...ros.device_events import publish_event
 from ...ros.diagnostics_publisher import DiagnosticsSource, MakeReports
-from ...ros.node import Endpoint
+from ...ros.node import Interface
 from ...ros.parameter_services import ParameterServices
 from ...ros.parameters import ChangeableParameters
 from ...ros.payload import Host
@@ -53,44 +53,44 @@ from ...ros.transforms import TransformPublisher
 T = TypeVar('T')
 
 PUBLICATIONS = (
-    Endpoint('connected', Bool, 'manager and device are heard'),
-    Endpoint('attitude', QuaternionStamped,
-             'axes ahead, left and up (FLU); `frame_id` names the yaw frame', STREAM_QOS),
-    Endpoint('angular_velocity', Vector3Stamped, 'rates of roll, pitch and yaw, rad/s; not '
-             'published where the device does not measure them', STREAM_QOS),
-    Endpoint('angles', Vector3Stamped, 'roll, pitch, yaw of the attitude, rad', STREAM_QOS),
-    Endpoint('yaw_lock', Bool, 'yaw is held against the earth'),
-    Endpoint('in_control', Bool, 'this node has primary control'),
-    Endpoint('controller', String,
-             'the components in control, such as `primary 1/195, secondary none`, or `unknown`'),
+    Interface('connected', Bool, 'manager and device are heard'),
+    Interface('attitude', QuaternionStamped,
+              'axes ahead, left and up (FLU); `frame_id` names the yaw frame', STREAM_QOS),
+    Interface('angular_velocity', Vector3Stamped, 'rates of roll, pitch and yaw, rad/s; not '
+              'published where the device does not measure them', STREAM_QOS),
+    Interface('angles', Vector3Stamped, 'roll, pitch, yaw of the attitude, rad', STREAM_QOS),
+    Interface('yaw_lock', Bool, 'yaw is held against the earth'),
+    Interface('in_control', Bool, 'this node has primary control'),
+    Interface('controller', String,
+              'the components in control, such as `primary 1/195, secondary none`, or `unknown`'),
 )
 # The request of each service to the gimbal; its message is the second argument.
-REQUESTS: dict[Endpoint, Callable[[Gimbal, Any, float, Done], None]] = {
-    Endpoint('take_control', Trigger, 'take primary control'):
+REQUESTS: dict[Interface, Callable[[Gimbal, Any, float, Done], None]] = {
+    Interface('take_control', Trigger, 'take primary control'):
         lambda gimbal, _, *asked: gimbal.take_control(*asked),
-    Endpoint('release_control', Trigger, 'stop, and release all control that this node has'):
+    Interface('release_control', Trigger, 'stop, and release all control that this node has'):
         lambda gimbal, _, *asked: gimbal.release_control(*asked),
-    Endpoint('neutral', Trigger, 'turn to the neutral position'):
+    Interface('neutral', Trigger, 'turn to the neutral position'):
         lambda gimbal, _, *asked: gimbal.set_neutral(*asked),
-    Endpoint('retract', Trigger, 'turn to the retracted position'):
+    Interface('retract', Trigger, 'turn to the retracted position'):
         lambda gimbal, _, *asked: gimbal.retract(*asked),
-    Endpoint('clear_roi', Trigger, 'no longer point at a place'):
+    Interface('clear_roi', Trigger, 'no longer point at a place'):
         lambda gimbal, _, *asked: gimbal.clear_roi(*asked),
-    Endpoint('set_yaw_lock', SetBool, 'stop, and hold yaw against the earth or let it follow the '
-             'vehicle; refused where the gimbal lacks it'):
+    Interface('set_yaw_lock', SetBool, 'stop, and hold yaw against the earth or let it follow the '
+              'vehicle; refused where the gimbal lacks it'):
         lambda gimbal, message, *asked: gimbal.set_yaw_lock(message.data, *asked),
 }
-CMD_ATTITUDE = Endpoint(
+CMD_ATTITUDE = Interface(
     'cmd/attitude', QuaternionStamped,
     'an attitude; `frame_id` names the yaw frame, any other is refused', ros_node.SWITCH_QOS)
-CMD_ANGLES = Endpoint(
+CMD_ANGLES = Interface(
     'cmd/angles', Vector3Stamped, 'the same as roll, pitch and yaw, rad; NaN leaves an axis where '
     'it was sent last, else where it is. Refused beyond pi, and pitch beyond pi/2',
     ros_node.SWITCH_QOS)
-CMD_RATE = Endpoint(
+CMD_RATE = Interface(
     'cmd/rate', Vector3Stamped, 'rates of roll, pitch and yaw, rad/s; `frame_id` is not read. '
     'Refused beyond 2 pi. Zero is sent once when no message comes for `setpoint_timeout`')
-CMD_ROI = Endpoint(
+CMD_ROI = Interface(
     'cmd/roi', NavSatFix, 'a place to point at (MAV_CMD_DO_SET_ROI_LOCATION); its altitude is '
     'above the ellipsoid', ros_node.SWITCH_QOS)
 
@@ -240,7 +240,7 @@ class GimbalNode:
             answer(False, self.absence(now))
 
     def _request(
-        self, service: Endpoint, message: Any, now: float, answer: ros_node.Answer,
+        self, service: Interface, message: Any, now: float, answer: ros_node.Answer,
     ) -> None:
         gimbal = self._gimbal()
         if gimbal is None:
@@ -263,9 +263,9 @@ class GimbalNode:
 
     # Setpoints
 
-    def _command_topics(self, source: str, prefix: str) -> tuple[ros_node.AnyCommand, ...]:
+    def _command_topics(self, source: str, prefix: str) -> tuple[ros_node.AnyCommandTopic, ...]:
         def topic(
-            plain: Endpoint, send: Callable[[Gimbal, T, float], str], read: Callable[[Any], T],
+            plain: Interface, send: Callable[[Gimbal, T, float], str], read: Callable[[Any], T],
         ) -> ros_node.CommandTopic[T]:
             endpoint = plain.of(prefix)
 

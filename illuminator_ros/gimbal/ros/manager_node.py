@@ -42,7 +42,7 @@ from ...payload.rotation import enu_ned, ned_frd, Quaternion, Vector
 from ...ros.conversions import quaternion_message, read_orientation, read_quaternion, read_vector
 from ...ros.diagnostics import ERROR, Finding, LinkDiagnostics, Report, Value, WARN
 from ...ros.diagnostics_publisher import DiagnosticsSource, MakeReports
-from ...ros.node import AnyCommand, CommandTopic, Endpoint, NodeInterface
+from ...ros.node import AnyCommandTopic, CommandTopic, Interface, NodeInterface
 from ...ros.parameters import by_name, ParameterError, ParameterSpec, Values
 from ...ros.payload import Host, RosPayload, ServedPayload, ShutdownReport
 from ...ros.qos import STREAM_QOS
@@ -53,16 +53,16 @@ ROS = 'ros'
 VEHICLE_RATE_LIMIT, VEHICLE_SPEED_LIMIT = 100.0, 10e3
 _RANGES = ((0.0, 0.0), (-math.pi / 2, math.pi / 2), (-math.pi, math.pi))
 
-DEVICE_SETPOINT = Endpoint(
+DEVICE_SETPOINT = Interface(
     'device/setpoint', QuaternionStamped, 'the attitude for the driver of a gimbal without '
     'MAVLink', STREAM_QOS)
-DEVICE_ATTITUDE = Endpoint(
+DEVICE_ATTITUDE = Interface(
     'device/attitude', QuaternionStamped, 'the attitude that the driver measures')
-IMU = Endpoint('imu', Imu, 'attitude of the vehicle, FLU in ENU')
-ODOMETRY = Endpoint('odometry', Odometry, 'attitude and velocity of the vehicle; the twist is in '
-                    'the axes of the body')
-FIX = Endpoint('fix', NavSatFix, 'position of the vehicle, for regions of interest; ignored '
-               'without a fix')
+IMU = Interface('imu', Imu, 'attitude of the vehicle, FLU in ENU')
+ODOMETRY = Interface('odometry', Odometry, 'attitude and velocity of the vehicle; the twist is in '
+                     'the axes of the body')
+FIX = Interface('fix', NavSatFix, 'position of the vehicle, for regions of interest; ignored '
+                'without a fix')
 MANAGER_PARAMETERS = (
     ParameterSpec('policy', Policy.HOLD.value, 'when a player takes control from another one',
                   choices=tuple(policy.value for policy in Policy), restricts=True),
@@ -161,9 +161,9 @@ class ManagerNode(ServedPayload):
             host.node.get_fully_qualified_name(), self._take_snapshot))
         manager.events.subscribe(self._take)
 
-    def _topics(self) -> list[AnyCommand]:
+    def _topics(self) -> list[AnyCommandTopic]:
         separation: float = self._host.values['geoid_separation']
-        topics: list[AnyCommand] = [
+        topics: list[AnyCommandTopic] = [
             CommandTopic(IMU, self._take_imu, _read_imu),
             CommandTopic(ODOMETRY, self._take_odometry, _read_odometry),
             CommandTopic(FIX, self._take_place,
@@ -207,7 +207,7 @@ class ManagerNode(ServedPayload):
         elif isinstance(event, manager_events.RequestRefused):
             self._log.warning(f'a request of {event.player} is refused: {event.reason}',
                               'refused')
-        elif isinstance(event, manager_events.SetpointClipped):
+        elif isinstance(event, manager_events.AnglesClipped):
             for one in event.clipped:
                 self._log.warning(
                     f'the setpoint is clipped: {one.axis} {one.requested:.3f} rad in MAVLink is '

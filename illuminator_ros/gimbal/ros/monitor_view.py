@@ -101,7 +101,7 @@ def neutral(device: Device, typed: str) -> Request:
     return shared.trigger('neutral', f'turn {device.name} to its neutral position?')
 
 
-def _details(device: Device) -> Iterable[shared.Line]:
+def _details(device: Device) -> Iterable[shared.DetailLine]:
     for axis in AXES:
         ends = [device.number('device', f'{axis}_{end}_rad') for end in ('min', 'max')]
         range_ = ' to '.join(direction(axis, end) for end in ends if end is not None)

@@ -21,7 +21,7 @@ from dataclasses import astuple
 from functools import partial
 
 from .session import (
-    Change,
+    CheckedChange,
     CONFIGURE,
     differences,
     DIM,
@@ -163,13 +163,13 @@ async def _switch(light: LightSession, on: bool) -> None:
         raise Skipped(f'accepted, but it was {state} and could not be switched {other} before')
 
 
-async def _synchronise(light: LightSession) -> Change:
+async def _synchronise(light: LightSession) -> CheckedChange:
     """Configure external sync; at 0 % without consent, because a signal may strobe the light."""
     brightness = LOW if light.consent else 0.0
     return await light.configure(Mode.EXTERNAL_SYNC, brightness=brightness)
 
 
-async def _unmet_mode(light: LightSession, one: Change, mode: Mode) -> Failed | None:
+async def _unmet_mode(light: LightSession, one: CheckedChange, mode: Mode) -> Failed | None:
     """
     Return why a mode was not configured, None if a status does not contradict.
 

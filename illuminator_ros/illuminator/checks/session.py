@@ -82,7 +82,7 @@ def same(one: Status, other: Status) -> bool:
 
 
 @dataclass(frozen=True)
-class Change:
+class CheckedChange:
     """
     A command that changes the light, and its effect on the status.
 
@@ -139,7 +139,7 @@ class LightSession(Session):
         status = await self.status()
         return None if status is None else status.enabled
 
-    async def switch(self, on: bool, *, as_int: bool = False) -> Change:
+    async def switch(self, on: bool, *, as_int: bool = False) -> CheckedChange:
         """Switch the light, and compare the status."""
         one = await self.command(ON_OFF, float(on), as_int=as_int)
         return await self._compared(one, lambda status: [] if status.enabled == on else ['enable'])
@@ -147,24 +147,26 @@ class LightSession(Session):
     async def configure(
         self, mode: int = Mode.INTERNAL_CONTROL, brightness: float = LOW, period: float = 0.0,
         duty: float = 0.0,
-    ) -> Change:
+    ) -> CheckedChange:
         """Configure the light, and compare the status."""
         asked = Configuration(Mode(mode), brightness, period, duty)
         one = await self.command(CONFIGURE, mode, brightness, period, duty)
         return await self._compared(one, lambda status: differences(asked, status))
 
-    async def _compared(self, one: Transaction, differ: Callable[[Status], list[str]]) -> Change:
+    async def _compared(
+        self, one: Transaction, differ: Callable[[Status], list[str]],
+    ) -> CheckedChange:
         if not one.accepted:
-            return Change(one)
+            return CheckedChange(one)
         mark = self.record.log.total
         status = await self.after_change(differ)
         if status is None or not (not_shown := differ(status)):
-            return Change(one)
+            return CheckedChange(one)
         self.disagreements.append(Failed(
             f'{one.text}: {one.answer}, but then the status differs in '
             f'{" and ".join(not_shown)}: {status_text(status)}',
             one.lines + self.record.log.since(mark)[-3:]))
-        return Change(one, tuple(not_shown), self.disagreements[-1])
+        return CheckedChange(one, tuple(not_shown), self.disagreements[-1])
 
     async def after_change(self, differ: Callable[[Status], list[str]]) -> Status | None:
         """Return the first status that shows a change, or the last before CHANGE_TIMEOUT."""

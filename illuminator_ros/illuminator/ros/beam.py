@@ -28,7 +28,7 @@ from ..events import LightEvent, StatusReceived
 from ..model import Mode, Status
 from ...payload.device_events import DeviceDisconnected
 from ...payload.rotation import Quaternion
-from ...ros.node import Endpoint
+from ...ros.node import Interface
 from ...ros.qos import STATE_QOS
 from ...ros.transforms import TransformPublisher
 
@@ -49,11 +49,11 @@ LIFETIME = 5
 MOVE_INTERVAL = 0.1
 
 
-def beam_topic() -> Endpoint:
+def beam_topic() -> Interface:
     """Return the topic; its type is imported only where the beam is shown."""
     from visualization_msgs.msg import Marker
 
-    return Endpoint(
+    return Interface(
         'beam', Marker, 'only with `beam_range`: [the beam](beam.md), for RViz and Foxglove')
 
 

@@ -33,29 +33,29 @@ from ...payload.command_sources import DEFAULT
 from ...payload.device_events import DeviceConnected, DeviceDisconnected, DeviceHeld
 from ...ros.device_events import publish_event
 from ...ros.diagnostics import ERROR, WARN
-from ...ros.node import Endpoint, NodeInterface
+from ...ros.node import Interface, NodeInterface
 from ...ros.parameters import DeviceParameters
 from ...ros.qos import STREAM_QOS
 from ...ros.throttled_log import NodeLog
 
 # One value of each status, by topic. ``enabled`` is first, since callers wait for it.
-STATUS_TOPICS: dict[Endpoint, Callable[[model.Status], object]] = {
-    Endpoint('enabled', Bool, 'the light is on'): operator.attrgetter('enabled'),
-    Endpoint('brightness', Float32, '%'): operator.attrgetter('brightness'),
-    Endpoint('mode', String, '`unknown`, `internal_control`, `external_sync`'):
+STATUS_TOPICS: dict[Interface, Callable[[model.Status], object]] = {
+    Interface('enabled', Bool, 'the light is on'): operator.attrgetter('enabled'),
+    Interface('brightness', Float32, '%'): operator.attrgetter('brightness'),
+    Interface('mode', String, '`unknown`, `internal_control`, `external_sync`'):
         operator.attrgetter('mode.label'),
-    Endpoint('strobe_period', Float32, 's, 0 = no strobe'): operator.attrgetter('strobe_period'),
-    Endpoint('strobe_duty_cycle', Float32, '%'): operator.attrgetter('strobe_duty_cycle'),
-    Endpoint('error_flags', UInt32, 'ILLUMINATOR_ERROR_FLAGS as sent: 1 thermal throttling, '
-             '2 over-temperature shutdown, 4 thermistor failure'):
+    Interface('strobe_period', Float32, 's, 0 = no strobe'): operator.attrgetter('strobe_period'),
+    Interface('strobe_duty_cycle', Float32, '%'): operator.attrgetter('strobe_duty_cycle'),
+    Interface('error_flags', UInt32, 'ILLUMINATOR_ERROR_FLAGS as sent: 1 thermal throttling, '
+              '2 over-temperature shutdown, 4 thermistor failure'):
         operator.attrgetter('error_flags'),
-    Endpoint('uptime', Float64, 's'): lambda status: status.uptime_ms / 1000.0,
+    Interface('uptime', Float64, 's'): lambda status: status.uptime_ms / 1000.0,
 }
 PUBLICATIONS = (
-    Endpoint('connected', Bool, 'the bridge hears the light; on change'),
+    Interface('connected', Bool, 'the bridge hears the light; on change'),
     *STATUS_TOPICS,
-    Endpoint('temperature', Temperature, 'degC; not published if the light does not measure it or '
-             'its sensor failed', STREAM_QOS),
+    Interface('temperature', Temperature, 'degC; not published if the light does not measure it '
+              'or its sensor failed', STREAM_QOS),
 )
 # Events that may change a level.
 _DIAGNOSED = (DeviceConnected, DeviceDisconnected, events.LightIdentified, DeviceHeld,

@@ -45,12 +45,12 @@ from ...ros.payload import Host
 from ...ros.throttled_log import NodeLog
 from ...ros.transforms import TransformPublisher
 
-ENABLE = ros_node.Endpoint('enable', SetBool, 'switch the light on or off')
-REFRESH = ros_node.Endpoint('refresh', Trigger, 'request identity and status again')
-CMD_ENABLE = ros_node.Endpoint(
+ENABLE = ros_node.Interface('enable', SetBool, 'switch the light on or off')
+REFRESH = ros_node.Interface('refresh', Trigger, 'request identity and status again')
+CMD_ENABLE = ros_node.Interface(
     'cmd/enable', Bool, 'the same as the service, for joysticks and behaviour trees',
     ros_node.SWITCH_QOS)
-CMD_BRIGHTNESS = ros_node.Endpoint(
+CMD_BRIGHTNESS = ros_node.Interface(
     'cmd/brightness', Float32,
     'a stream of setpoints, %: the newest wins, with one command in flight, whatever the rate')
 # Refreshes that may wait for their answers: each is two messages of the light.
@@ -77,7 +77,7 @@ class LightNode:
         self, node: Node, host: Host, log: NodeLog, client: IlluminatorClient,
         geometry: BeamGeometry, limits: SafetyLimits, *,
         services: tuple[ros_node.RequestService, ...] = (),
-        commands: tuple[ros_node.AnyCommand, ...] = (),
+        commands: tuple[ros_node.AnyCommandTopic, ...] = (),
         changeable: ChangeableParameters | None = None,
         transforms: TransformPublisher | None = None,
     ) -> None:
@@ -208,7 +208,7 @@ class LightNode:
 
     def _command_topics(
         self, source: str, prefix: str,
-    ) -> tuple[ros_node.AnyCommand, ros_node.AnyCommand]:
+    ) -> tuple[ros_node.AnyCommandTopic, ros_node.AnyCommandTopic]:
         return (
             ros_node.CommandTopic(
                 CMD_ENABLE.of(prefix), functools.partial(self._switch, source, prefix)),

@@ -33,15 +33,15 @@ from ...mavlink.messages import Address
 from ...payload.confirmed_command import Done, Result
 from ...payload.device_events import DeviceConnected
 from ...ros.device_nodes import DeviceNodes
-from ...ros.node import Answer, CommandTopic, Endpoint, RequestService, SWITCH_QOS
+from ...ros.node import Answer, CommandTopic, Interface, RequestService, SWITCH_QOS
 from ...ros.parameters import ChangeableParameters, Values
 from ...ros.payload import Host, RosPayload, ServedPayload, ShutdownReport
 from ...ros.transforms import TransformPublisher
 
-ENABLE_ALL = Endpoint(
+ENABLE_ALL = Interface(
     'enable_all', SetBool, 'first node only: switch all connected lights; the answer names each '
     'outcome, and is `true` if all succeeded')
-CMD_ENABLE_ALL = Endpoint(
+CMD_ENABLE_ALL = Interface(
     'cmd/enable_all', Bool, 'the same as the service `~/enable_all`', SWITCH_QOS)
 # s from the first light to the warnings on unused names: lights that start together are heard by
 # then.

@@ -120,7 +120,7 @@ def _strobe(device: Device) -> str:
     return f'{period:.3g} s' + (f' {duty:.3g} %' if duty else '')
 
 
-def _details(device: Device) -> Iterable[shared.Line]:
+def _details(device: Device) -> Iterable[shared.DetailLine]:
     values, lamp = device.values, functools.partial(device.diagnosed, 'lamp')
     shines, limit, uptime = values.get('brightness'), agreed(device), values.get('uptime')
     serial = lamp('serial_number')

@@ -25,7 +25,7 @@ from typing import NamedTuple
 
 from rclpy.node import Node
 
-from ..light import Settings
+from ..light import LightSettings
 from ..model import MAX_STROBE_PERIOD, MODES, SafetyLimits
 from ...mavlink.messages import Address
 from ...ros.command_sources import SOURCE_PARAMETERS, source_settings
@@ -119,7 +119,7 @@ class BeamGeometry(NamedTuple):
             node, (spec for spec in LIGHT_PARAMETERS if spec.name in _GEOMETRY), self._asdict()))
 
 
-def settings(values: Values) -> Settings:
+def settings(values: Values) -> LightSettings:
     """
     Return the settings of the lights.
 
@@ -128,7 +128,7 @@ def settings(values: Values) -> Settings:
     sources, off = source_settings(values), values['on_release'] == 'off'
     if off and sources is None:
         raise ParameterError('on_release: is given, but sources is empty')
-    return by_name(Settings, values, limits=by_name(SafetyLimits, values), sources=sources,
+    return by_name(LightSettings, values, limits=by_name(SafetyLimits, values), sources=sources,
                    off_on_release=off)
 
 

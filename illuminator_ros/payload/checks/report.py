@@ -22,7 +22,7 @@ from dataclasses import dataclass
 import json
 from xml.etree import ElementTree
 
-from .requirement import AnyRequirement, Result, Verdict
+from .requirement import AnyRequirement, CheckResult, CheckVerdict
 from .specifications import HEARTBEAT
 from ... import __version__
 
@@ -47,36 +47,36 @@ class RunReport:
     kind: str
     url: str
     device: str
-    results: tuple[Result, ...]
+    results: tuple[CheckResult, ...]
     restored: str
     seconds: float
     passed: bool
 
-    def count(self, verdict: Verdict) -> int:
+    def count(self, verdict: CheckVerdict) -> int:
         """Return the number of results with a verdict."""
         return sum(one.verdict is verdict for one in self.results)
 
     @property
     def summary(self) -> str:
         """Return the last line."""
-        return (f'{self.count(Verdict.PASS)} passed, {self.count(Verdict.FAIL)} failed, '
-                f'{self.count(Verdict.SKIPPED)} skipped in {self.seconds:.0f} s; '
+        return (f'{self.count(CheckVerdict.PASS)} passed, {self.count(CheckVerdict.FAIL)} failed, '
+                f'{self.count(CheckVerdict.SKIPPED)} skipped in {self.seconds:.0f} s; '
                 f'{self.restored}')
 
 
-def lines(result: Result, *, verbose: bool = False) -> list[str]:
+def lines(result: CheckResult, *, verbose: bool = False) -> list[str]:
     """
     Return a result as lines of the table.
 
     :param verbose: whether to show the lines of the log for a requirement that is met, too.
     """
     one = result.requirement
-    met = result.verdict is Verdict.PASS
+    met = result.verdict is CheckVerdict.PASS
     detail = f' ({result.detail})' if result.detail and met else ''
     text = [f'{result.verdict.value:8}{one.name:23}{one.title}{detail}']
     if not met:
         text.append(f'{"":8}{result.detail}')
-    if result.verdict is Verdict.FAIL or verbose:
+    if result.verdict is CheckVerdict.FAIL or verbose:
         text.append(f'{"":8}see {one.place}: {one.specification.url}')
         shown = [line for line in result.exchange
                  if one.specification is HEARTBEAT or ' HEARTBEAT ' not in line]
@@ -87,10 +87,10 @@ def lines(result: Result, *, verbose: bool = False) -> list[str]:
     return text
 
 
-def unreached(results: Iterable[Result]) -> list[str]:
+def unreached(results: Iterable[CheckResult]) -> list[str]:
     """Return a line for all requirements that were not reached for the same reason."""
     reasons = Counter(one.detail for one in results if not one.reached)
-    return [f'{Verdict.SKIPPED.value:8}{count} not reached: {reason}'
+    return [f'{CheckVerdict.SKIPPED.value:8}{count} not reached: {reason}'
             for reason, count in reasons.items()]
 
 
@@ -111,7 +111,7 @@ def as_json(report: RunReport) -> str:
         'passed': report.passed,
         'seconds': round(report.seconds, 3),
         'restored': report.restored,
-        'counts': {one.value: report.count(one) for one in Verdict},
+        'counts': {one.value: report.count(one) for one in CheckVerdict},
         'results': [{
             'name': one.requirement.name,
             'title': one.requirement.title,
@@ -132,13 +132,13 @@ def as_junit(report: RunReport) -> str:
         return ElementTree.SubElement(
             parent, tag, {name: text.translate(_NOT_XML) for name, text in attributes.items()})
 
-    failures = report.count(Verdict.FAIL)
+    failures = report.count(CheckVerdict.FAIL)
     # A reader of the report alone must not take an incomplete run for one without a fault.
     error = not (report.passed or failures)
     suite = ElementTree.Element(
         'testsuite', name=f'{report.payload} conformance',
         tests=str(len(report.results) + error), failures=str(failures), errors=str(int(error)),
-        skipped=str(report.count(Verdict.SKIPPED)), time=f'{report.seconds:.3f}')
+        skipped=str(report.count(CheckVerdict.SKIPPED)), time=f'{report.seconds:.3f}')
     properties = add(suite, 'properties')
     for name, value in (('url', report.url), (report.kind, report.device),
                         ('restored', report.restored)):
@@ -147,10 +147,10 @@ def as_junit(report: RunReport) -> str:
         one = result.requirement
         case = add(suite, 'testcase', name=f'{one.name}: {one.title}',
                    classname=one.specification.title, time=f'{result.seconds:.3f}')
-        if result.verdict is Verdict.FAIL:
+        if result.verdict is CheckVerdict.FAIL:
             failure = add(case, 'failure', message=result.detail)
             failure.text = f'see {one.place}: {one.specification.url}'
-        elif result.verdict is Verdict.SKIPPED:
+        elif result.verdict is CheckVerdict.SKIPPED:
             add(case, 'skipped', message=result.detail)
         add(case, 'system-out').text = '\n'.join(result.exchange).translate(_NOT_XML)
     if error:

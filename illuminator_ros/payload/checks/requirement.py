@@ -29,7 +29,7 @@ T = TypeVar('T', bound=Session, contravariant=True)
 Check = Callable[[T], Awaitable['str | None']]
 
 
-class Verdict(Enum):
+class CheckVerdict(Enum):
     """The verdict of a check."""
 
     PASS = 'PASS'
@@ -84,7 +84,7 @@ AnyRequirement = Requirement[Any]
 
 
 @dataclass(frozen=True)
-class Result:
+class CheckResult:
     """
     The result of a check.
 
@@ -95,7 +95,7 @@ class Result:
     """
 
     requirement: AnyRequirement
-    verdict: Verdict
+    verdict: CheckVerdict
     detail: str = ''
     exchange: list[str] = field(default_factory=list)
     seconds: float = 0.0

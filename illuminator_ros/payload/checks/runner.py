@@ -23,7 +23,7 @@ from typing import Generic
 from .components import names
 from .coroutines import Interrupted
 from .outcomes import DeviceLost, Failed, Skipped
-from .requirement import NOT_AGREED, PayloadChecks, Requirement, Result, T, Verdict
+from .requirement import CheckResult, CheckVerdict, NOT_AGREED, PayloadChecks, Requirement, T
 from .session import Session
 
 # s
@@ -67,9 +67,9 @@ class CheckRunner(Generic[T]):
 
     def __init__(
         self, checks: PayloadChecks[T], session: T, requirements: Sequence[Requirement[T]],
-        on_result: Callable[[Result], None] = lambda result: None,
+        on_result: Callable[[CheckResult], None] = lambda result: None,
     ) -> None:
-        self.results: list[Result] = []
+        self.results: list[CheckResult] = []
         self.restored = 'nothing was changed'
         self.changed = False
         self.left_changed = False
@@ -85,7 +85,7 @@ class CheckRunner(Generic[T]):
         """Whether a requirement is met, no requirement has failed, and the run was complete."""
         verdicts = [one.verdict for one in self.results]
         return (not self.left_changed and not self._session.runner.interrupted
-                and Verdict.FAIL not in verdicts and Verdict.PASS in verdicts)
+                and CheckVerdict.FAIL not in verdicts and CheckVerdict.PASS in verdicts)
 
     async def run(self, missing: str = '') -> None:
         """
@@ -101,27 +101,27 @@ class CheckRunner(Generic[T]):
         except Interrupted:
             reason = 'stopped' if self._session.danger else 'interrupted'
             for one in self._requirements[len(self.results):]:
-                self._add(Result(one, Verdict.SKIPPED, reason, reached=False))
+                self._add(CheckResult(one, CheckVerdict.SKIPPED, reason, reached=False))
         finally:
             self._session.runner.restoring = True
             if self.changed:
                 await self._restore()
 
-    def _add(self, result: Result) -> None:
+    def _add(self, result: CheckResult) -> None:
         self.results.append(result)
         self._on_result(result)
 
-    async def _check(self, one: Requirement[T], missing: str) -> Result:
+    async def _check(self, one: Requirement[T], missing: str) -> CheckResult:
         log = self._session.record.log
         begun, mark = self._session.now, log.total
-        verdict, lines, reached = Verdict.FAIL, None, True
+        verdict, lines, reached = CheckVerdict.FAIL, None, True
         try:
             await self._prepare(one, missing)
-            verdict, detail = Verdict.PASS, await one.check(self._session) or ''
+            verdict, detail = CheckVerdict.PASS, await one.check(self._session) or ''
         except Failed as error:
             detail, lines = str(error), error.lines
         except Skipped as error:
-            verdict, detail = Verdict.SKIPPED, str(error)
+            verdict, detail = CheckVerdict.SKIPPED, str(error)
             reached = not isinstance(error, _Unreached)
         except Interrupted:
             if not self._session.danger:
@@ -133,7 +133,7 @@ class CheckRunner(Generic[T]):
             _log.exception('internal error in the check %s', one.name)
             detail = f'internal error in this check: {error!r}'
         exchange = log.since(mark)[-MAX_LINES:] if lines is None else lines[:MAX_LINES]
-        return Result(one, verdict, detail, exchange, self._session.now - begun, reached)
+        return CheckResult(one, verdict, detail, exchange, self._session.now - begun, reached)
 
     async def _prepare(self, one: Requirement[T], missing: str) -> None:
         """Raise if the check cannot be made, or if the device could not be restored after it."""

@@ -29,10 +29,10 @@ from std_msgs.msg import Bool, Header, UInt32
 from std_srvs.srv import Trigger
 
 from .diagnostics import (
+    InputTopic,
     missing,
     reports,
     shared_topics,
-    Topic,
     topics,
     why_no_camera,
     why_unused,
@@ -41,10 +41,10 @@ from .inputs import subscriptions
 from ..client import CameraEvent, ImageTaken, RedEdgeClient
 from ..conversions import fixed_mount, image_attitude, image_position, MountFrame, MountParent
 from ..input_states import (
+    CameraSettings,
     Input,
     InputState,
     PositionSource,
-    Settings,
     Stamp,
 )
 from ..messages import CameraFeedback, Shot
@@ -55,7 +55,7 @@ from ...ros.conversions import GEOID_SEPARATION, quaternion_message
 from ...ros.device_events import publish_event
 from ...ros.device_nodes import ABSENCE_DELAY
 from ...ros.diagnostics_publisher import DiagnosticsSource, MakeReports
-from ...ros.node import Answer, Endpoint, NodeInterface, RequestService
+from ...ros.node import Answer, Interface, NodeInterface, RequestService
 from ...ros.parameter_services import ParameterServices
 from ...ros.parameters import (
     by_name,
@@ -80,18 +80,18 @@ DISCOVERY_TIME = 2.0
 COUNT_INTERVAL = 1.0
 
 PUBLICATIONS = (
-    Endpoint('connected', Bool, "the camera's heartbeat is heard"),
-    Endpoint('image/fix', NavSatFix, 'position of an image; its altitude is above the ellipsoid',
-             STREAM_QOS),
-    Endpoint('image/attitude', QuaternionStamped,
-             'orientation of the camera in that image, in `map` (ENU)', STREAM_QOS),
-    Endpoint('image/index', UInt32, 'its number, as the camera counts captures by MAVLink',
-             STREAM_QOS),
+    Interface('connected', Bool, "the camera's heartbeat is heard"),
+    Interface('image/fix', NavSatFix, 'position of an image; its altitude is above the ellipsoid',
+              STREAM_QOS),
+    Interface('image/attitude', QuaternionStamped,
+              'orientation of the camera in that image, in `map` (ENU)', STREAM_QOS),
+    Interface('image/index', UInt32, 'its number, as the camera counts captures by MAVLink',
+              STREAM_QOS),
 )
-PING = Endpoint('ping', Trigger, 'round trip through the camera; the message has the time in ms')
+PING = Interface('ping', Trigger, 'round trip through the camera; the message has the time in ms')
 CAPTURES = {
-    Endpoint('capture', Trigger, 'take an image'): Shot.SURVEY,
-    Endpoint('capture_panel', Trigger, 'take an image of the calibration panel'): Shot.PANEL,
+    Interface('capture', Trigger, 'take an image'): Shot.SURVEY,
+    Interface('capture_panel', Trigger, 'take an image of the calibration panel'): Shot.PANEL,
 }
 PARAMETERS = (
     ParameterSpec('position_source', 'raw', 'messages that carry the position: GPS_RAW_INT, or '
@@ -137,7 +137,7 @@ class CameraNode(ServedPayload):
         self._states: dict[Input, InputState] = {}
         self._geoid_is_known = GEOID_SEPARATION.name in given_parameters(host.node)
         self._topics = {one: host.node.resolve_topic_name(f'~/{one.value}') for one in Input}
-        self._graph: dict[Input, Topic] = {}
+        self._graph: dict[Input, InputTopic] = {}
         self._count_due = -math.inf
         self._interface = NodeInterface(
             host.node, host.link, host.log, publications=PUBLICATIONS,
@@ -233,7 +233,7 @@ class CameraNode(ServedPayload):
         self._log_inputs(now)
         if now >= self._count_due:
             self._count_due = now + COUNT_INTERVAL
-            self._graph = {one: Topic(name, self._host.node.count_publishers(name))
+            self._graph = {one: InputTopic(name, self._host.node.count_publishers(name))
                            for one, name in self._topics.items()}
             self._host.log.write_conditions(shared_topics(self._graph), 'shared input')
             # Publishers and their first messages take some time.
@@ -307,7 +307,7 @@ def _make_client(commands: CommandSender, values: Values) -> RedEdgeClient:
     if commands.address.component == mavlink.MAV_COMP_ID_CAMERA:
         raise ParameterError(f'component_id: {mavlink.MAV_COMP_ID_CAMERA} is the id of the camera')
     return RedEdgeClient(commands, by_name(
-        Settings, values, position_source=PositionSource(values['position_source']),
+        CameraSettings, values, position_source=PositionSource(values['position_source']),
         mount_frame=MountFrame(values['mount_frame'])))
 
 

@@ -55,7 +55,7 @@ CAMERA_VALUES = {
 }
 
 
-class Topic(NamedTuple):
+class InputTopic(NamedTuple):
     """The topic of an input, with its name in the graph and the number of its publishers."""
 
     name: str
@@ -67,7 +67,7 @@ class Topic(NamedTuple):
 
 
 # The topics whose publishers have been counted.
-Topics = Mapping[Input, Topic]
+Topics = Mapping[Input, InputTopic]
 
 
 def reports(

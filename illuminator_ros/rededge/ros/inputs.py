@@ -36,7 +36,7 @@ from ..input_states import Input, Stamp, UNKNOWN
 from ...mavlink.link import Link
 from ...payload.rotation import Quaternion, Vector
 from ...ros.conversions import NO_VALUE, read_orientation, read_quaternion, read_vector
-from ...ros.node import AnyCommand, CommandTopic, Endpoint
+from ...ros.node import AnyCommandTopic, CommandTopic, Interface
 
 # s; a greater change relative to a steady clock is a jump. Simulated time may run fast and in
 # steps, so its limit is higher.
@@ -45,7 +45,7 @@ SIMULATED_JUMP = 5.0
 
 
 TOPICS = {
-    name: Endpoint(name.value, type_, meaning) for name, type_, meaning in (
+    name: Interface(name.value, type_, meaning) for name, type_, meaning in (
         (Input.FIX, NavSatFix,
          'required: position; its altitude is above the WGS84 ellipsoid'),
         (Input.VELOCITY, TwistStamped,
@@ -115,13 +115,13 @@ def orientation_and_rates(message: Imu) -> tuple[Quaternion | None, Vector]:
         else read_vector(message.angular_velocity))
 
 
-def subscriptions(node: Node, link: Link, feeder: Feeder) -> Iterable[AnyCommand]:
+def subscriptions(node: Node, link: Link, feeder: Feeder) -> Iterable[AnyCommandTopic]:
     """Return the subscribed topics, which the feeder takes in the link's thread."""
     reader = StampReader(node, lambda: link.call(lambda now: feeder.clock_jumped()))
 
     def topic(
         name: Input, values: Callable[[Any], tuple[object, ...]], take: Callable[..., None],
-    ) -> AnyCommand:
+    ) -> AnyCommandTopic:
         def read(message: Any) -> tuple[object, ...]:
             return *values(message), reader.read(message.header)
 

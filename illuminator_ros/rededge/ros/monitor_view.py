@@ -49,7 +49,7 @@ def _inputs(device: Device) -> str:
     return ' '.join(name for name in INPUTS if device.diagnosed('camera', name) == 'ok') or 'none'
 
 
-def _details(device: Device) -> Iterable[shared.Line]:
+def _details(device: Device) -> Iterable[shared.DetailLine]:
     yield 'image', [f'{_image(device)}, at {place(device)}']
     cells: list[shared.Cell] = []
     findings = device.diagnoses['camera'].message if 'camera' in device.diagnoses else ''
