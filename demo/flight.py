@@ -60,12 +60,12 @@ from illuminator_ros.mavlink.link import Link  # noqa: E402
 from illuminator_ros.mavlink.url import parse_url  # noqa: E402
 from illuminator_ros.payload.messages import GeoPoint  # noqa: E402
 from illuminator_ros.payload.rotation import enu_flu, flip, Quaternion  # noqa: E402
-from illuminator_ros.payload.simulated import SimulatedComponents  # noqa: E402
 from illuminator_ros.rededge.simulated import (  # noqa: E402
     COLUMNS,
     RedEdgeProperties,
     SimulatedRedEdge,
 )
+from illuminator_ros.simulation.simulated import SimulatedComponents  # noqa: E402
 from programs import END_TIMEOUT, running  # noqa: E402
 
 # s to start a program, and s from its start to the take-off, real time.

@@ -33,7 +33,7 @@ MODULES = {
     '.'.join(path.relative_to(ROOT).with_suffix('').parts).removesuffix('.__init__'): path
     for path in sorted((ROOT / PACKAGE).rglob('*.py'))}
 # Every other folder holds one payload.
-SHARED = {'mavlink', 'payload', 'ros', 'cli'}
+SHARED = {'mavlink', 'payload', 'simulation', 'checks', 'ros', 'cli'}
 PAYLOADS = {module.split('.')[1] for module, path in MODULES.items()
             if path.name == '__init__.py' and module.count('.') == 1} - SHARED
 
@@ -64,13 +64,13 @@ def folder(module: str) -> tuple[str, ...]:
 def allowed(importer: tuple[str, ...]) -> set[tuple[str, ...]]:
     """Return the folders from which a module of this folder may import."""
     if importer in ((), ('cli',)):
-        return {(), ('cli',), ('ros',), ('payload',), ('mavlink',),
+        return {(), ('cli',), ('ros',), ('simulation',), ('checks',), ('payload',), ('mavlink',),
                 *((name,) for name in PAYLOADS), *((name, 'ros') for name in PAYLOADS)}
     if importer == ('mavlink',):
         return {importer}
-    if importer in (('ros',), ('payload',)):
+    if importer in (('ros',), ('simulation',), ('checks',), ('payload',)):
         return {importer, ('payload',), ('mavlink',), ()}
-    own = {(importer[0],), ('payload',), ('mavlink',), ()}
+    own = {(importer[0],), ('simulation',), ('checks',), ('payload',), ('mavlink',), ()}
     return own | {importer, ('ros',)} if importer[1:] else own
 
 
@@ -157,7 +157,8 @@ def test_no_module_imports_itself_by_way_of_others() -> None:
 def test_protocol_modules_do_no_io_and_have_no_clock_and_no_thread() -> None:
     sans_io = [module for module in MODULES if folder(module) and (
         folder(module) == ('mavlink',) and not set(module.split('.')[2:3]) & MAVLINK_IO
-        or folder(module)[0] in {'payload'} | PAYLOADS and folder(module)[1:] != ('ros',))]
+        or folder(module)[0] in {'payload', 'simulation', 'checks'} | PAYLOADS
+        and folder(module)[1:] != ('ros',))]
     above = tuple(f'{PACKAGE}.mavlink.{name}' for name in (
         'line', 'link', 'connector', 'transport.'))
 
@@ -170,7 +171,8 @@ def test_protocol_modules_do_no_io_and_have_no_clock_and_no_thread() -> None:
 def test_shared_protocol_modules_name_no_payload() -> None:
     # MAVLink's own names: entries of enums are in capitals, and pymavlink's classes begin with its
     # name; payload/messages.py has messages of MAVLink that several payloads read.
-    assert {module: found for module in MODULES if folder(module) in (('mavlink',), ('payload',))
+    assert {module: found for module in MODULES if folder(module) in (
+                ('mavlink',), ('payload',), ('simulation',), ('checks',))
             and module != f'{PACKAGE}.payload.messages'
             and (found := [name for name in identifiers(module) if PAYLOAD_WORD.search(name)
                            and name not in {PACKAGE, *SHARED_NAMES}

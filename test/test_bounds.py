@@ -47,14 +47,14 @@ from illuminator_ros.mavlink.signing import MAX_STREAMS, ticks
 from illuminator_ros.mavlink.statistics import MAX_SOURCES
 from illuminator_ros.mavlink.transport.udp import MAX_PEERS
 from illuminator_ros.mavlink.url import MemoryUrl
-from illuminator_ros.payload import simulated
 from illuminator_ros.payload.device_property import MAX_CALLERS
 from illuminator_ros.payload.discovery import MAX_CANDIDATES, MAX_DEVICES, MAX_IGNORED
 from illuminator_ros.payload.messages import Attitude, GimbalDeviceAttitudeStatus
-from illuminator_ros.payload.simulated import SimulatedComponents
 from illuminator_ros.rededge.client import RedEdgeClient
 from illuminator_ros.rededge.input_states import CameraSettings
 from illuminator_ros.rededge.messages import CameraFeedback
+from illuminator_ros.simulation import simulated
+from illuminator_ros.simulation.simulated import SimulatedComponents
 import pytest
 from support.client import Client
 from support.entries import stores

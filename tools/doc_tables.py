@@ -27,6 +27,7 @@ import sys
 from typing import Any, TYPE_CHECKING
 import xml.etree.ElementTree as ET
 
+from illuminator_ros.checks.requirement import Requirement
 from illuminator_ros.cli.payloads import PAYLOADS
 from illuminator_ros.cli.simulator.console import COMMANDS as CONSOLE_COMMANDS
 from illuminator_ros.cli.simulator.console import OTHERS
@@ -37,13 +38,12 @@ from illuminator_ros.illuminator.simulated import COMMANDS as LIGHT_COMMANDS
 from illuminator_ros.illuminator.simulated import SIMULATED
 from illuminator_ros.illuminator.simulated_properties import FAULTS, PROFILES
 from illuminator_ros.mavlink.retries import POLICIES
-from illuminator_ros.payload.checks.requirement import Requirement
-from illuminator_ros.payload.faults import FaultTable
-from illuminator_ros.payload.simulated import SimulatedType
 from illuminator_ros.rededge.checks import REQUIREMENTS as CAMERA_REQUIREMENTS
 from illuminator_ros.rededge.conversions import FIELDS
 from illuminator_ros.rededge.simulated import COLUMNS
 from illuminator_ros.rededge.simulated import SIMULATED as CAMERA
+from illuminator_ros.simulation.faults import FaultTable
+from illuminator_ros.simulation.simulated import SimulatedType
 
 if TYPE_CHECKING:
     from illuminator_ros.ros.node import Interface

@@ -36,12 +36,12 @@ from .simulated_motion import GimbalMechanics, GimbalMotion
 from .. import __version__
 from ..mavlink.dialect import flag_names, mavlink
 from ..mavlink.messages import Address, Message, time_boot_ms
-from ..payload import simulated
-from ..payload.faults import Behaviour, fault, FaultTable, FaultValue, FLAGS
 from ..payload.messages import GimbalDeviceAttitudeStatus
 from ..payload.mount_attitude import AXES, yaw_frame, YawFrame
 from ..payload.rotation import Quaternion
-from ..payload.simulated_settings import integer, number, one_of, setting, text
+from ..simulation import simulated
+from ..simulation.faults import Behaviour, fault, FaultTable, FaultValue, FLAGS
+from ..simulation.settings import integer, number, one_of, setting, text
 
 # s without an announcement after which a component is no longer the manager.
 MANAGER_TIMEOUT = 5.0

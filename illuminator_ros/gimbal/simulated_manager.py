@@ -36,8 +36,6 @@ from .messages import DEVICE_ID_PARAM, NO_COMPONENT
 from .simulated_device import COMMANDS, GimbalBehaviour, MountProperties, SimulatedMount
 from ..mavlink.dialect import mavlink, replaced
 from ..mavlink.messages import Address, AnyCommand, Message, params_of
-from ..payload import simulated
-from ..payload.faults import Behaviour, fault, FaultTable
 from ..payload.messages import (
     Attitude,
     GeoPoint,
@@ -47,7 +45,9 @@ from ..payload.messages import (
     place_of,
 )
 from ..payload.mount_attitude import UNSET_VECTOR, YawFrame
-from ..payload.simulated_settings import geo_point, integer, number, setting
+from ..simulation import simulated
+from ..simulation.faults import Behaviour, fault, FaultTable
+from ..simulation.settings import geo_point, integer, number, setting
 
 # s between messages with the state of the manager ("Gimbal Manager Status").
 STATUS_INTERVAL = 0.2

@@ -25,7 +25,7 @@ from .manager_setpoint import Setpoint
 from ..mavlink.dialect import mavlink, short_names
 from ..payload.mount_attitude import AXES, UNSET_VECTOR, YawFrame
 from ..payload.rotation import Quaternion, Vector
-from ..payload.simulated_settings import number, one_of, setting
+from ..simulation.settings import number, one_of, setting
 
 # s without a heading from the vehicle after which its heading is unknown.
 HEADING_TIMEOUT = 2.0

@@ -32,8 +32,9 @@ from .thermal import ThermalModel, ThermalProperties
 from ..mavlink import messages as mav
 from ..mavlink.dialect import mavlink
 from ..mavlink.messages import AnyCommand, params_of
-from ..payload.faults import Behaviour
-from ..payload.simulated import (
+from ..simulation.faults import Behaviour
+from ..simulation.settings import number
+from ..simulation.simulated import (
     CommandReply,
     ConsoleCommand,
     Effect,
@@ -42,7 +43,6 @@ from ..payload.simulated import (
     SimulatedType,
     Snapshot,
 )
-from ..payload.simulated_settings import number
 
 # K by which the temperature must change for a line of its own.
 TEMPERATURE_STEP = 5.0

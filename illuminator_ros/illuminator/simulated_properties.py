@@ -25,9 +25,9 @@ from .thermal import ThermalProperties
 from .. import __version__
 from ..mavlink import messages
 from ..mavlink.dialect import mavlink
-from ..payload.faults import Behaviour, fault, FaultTable, FLAGS
-from ..payload.simulated import Profile, Properties
-from ..payload.simulated_settings import integer, number, one_of, setting, text
+from ..simulation.faults import Behaviour, fault, FaultTable, FLAGS
+from ..simulation.settings import integer, number, one_of, setting, text
+from ..simulation.simulated import Profile, Properties
 
 
 @dataclass(frozen=True)

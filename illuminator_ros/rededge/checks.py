@@ -30,13 +30,13 @@ from typing import NamedTuple, TypeAlias
 
 from . import conversions
 from . import messages as rededge
+from ..checks import component_requirements as component
+from ..checks.outcomes import Failed, Skipped
+from ..checks.requirement import PayloadChecks, Requirement, requirement
+from ..checks.session import Conditions, Session
+from ..checks.specifications import Specification
 from ..mavlink.dialect import mavlink
 from ..mavlink.messages import Address, Heartbeat, Message, target_of
-from ..payload.checks import component_requirements as component
-from ..payload.checks.outcomes import Failed, Skipped
-from ..payload.checks.requirement import PayloadChecks, Requirement, requirement
-from ..payload.checks.session import Conditions, Session
-from ..payload.checks.specifications import Specification
 from ..payload.messages import Attitude, GlobalPositionInt, SystemTime
 
 SERIAL_API = Specification(

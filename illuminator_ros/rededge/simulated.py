@@ -31,11 +31,11 @@ from typing import Any, NamedTuple
 from . import messages as rededge
 from ..mavlink.dialect import mavlink, raw, replaced
 from ..mavlink.messages import Address, Heartbeat, Message, target_of
-from ..payload import simulated
-from ..payload.faults import Behaviour, COUNT, fault, FaultTable, SECONDS
 from ..payload.messages import Attitude, GeoPoint, GlobalPositionInt, is_plausible, SystemTime
 from ..payload.rotation import Quaternion
-from ..payload.simulated_settings import geo_point, number, setting, SettingValues
+from ..simulation import simulated
+from ..simulation.faults import Behaviour, COUNT, fault, FaultTable, SECONDS
+from ..simulation.settings import geo_point, number, setting, SettingValues
 
 # Until the camera hears a host.
 DEFAULT_SYSTEM_ID = 255

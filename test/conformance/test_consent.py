@@ -16,6 +16,7 @@
 
 from dataclasses import replace
 
+from illuminator_ros.checks.requirement import CheckVerdict
 from illuminator_ros.illuminator.model import Configuration, Mode
 from illuminator_ros.illuminator.simulated_properties import (
     FAULTS,
@@ -24,8 +25,7 @@ from illuminator_ros.illuminator.simulated_properties import (
 )
 from illuminator_ros.mavlink.dialect import mavlink
 from illuminator_ros.mavlink.messages import Address
-from illuminator_ros.payload.checks.requirement import CheckVerdict
-from illuminator_ros.payload.simulated import CommandReply, Effect
+from illuminator_ros.simulation.simulated import CommandReply, Effect
 import pytest
 from support.checks_run import ChecksRun, KINDS, start
 

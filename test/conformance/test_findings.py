@@ -21,6 +21,7 @@ from dataclasses import replace
 import math
 from typing import Any
 
+from illuminator_ros.checks.requirement import CheckVerdict
 from illuminator_ros.cli.payloads import PAYLOADS
 from illuminator_ros.gimbal import messages as gimbal
 from illuminator_ros.gimbal.manager_setpoint import Setpoint
@@ -28,10 +29,9 @@ from illuminator_ros.illuminator.model import Mode
 from illuminator_ros.illuminator.simulated_properties import PROFILES
 from illuminator_ros.mavlink.dialect import mavlink, replaced
 from illuminator_ros.mavlink.messages import Address, CommandAck, CommandInt, CommandLong
-from illuminator_ros.payload.checks.requirement import CheckVerdict
 from illuminator_ros.payload.messages import GimbalDeviceAttitudeStatus as AttitudeStatus
-from illuminator_ros.payload.simulated import CommandReply, Effect
 from illuminator_ros.rededge.messages import Firmware
+from illuminator_ros.simulation.simulated import CommandReply, Effect
 import pytest
 from support.checks_run import ChecksRun, KINDS, run, start
 

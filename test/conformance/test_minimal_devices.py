@@ -20,13 +20,13 @@ from collections.abc import Callable, Sequence
 import math
 from typing import Any, TypeAlias
 
+from illuminator_ros.checks.requirement import CheckVerdict, PayloadChecks
 from illuminator_ros.gimbal.checks import device
 from illuminator_ros.gimbal.messages import GimbalDeviceSetAttitude
 from illuminator_ros.illuminator.checks import requirements as illuminator
 from illuminator_ros.illuminator.messages import IlluminatorStatus
 from illuminator_ros.mavlink.dialect import replaced
 from illuminator_ros.mavlink.messages import Address, Message
-from illuminator_ros.payload.checks.requirement import CheckVerdict, PayloadChecks
 from illuminator_ros.rededge import checks as rededge
 from illuminator_ros.rededge.messages import DigicamControl
 import pytest

@@ -18,11 +18,11 @@ import dataclasses
 import json
 from xml.etree import ElementTree
 
+from illuminator_ros.checks import report as reports
+from illuminator_ros.checks.report import lines, RunReport, unreached
+from illuminator_ros.checks.requirement import CheckVerdict
 from illuminator_ros.illuminator.checks.requirements import REQUIREMENTS
 from illuminator_ros.mavlink.messages import Address
-from illuminator_ros.payload.checks import report as reports
-from illuminator_ros.payload.checks.report import lines, RunReport, unreached
-from illuminator_ros.payload.checks.requirement import CheckVerdict
 import pytest
 from support.checks_run import ChecksRun, run, start
 

@@ -18,6 +18,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any
 
+from illuminator_ros.checks.requirement import CheckVerdict, Requirement
 from illuminator_ros.gimbal.manager_setpoint import Setpoint
 from illuminator_ros.illuminator.checks.requirements import REQUIREMENTS
 from illuminator_ros.illuminator.checks.session import LightSession
@@ -25,7 +26,6 @@ from illuminator_ros.illuminator.model import Configuration, Mode
 from illuminator_ros.illuminator.simulated_properties import FAULTS
 from illuminator_ros.mavlink.dialect import mavlink
 from illuminator_ros.mavlink.messages import Address, CommandLong
-from illuminator_ros.payload.checks.requirement import CheckVerdict, Requirement
 import pytest
 from support.checks_run import ChecksRun, start
 

@@ -17,6 +17,8 @@
 from collections.abc import Sequence
 import tracemalloc
 
+from illuminator_ros.checks.record import MAX_ENTRIES
+from illuminator_ros.checks.session import Conditions
 from illuminator_ros.gimbal import messages as gimbal
 from illuminator_ros.gimbal.checks import manager
 from illuminator_ros.illuminator.checks.requirements import CHECKS
@@ -27,8 +29,6 @@ from illuminator_ros.illuminator.simulated_properties import (
     IlluminatorProperties,
 )
 from illuminator_ros.mavlink.messages import Address, CommandAck, heartbeat
-from illuminator_ros.payload.checks.record import MAX_ENTRIES
-from illuminator_ros.payload.checks.session import Conditions
 from illuminator_ros.payload.messages import GimbalDeviceAttitudeStatus as AttitudeStatus
 from illuminator_ros.rededge.simulated import RedEdgeProperties
 import pytest

@@ -22,6 +22,8 @@ import re
 import shlex
 from typing import Any
 
+from illuminator_ros.checks.report import as_json, RunReport
+from illuminator_ros.checks.requirement import CheckResult, CheckVerdict, Requirement
 from illuminator_ros.cli.conformance.run import parse
 from illuminator_ros.cli.discover import run as discover
 from illuminator_ros.cli.discover.port import Port
@@ -33,8 +35,6 @@ from illuminator_ros.illuminator.checks.requirements import REQUIREMENTS
 from illuminator_ros.illuminator.simulated import SIMULATED
 from illuminator_ros.illuminator.thermal import ThermalProperties
 from illuminator_ros.mavlink.url import parse_url
-from illuminator_ros.payload.checks.report import as_json, RunReport
-from illuminator_ros.payload.checks.requirement import CheckResult, CheckVerdict, Requirement
 from illuminator_ros.rededge.checks import REQUIREMENTS as CAMERA_REQUIREMENTS
 from payloads.winch import WINCH
 import pytest

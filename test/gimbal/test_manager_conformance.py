@@ -18,11 +18,11 @@ from __future__ import annotations
 
 from typing import Any
 
+from illuminator_ros.checks.requirement import CheckVerdict
 from illuminator_ros.gimbal.axes import Range
 from illuminator_ros.gimbal.checks import manager
 from illuminator_ros.gimbal.manager_control import ControlSettings, Role
 from illuminator_ros.payload.arbitration import Policy
-from illuminator_ros.payload.checks.requirement import CheckVerdict
 import pytest
 from support.checks_run import ChecksRun
 from support.gimbal_manager import OURS

@@ -24,7 +24,7 @@ from typing import Any
 
 from illuminator_ros.gimbal.simulated_device import GimbalProperties, SimulatedGimbal
 from illuminator_ros.mavlink.messages import Address, Message
-from illuminator_ros.payload.simulated import SimulatedComponents
+from illuminator_ros.simulation.simulated import SimulatedComponents
 import pytest
 
 pytest.importorskip('rclpy')

@@ -35,7 +35,7 @@ from illuminator_ros.mavlink.messages import Address
 from illuminator_ros.payload.confirmed_command import Result
 from illuminator_ros.payload.mount_attitude import to_mavlink, YawFrame
 from illuminator_ros.payload.rotation import Quaternion, Vector
-from illuminator_ros.payload.simulated import SimulatedComponents
+from illuminator_ros.simulation.simulated import SimulatedComponents
 import pytest
 from support.gimbal_vehicle import Autopilot, HERE, managed_vehicle, Vehicle
 from support.live_link import EndpointLink

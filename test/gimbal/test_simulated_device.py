@@ -27,7 +27,7 @@ from illuminator_ros.mavlink.messages import Address, CommandAck, CommandLong, M
 from illuminator_ros.payload.messages import GimbalDeviceAttitudeStatus
 from illuminator_ros.payload.mount_attitude import YawFrame
 from illuminator_ros.payload.rotation import Quaternion
-from illuminator_ros.payload.simulated import SimulatedComponents
+from illuminator_ros.simulation.simulated import SimulatedComponents
 import pytest
 
 NAN = math.nan

@@ -30,7 +30,7 @@ from illuminator_ros.payload.messages import (
 )
 from illuminator_ros.payload.mount_attitude import YawFrame
 from illuminator_ros.payload.rotation import Quaternion
-from illuminator_ros.payload.simulated import SimulatedComponents
+from illuminator_ros.simulation.simulated import SimulatedComponents
 import pytest
 
 NAN = math.nan

@@ -19,8 +19,8 @@ from typing import Any
 from illuminator_ros.illuminator.simulated_properties import FAULTS, IlluminatorBehaviour
 from illuminator_ros.mavlink.dialect import mavlink
 from illuminator_ros.mavlink.messages import CommandAck, Heartbeat
-from illuminator_ros.payload.faults import FaultError
-from illuminator_ros.payload.simulated import MAX_DELAYED
+from illuminator_ros.simulation.faults import FaultError
+from illuminator_ros.simulation.simulated import MAX_DELAYED
 import pytest
 from support.light_bench import LightBench
 

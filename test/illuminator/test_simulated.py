@@ -23,7 +23,7 @@ from illuminator_ros.illuminator.simulated_properties import IlluminatorProperti
 from illuminator_ros.illuminator.thermal import ThermalProperties
 from illuminator_ros.mavlink import messages as mav
 from illuminator_ros.mavlink.dialect import encode, mavlink
-from illuminator_ros.payload.simulated import SimulatedComponents
+from illuminator_ros.simulation.simulated import SimulatedComponents
 import pytest
 from support.light_bench import GROUND, LightBench
 

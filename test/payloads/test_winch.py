@@ -33,7 +33,7 @@ from illuminator_ros.mavlink.messages import (
     Message,
 )
 from illuminator_ros.payload.confirmed_command import Result
-from illuminator_ros.payload.simulated import SimulatedComponents
+from illuminator_ros.simulation.simulated import SimulatedComponents
 from payloads.winch import WINCH, WinchClient, WinchReport
 import pytest
 

@@ -21,7 +21,7 @@ from illuminator_ros.cli import conformance
 from illuminator_ros.illuminator.simulated import SimulatedIlluminator
 from illuminator_ros.illuminator.simulated_properties import IlluminatorProperties
 from illuminator_ros.mavlink.messages import Address
-from illuminator_ros.payload.simulated import SimulatedComponents
+from illuminator_ros.simulation.simulated import SimulatedComponents
 from payloads.winch import CHECKS, SIMULATED, SimulatedWinch, WINCH
 import pytest
 from support.checks_run import ChecksRun

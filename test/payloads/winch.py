@@ -25,23 +25,23 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import partial
 
+from illuminator_ros.checks.component_requirements import with_common
+from illuminator_ros.checks.requirement import PayloadChecks, requirement
+from illuminator_ros.checks.session import Session, Transaction
+from illuminator_ros.checks.specifications import MESSAGES
 from illuminator_ros.mavlink.command_sender import CommandSender
 from illuminator_ros.mavlink.component import Payload
 from illuminator_ros.mavlink.dialect import mavlink
 from illuminator_ros.mavlink.messages import Address, AnyCommand, Heartbeat, Message
-from illuminator_ros.payload import simulated
-from illuminator_ros.payload.checks.component_requirements import with_common
-from illuminator_ros.payload.checks.requirement import PayloadChecks, requirement
-from illuminator_ros.payload.checks.session import Session, Transaction
-from illuminator_ros.payload.checks.specifications import MESSAGES
 from illuminator_ros.payload.confirmed_command import Done, Result, Target
 from illuminator_ros.payload.device_property import answer, Caller, Desired, Property
 from illuminator_ros.payload.discovery import Discovery
-from illuminator_ros.payload.faults import Behaviour
 from illuminator_ros.payload.listeners import Listeners
 from illuminator_ros.payload.liveness import Liveness
 from illuminator_ros.payload.payload_type import PayloadType
 from illuminator_ros.payload.plain_change import PlainChange
+from illuminator_ros.simulation import simulated
+from illuminator_ros.simulation.faults import Behaviour
 
 WINCH = PayloadType('winch', ros='payloads.winch_ros:WINCH', simulated='payloads.winch:SIMULATED',
                     checks='payloads.winch:CHECKS', view='payloads.winch_ros:VIEW')

@@ -27,7 +27,6 @@ from illuminator_ros.mavlink.component import Component
 from illuminator_ros.mavlink.messages import Address
 from illuminator_ros.payload.messages import GeoPoint
 from illuminator_ros.payload.rotation import enu_flu, flip, Quaternion
-from illuminator_ros.payload.simulated import SimulatedComponents
 from illuminator_ros.rededge.client import RedEdgeClient
 from illuminator_ros.rededge.conversions import interpolate, Position
 from illuminator_ros.rededge.input_states import (
@@ -38,6 +37,7 @@ from illuminator_ros.rededge.input_states import (
     UNKNOWN,
 )
 from illuminator_ros.rededge.simulated import COLUMNS, RedEdgeProperties, SimulatedRedEdge
+from illuminator_ros.simulation.simulated import SimulatedComponents
 import pytest
 from support.virtual_link import START, VirtualLink
 

@@ -24,7 +24,6 @@ from illuminator_ros.mavlink.dialect import mavlink
 from illuminator_ros.mavlink.messages import Address, CommandLong, Heartbeat, heartbeat, Message
 from illuminator_ros.payload.messages import Attitude, GeoPoint, GlobalPositionInt, SystemTime
 from illuminator_ros.payload.rotation import Vector
-from illuminator_ros.payload.simulated import SimulatedComponents
 from illuminator_ros.rededge.messages import (
     CameraFeedback,
     CameraStatus,
@@ -43,6 +42,7 @@ from illuminator_ros.rededge.simulated import (
     SimulatedRedEdge,
     Source,
 )
+from illuminator_ros.simulation.simulated import SimulatedComponents
 import pytest
 
 HOST = Address(7, 191)

@@ -26,7 +26,7 @@ from illuminator_ros.illuminator.simulated import SIMULATED, SimulatedIlluminato
 from illuminator_ros.illuminator.simulated_properties import IlluminatorProperties
 from illuminator_ros.illuminator.thermal import ThermalProperties
 from illuminator_ros.mavlink.messages import Address
-from illuminator_ros.payload.simulated import SimulatedDevice, SimulatedType
+from illuminator_ros.simulation.simulated import SimulatedDevice, SimulatedType
 import pytest
 
 TYPES = [SIMULATED]

@@ -21,8 +21,8 @@ from illuminator_ros.illuminator.simulated import SimulatedIlluminator
 from illuminator_ros.illuminator.simulated_properties import FAULTS, IlluminatorProperties
 from illuminator_ros.mavlink.dialect import mavlink
 from illuminator_ros.mavlink.messages import Address
-from illuminator_ros.payload.faults import Behaviour
-from illuminator_ros.payload.simulated import SimulatedComponents
+from illuminator_ros.simulation.faults import Behaviour
+from illuminator_ros.simulation.simulated import SimulatedComponents
 import pytest
 
 

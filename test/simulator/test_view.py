@@ -28,7 +28,7 @@ from illuminator_ros.illuminator.simulated_properties import (
     IlluminatorProperties,
 )
 from illuminator_ros.mavlink.messages import Address
-from illuminator_ros.payload.simulated import SimulatedComponent
+from illuminator_ros.simulation.simulated import SimulatedComponent
 import pytest
 
 Light = SimulatedComponent[SimulatedIlluminator]

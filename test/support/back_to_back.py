@@ -31,7 +31,7 @@ from illuminator_ros.mavlink.frame import Decoder
 from illuminator_ros.mavlink.statistics import Traffic
 from illuminator_ros.payload.confirmed_command import Result
 from illuminator_ros.payload.device_events import DeviceFound
-from illuminator_ros.payload.simulated import SimulatedComponent, SimulatedComponents
+from illuminator_ros.simulation.simulated import SimulatedComponent, SimulatedComponents
 from support.client import Client
 from support.faulty_wire import Faults, FaultyWire
 from support.frames import Codec

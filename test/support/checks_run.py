@@ -21,21 +21,21 @@ import contextlib
 from dataclasses import replace
 from typing import Any
 
-from illuminator_ros.cli.conformance.run import LISTEN_TIME
-from illuminator_ros.cli.payloads import PAYLOADS
-from illuminator_ros.mavlink.component import Endpoint
-from illuminator_ros.mavlink.dialect import mavlink
-from illuminator_ros.mavlink.messages import Address, CommandLong
-from illuminator_ros.payload.checks.coroutines import Interrupted
-from illuminator_ros.payload.checks.requirement import (
+from illuminator_ros.checks.coroutines import Interrupted
+from illuminator_ros.checks.requirement import (
     CheckResult,
     CheckVerdict,
     PayloadChecks,
     Requirement,
 )
-from illuminator_ros.payload.checks.runner import absence, CheckRunner
-from illuminator_ros.payload.checks.session import Conditions, Session
-from illuminator_ros.payload.simulated import Properties, SimulatedComponents
+from illuminator_ros.checks.runner import absence, CheckRunner
+from illuminator_ros.checks.session import Conditions, Session
+from illuminator_ros.cli.conformance.run import LISTEN_TIME
+from illuminator_ros.cli.payloads import PAYLOADS
+from illuminator_ros.mavlink.component import Endpoint
+from illuminator_ros.mavlink.dialect import mavlink
+from illuminator_ros.mavlink.messages import Address, CommandLong
+from illuminator_ros.simulation.simulated import Properties, SimulatedComponents
 from support.virtual_link import START, VirtualLink
 
 OURS = Address(255, 190)

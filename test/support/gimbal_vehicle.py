@@ -27,7 +27,7 @@ from illuminator_ros.mavlink.component import Component, Endpoint, HeartbeatTime
 from illuminator_ros.mavlink.dialect import mavlink
 from illuminator_ros.mavlink.messages import Address, CommandAck, Message
 from illuminator_ros.payload.messages import Attitude, GlobalPositionInt
-from illuminator_ros.payload.simulated import SimulatedComponents
+from illuminator_ros.simulation.simulated import SimulatedComponents
 from support.gimbal_manager import AUTOPILOT, DEVICE, OURS
 
 HERE = 47.0, 8.0, 500.0

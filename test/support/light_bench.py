@@ -25,7 +25,7 @@ from illuminator_ros.illuminator.simulated_properties import (
     IlluminatorProperties,
 )
 from illuminator_ros.mavlink.messages import Address, CommandInt, CommandLong
-from illuminator_ros.payload.simulated import SimulatedComponent
+from illuminator_ros.simulation.simulated import SimulatedComponent
 
 GROUND = Address(255, 190)
 

@@ -32,7 +32,7 @@ from illuminator_ros.illuminator.simulated_properties import (
 from illuminator_ros.illuminator.thermal import ThermalProperties
 from illuminator_ros.mavlink.dialect import mavlink
 from illuminator_ros.mavlink.messages import Address, CommandAck
-from illuminator_ros.payload.simulated import Effect, SimulatedComponent
+from illuminator_ros.simulation.simulated import Effect, SimulatedComponent
 from support.back_to_back import Pair
 from support.faulty_wire import Faults
 from support.records import Answer

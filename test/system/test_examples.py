@@ -30,9 +30,9 @@ from illuminator_ros.gimbal.simulated_manager import ManagerProperties, Simulate
 from illuminator_ros.illuminator.simulated import SimulatedIlluminator
 from illuminator_ros.illuminator.simulated_properties import IlluminatorProperties
 from illuminator_ros.mavlink.messages import Address, Message
-from illuminator_ros.payload.simulated import SimulatedComponents, SimulatedDevice
 from illuminator_ros.rededge.messages import GpsRawInt
 from illuminator_ros.rededge.simulated import RedEdgeProperties, SimulatedRedEdge
+from illuminator_ros.simulation.simulated import SimulatedComponents, SimulatedDevice
 import pytest
 from sensor_msgs.msg import NavSatFix, NavSatStatus
 from std_msgs.msg import Bool, Header

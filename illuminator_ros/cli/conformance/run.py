@@ -36,6 +36,12 @@ from ..entry_point import print_output
 from ..options import add_mavlink_version, add_signing, address, mavlink_version, signing
 from ..payloads import DEFAULT_PAYLOAD, PAYLOADS
 from ..termination import ENDING
+from ...checks.components import names
+from ...checks.coroutines import Main
+from ...checks.report import as_json, as_junit, catalogue, lines, RunReport, unreached
+from ...checks.requirement import AnyChecks, CheckResult, CheckVerdict
+from ...checks.runner import absence, CheckRunner
+from ...checks.session import Conditions, Session
 from ...mavlink.link import Link
 from ...mavlink.link_state import LinkEvent, LinkSnapshot
 from ...mavlink.link_thread import LinkThreadError
@@ -43,14 +49,8 @@ from ...mavlink.messages import Address
 from ...mavlink.signing import Signing
 from ...mavlink.signing_files import TimestampStore
 from ...mavlink.url import parse_url, Url
-from ...payload.checks.components import names
-from ...payload.checks.coroutines import Main
-from ...payload.checks.report import as_json, as_junit, catalogue, lines, RunReport, unreached
-from ...payload.checks.requirement import AnyChecks, CheckResult, CheckVerdict
-from ...payload.checks.runner import absence, CheckRunner
-from ...payload.checks.session import Conditions, Session
 from ...payload.payload_type import PayloadType
-from ...payload.simulated_settings import integer, number
+from ...simulation.settings import integer, number
 
 # s to listen before the first command.
 LISTEN_TIME = 4.5

@@ -33,7 +33,7 @@ from ..arguments import invocation, option, Parser
 from ..entry_point import print_output
 from ...mavlink.link_thread import Waker
 from ...mavlink.url import HostPort, parse_url, SerialUrl, UdpUrl, Url
-from ...payload.simulated_settings import number
+from ...simulation.settings import number
 
 UDP_PORTS = 14540, 14550, 14590
 # s to listen. A heartbeat comes once a second; each rate of a serial port has a quarter of it.

@@ -25,8 +25,8 @@ from typing import Any
 
 from ..options import address
 from ...mavlink.messages import Address
-from ...payload.simulated import SimulatedDevice, SimulatedType
-from ...payload.simulated_settings import Setting, SettingValues
+from ...simulation.settings import Setting, SettingValues
+from ...simulation.simulated import SimulatedDevice, SimulatedType
 
 MAX_COMPONENTS = 200
 # MAX_COMPONENTS with all their settings need a tenth of it.

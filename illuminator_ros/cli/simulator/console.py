@@ -19,7 +19,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from typing import Any
 
-from ...payload.simulated import ConsoleCommand, SimulatedComponent, SimulatedDevice
+from ...simulation.simulated import ConsoleCommand, SimulatedComponent, SimulatedDevice
 
 AnySimulated = SimulatedComponent[SimulatedDevice]
 

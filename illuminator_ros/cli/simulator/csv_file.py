@@ -22,7 +22,7 @@ import csv
 import logging
 
 from .components import SettingError, Types
-from ...payload.simulated import SimulatedDevice
+from ...simulation.simulated import SimulatedDevice
 
 _log = logging.getLogger(__name__)
 

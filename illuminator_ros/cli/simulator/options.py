@@ -25,7 +25,7 @@ from ..arguments import invocation, option, Parser
 from ..options import add_mavlink_version, add_signing
 from ..payloads import DEFAULT_PAYLOAD, PAYLOADS
 from ...payload.payload_type import PayloadType
-from ...payload.simulated_settings import integer
+from ...simulation.settings import integer
 
 
 def payload_types(args: Iterable[str] | None, payloads: Mapping[str, PayloadType]) -> Types:

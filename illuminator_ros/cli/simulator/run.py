@@ -41,7 +41,7 @@ from ...mavlink.link import Link
 from ...mavlink.link_thread import LinkThreadError
 from ...mavlink.url import parse_url, Url
 from ...payload.payload_type import PayloadType
-from ...payload.simulated import SimulatedComponents, SimulatedDevice, Snapshot
+from ...simulation.simulated import SimulatedComponents, SimulatedDevice, Snapshot
 
 # s between updates of the view.
 VIEW_INTERVAL = 0.2

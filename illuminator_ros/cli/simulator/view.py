@@ -21,7 +21,7 @@ import contextlib
 import shutil
 from typing import TextIO
 
-from ...payload.simulated import Snapshot
+from ...simulation.simulated import Snapshot
 
 # Lines of a terminal that are left for the console.
 SPARE_LINES = 4

@@ -37,13 +37,13 @@ from .session import (
     TOLERANCE,
 )
 from ..axes import AT_LIMIT
+from ...checks.component_requirements import check_command_int, none_of, uptime
+from ...checks.outcomes import Failed, Skipped
+from ...checks.requirement import AnyRequirement, Requirement, requirement
+from ...checks.session import Transaction
+from ...checks.specifications import COMMAND, MESSAGES, Specification
 from ...mavlink.dialect import flag_names, mavlink, short_names
 from ...mavlink.messages import Message
-from ...payload.checks.component_requirements import check_command_int, none_of, uptime
-from ...payload.checks.outcomes import Failed, Skipped
-from ...payload.checks.requirement import AnyRequirement, Requirement, requirement
-from ...payload.checks.session import Transaction
-from ...payload.checks.specifications import COMMAND, MESSAGES, Specification
 from ...payload.messages import GimbalDeviceAttitudeStatus as AttitudeStatus
 from ...payload.mount_attitude import AXES
 from ...payload.rotation import Quaternion

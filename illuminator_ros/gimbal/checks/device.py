@@ -30,13 +30,13 @@ from .attitude import ignores, moves, reaches
 from .session import FORWARD, GIMBAL, GimbalSession, NAN, Pose, PROPOSAL, STEP, TOLERANCE
 from .. import messages as gimbal
 from ..axes import LEVEL
+from ...checks import component_requirements as component
+from ...checks.outcomes import Failed, Skipped
+from ...checks.requirement import Option, PayloadChecks, Requirement, requirement
+from ...checks.session import Conditions, Session
+from ...checks.specifications import MESSAGES, ROUTING
 from ...mavlink.dialect import mavlink
 from ...mavlink.messages import Address, CommandLong, heartbeat, Message, target_of
-from ...payload.checks import component_requirements as component
-from ...payload.checks.outcomes import Failed, Skipped
-from ...payload.checks.requirement import Option, PayloadChecks, Requirement, requirement
-from ...payload.checks.session import Conditions, Session
-from ...payload.checks.specifications import MESSAGES, ROUTING
 from ...payload.messages import GimbalDeviceAttitudeStatus as AttitudeStatus
 from ...payload.mount_attitude import UNSET_VECTOR, Wxyz
 from ...payload.rotation import Quaternion, Vector

@@ -40,13 +40,13 @@ from .session import (
 )
 from .. import messages as gimbal
 from ..messages import NO_COMPONENT, NON_MAVLINK_IDS
+from ...checks import component_requirements as component
+from ...checks.outcomes import fail_if, Failed, Skipped
+from ...checks.requirement import PayloadChecks, Requirement, requirement
+from ...checks.session import Conditions, Session, Transaction
+from ...checks.specifications import MESSAGES, ROUTING
 from ...mavlink.dialect import mavlink
 from ...mavlink.messages import Address, Message, time_boot_ms
-from ...payload.checks import component_requirements as component
-from ...payload.checks.outcomes import fail_if, Failed, Skipped
-from ...payload.checks.requirement import PayloadChecks, Requirement, requirement
-from ...payload.checks.session import Conditions, Session, Transaction
-from ...payload.checks.specifications import MESSAGES, ROUTING
 from ...payload.messages import Attitude, GlobalPositionInt
 from ...payload.messages import GimbalDeviceAttitudeStatus as AttitudeStatus
 from ...payload.mount_attitude import Wxyz

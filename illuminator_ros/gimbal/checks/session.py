@@ -24,12 +24,12 @@ from typing import ClassVar, NamedTuple, TypeVar
 
 from .. import messages as gimbal
 from ..axes import LEVEL, Range, read_ranges
+from ...checks.component_requirements import restore_interval
+from ...checks.outcomes import Failed, Skipped
+from ...checks.session import Conditions, Session
+from ...checks.specifications import Specification
 from ...mavlink.dialect import mavlink, short_names
 from ...mavlink.messages import Address, Message
-from ...payload.checks.component_requirements import restore_interval
-from ...payload.checks.outcomes import Failed, Skipped
-from ...payload.checks.session import Conditions, Session
-from ...payload.checks.specifications import Specification
 from ...payload.messages import GimbalDeviceAttitudeStatus as AttitudeStatus
 from ...payload.mount_attitude import (
     names_frame,

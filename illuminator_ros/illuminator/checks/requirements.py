@@ -33,12 +33,12 @@ from .session import (
 )
 from ..messages import IlluminatorStatus
 from ..model import Configuration, flag_names, float32, Mode, Status, StrobeRange
+from ...checks import component_requirements as component
+from ...checks.outcomes import fail_if, Failed, Skipped
+from ...checks.requirement import Option, PayloadChecks, Requirement, requirement
+from ...checks.specifications import COMMAND, MESSAGES, ROUTING, Specification
 from ...mavlink.dialect import mavlink
 from ...mavlink.messages import Address, ComponentInformationBasic
-from ...payload.checks import component_requirements as component
-from ...payload.checks.outcomes import fail_if, Failed, Skipped
-from ...payload.checks.requirement import Option, PayloadChecks, Requirement, requirement
-from ...payload.checks.specifications import COMMAND, MESSAGES, ROUTING, Specification
 
 ILLUMINATOR = Specification(
     'illuminator protocol', 'https://mavlink.io/en/services/illuminator.html')

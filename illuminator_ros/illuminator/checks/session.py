@@ -29,12 +29,12 @@ from ..model import (
     Status,
     unexpected_differences,
 )
+from ...checks.component_requirements import restore_interval
+from ...checks.outcomes import Failed, Skipped
+from ...checks.requirement import NOT_AGREED
+from ...checks.session import Conditions, Session, Transaction
 from ...mavlink.dialect import mavlink
 from ...mavlink.messages import ComponentInformationBasic, Message
-from ...payload.checks.component_requirements import restore_interval
-from ...payload.checks.outcomes import Failed, Skipped
-from ...payload.checks.requirement import NOT_AGREED
-from ...payload.checks.session import Conditions, Session, Transaction
 
 # %; the brightness of checks without consent, and the most at which the light may then be on.
 LOW = 10.0

@@ -24,7 +24,7 @@ from xml.etree import ElementTree
 
 from .requirement import AnyRequirement, CheckResult, CheckVerdict
 from .specifications import HEARTBEAT
-from ... import __version__
+from .. import __version__
 
 SHOWN_LINES = 12
 # Characters that XML 1.0 excludes ("Char"): control characters, surrogates, and two others.

@@ -27,12 +27,12 @@ from operator import itemgetter
 from typing import Any, ClassVar, Generic, NamedTuple, TypeVar
 
 from .faults import Behaviour, FaultInjector, FAULTS, FaultTable
-from .listeners import Listeners
-from .simulated_settings import integer, one_of, Setting, settings_of, SettingValues
+from .settings import integer, one_of, Setting, settings_of, SettingValues
 from ..mavlink import messages
 from ..mavlink.component import Endpoint
 from ..mavlink.dialect import mavlink
 from ..mavlink.messages import Address, AnyCommand, Message
+from ..payload.listeners import Listeners
 
 # s; the shortest interval of a stream, which also serves requests for shorter ones.
 SHORTEST_INTERVAL = 0.01

@@ -26,8 +26,8 @@ from .outcomes import fail_if, Failed, Skipped
 from .requirement import Requirement, requirement, T
 from .session import REJECTIONS, Session, Transaction
 from .specifications import COMMAND, HEARTBEAT, MESSAGES, ROUTING, SERIALIZATION, Specification
-from ...mavlink.dialect import mavlink, raw
-from ...mavlink.messages import Address, ComponentInformationBasic, Heartbeat, Message
+from ..mavlink.dialect import mavlink, raw
+from ..mavlink.messages import Address, ComponentInformationBasic, Heartbeat, Message
 
 # s
 HEARTBEAT_TIMEOUT = 5.0

@@ -28,7 +28,7 @@ import math
 import random
 from typing import Any, NamedTuple, TypeVar
 
-from .simulated_settings import integer, number, SettingValues
+from .settings import integer, number, SettingValues
 from ..mavlink import messages
 from ..mavlink.dialect import mavlink, short_names
 

@@ -20,7 +20,7 @@ from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field, fields
 from typing import Any, TypeVar
 
-from .messages import GeoPoint
+from ..payload.messages import GeoPoint
 
 # The values of settings by name, untyped: each is what its Setting.read returns.
 SettingValues = Mapping[str, Any]

@@ -29,12 +29,11 @@ from .components import Components
 from .coroutines import CoroutineRunner
 from .outcomes import DeviceLost, Failed, Skipped
 from .record import History, Record
-from ..identity import Identity
-from ...mavlink import messages
-from ...mavlink.component import Endpoint, HeartbeatTimer
-from ...mavlink.dialect import line_of, mavlink
-from ...mavlink.frame import Frame
-from ...mavlink.messages import (
+from ..mavlink import messages
+from ..mavlink.component import Endpoint, HeartbeatTimer
+from ..mavlink.dialect import line_of, mavlink
+from ..mavlink.frame import Frame
+from ..mavlink.messages import (
     Address,
     command_name,
     CommandAck,
@@ -43,6 +42,7 @@ from ...mavlink.messages import (
     Message,
     result_name,
 )
+from ..payload.identity import Identity
 
 M = TypeVar('M', bound=Message)
 

@@ -20,9 +20,9 @@ from collections import Counter, deque
 from collections.abc import Iterable
 from typing import cast, TypeVar
 
-from ...mavlink.dialect import base_size
-from ...mavlink.frame import Frame
-from ...mavlink.messages import Message
+from ..mavlink.dialect import base_size
+from ..mavlink.frame import Frame
+from ..mavlink.messages import Message
 
 T = TypeVar('T')
 M = TypeVar('M', bound=Message)
