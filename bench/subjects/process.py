@@ -76,7 +76,7 @@ def growth(bench: Bench) -> Row:
 PARTICIPANTS = 5
 # Limits for 16 lights and fewer: MB above a node with one service, threads, s.
 MEMORY, THREADS, DISCOVERY = 60.0, 20, 3.0
-# The longest ``~/enable`` of the last light, as a multiple of that of a single one.
+# The longest ``~/enable`` of the last light, as a multiple of the time of a single light.
 SLOWDOWN = {4: 1.4, 16: 2.5}
 
 

@@ -84,7 +84,7 @@ class DiagnosticsPublisher:
         self._lock = threading.Lock()
         # When each source is due, and the levels that were published last.
         self._sources: dict[DiagnosticsSource, tuple[float, list[bytes]]] = {}
-        # What the link's thread has taken and the executor's thread publishes.
+        # Snapshots that the link's thread has taken, for the executor's thread.
         self._taken: queue.SimpleQueue[_Taken] = queue.SimpleQueue()
         self._have_taken = node.create_guard_condition(self._publish_due)
 
