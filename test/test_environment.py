@@ -21,6 +21,7 @@ import subprocess
 import sys
 
 import pytest
+from support.fork_server import handle_signals_by_default
 
 ROOT = Path(__file__).parents[1]
 PYTHON = r"""#!/bin/sh
@@ -78,7 +79,7 @@ class Project:
         outcome = subprocess.run(
             [sys.executable, '-c', tool, *(arguments or ('demo',))], cwd=self.folder,
             env={**clean, 'PATH': path, **environment}, text=True, timeout=60,
-            stdout=subprocess.PIPE, stderr=subprocess.STDOUT)
+            stdout=subprocess.PIPE, stderr=subprocess.STDOUT, preexec_fn=handle_signals_by_default)
         return outcome.returncode, outcome.stdout
 
     def calls(self) -> str:
