@@ -206,10 +206,11 @@ A robot flies a survey. The node /rededge gives its position, attitude and gimba
 are ROS topics, to a simulated camera on a serial line. What the camera writes into its images is
 compared with the truth:"""
 NEXT = """
-Go on with these three, each in a terminal of its own:
+Go on with these, each in a terminal of its own, in this folder:
   {python} -m illuminator_ros.simulator   # a light on the screen; type "help"
   {python} -m illuminator_ros.bridge      # finds that light
   {python} -m illuminator_ros.monitor     # all devices, operated with keys
+  {python} -m illuminator_ros.discover    # finds the port of a device of yours
 """
 
 

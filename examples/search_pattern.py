@@ -18,10 +18,10 @@ import math
 import signal
 import sys
 import time
-from typing import Any
 
 from geometry_msgs.msg import Vector3, Vector3Stamped
 import rclpy
+from rclpy.client import Client
 from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, QoSProfile
 from rclpy.signals import SignalHandlerOptions
@@ -44,6 +44,9 @@ class Search(Node):
     def __init__(self) -> None:
         super().__init__('search_pattern')
         self.in_control, self.angles, self.is_stopped = False, Vector3Stamped(), False
+        self.enable = self.create_client(SetBool, f'{LIGHT}/enable')
+        self.take = self.create_client(Trigger, f'{GIMBAL}/take_control')
+        self.release = self.create_client(Trigger, f'{GIMBAL}/release_control')
         self.setpoint = self.create_publisher(Vector3Stamped, f'{GIMBAL}/cmd/angles', 10)
         self.brightness = self.create_publisher(Float32, f'{LIGHT}/cmd/brightness', 10)
         # Repeated, so that off_after_silence of the bridge ends the light with this program.
@@ -60,18 +63,21 @@ class Search(Node):
     def stop(self, *signal_and_frame: object) -> None:
         self.is_stopped = True
 
-    def call(self, type_: Any, name: str, **request: bool) -> None:
-        client = self.create_client(type_, name)
-        if not client.wait_for_service(10.0):
-            sys.exit(f'{name}: no such service')
+    def call(self, client: Client, request: object) -> str:
+        """Return why it failed, '' if it did not."""
         # The answer to the first call of a client may be lost.
         for _ in range(3):
-            answer = client.call_async(type_.Request(**request))
+            answer = client.call_async(request)
             rclpy.spin_until_future_complete(self, answer, timeout_sec=4.0)
             if result := answer.result():
                 break
-        if not result or not result.success:
-            sys.exit(f'{name} failed: {result.message if result else "no answer"}')
+        if result and result.success:
+            return ''
+        return f'{client.service_name} failed: {result.message if result else "no answer"}'
+
+    def demand(self, client: Client, request: object) -> None:
+        if reason := self.call(client, request):
+            sys.exit(reason)
 
     def spin_for(self, seconds: float) -> None:
         end = time.monotonic() + seconds
@@ -94,25 +100,35 @@ class Search(Node):
                 return
         sys.exit(f'the gimbal does not reach {down} degrees down, {left} left')
 
+    def run(self) -> None:
+        self.demand(self.take, Trigger.Request())
+        while not self.in_control:
+            rclpy.spin_once(self)
+        self.look(*PATTERN[0])
+        self.demand(self.enable, SetBool.Request(data=True))
+        for direction in PATTERN:
+            self.look(*direction)
+            self.spin_for(DWELL)
+
 
 def main() -> None:
     # By default Ctrl-C ends ROS, and the light could not be switched off any more.
     rclpy.init(signal_handler_options=SignalHandlerOptions.NO)
     search = Search()
+    for client in (search.enable, search.take):
+        if not client.wait_for_service(4.0):
+            sys.exit(f'{client.service_name}: no such service')
     for number in (signal.SIGINT, signal.SIGTERM):
         signal.signal(number, search.stop)
+    reasons = []
     try:
-        search.call(Trigger, f'{GIMBAL}/take_control')
-        while not search.in_control:
-            rclpy.spin_once(search)
-        search.look(*PATTERN[0])
-        search.call(SetBool, f'{LIGHT}/enable', data=True)
-        for direction in PATTERN:
-            search.look(*direction)
-            search.spin_for(DWELL)
+        search.run()
+    except SystemExit as end:
+        reasons.append(str(end.code or ''))
     finally:
-        search.call(SetBool, f'{LIGHT}/enable', data=False)
-        search.call(Trigger, f'{GIMBAL}/release_control')
+        reasons += [search.call(search.enable, SetBool.Request(data=False)),
+                    search.call(search.release, Trigger.Request())]
+    sys.exit('\n'.join(filter(None, reasons)) or None)
 
 
 if __name__ == '__main__':

@@ -78,6 +78,8 @@ def main() -> None:
     # By default Ctrl-C ends ROS, and the light could not be switched off any more.
     rclpy.init(signal_handler_options=SignalHandlerOptions.NO)
     light = Searchlight()
+    if not light.enable.wait_for_service(4.0):
+        sys.exit(f'{light.enable.service_name}: no such service')
     for number in (signal.SIGINT, signal.SIGTERM):
         signal.signal(number, light.stop)
     try:

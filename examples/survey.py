@@ -52,6 +52,13 @@ class Survey(Node):
         self.capture = self.create_client(Trigger, f'{CAMERA}/capture')
         self.create_subscription(NavSatFix, f'{CAMERA}/image/fix', self.take_image, 10)
         self.create_subscription(NavSatFix, FIX, self.take_fix, qos_profile_sensor_data)
+        self.create_timer(4.0, self.name_missing)
+
+    def name_missing(self) -> None:
+        if not self.capture.service_is_ready():
+            self.get_logger().warning(f'{self.capture.service_name}: no such service')
+        if not self.count_publishers(FIX):
+            self.get_logger().warning(f'{self.resolve_topic_name(FIX)}: no publisher')
 
     def take_fix(self, fix: NavSatFix) -> None:
         near = self.last is not None and distance(self.last, fix) < DISTANCE

@@ -87,6 +87,7 @@ class ControlArbiter:
         self.primary, self.secondary = (Arbiter(
             settings.policy, rank, lease=settings.lease, overruling=settings.overruling)
             for _ in Role)
+        self._policy = settings.policy
         self._arbiters = {Role.PRIMARY: self.primary, Role.SECONDARY: self.secondary}
         # The last heartbeat of each player in control, and its time.
         self._identities: dict[Address, tuple[tuple[int, int], float]] = {}
@@ -112,8 +113,11 @@ class ControlArbiter:
         if primary == secondary == source and not self._may_give(Role.SECONDARY, source, source):
             secondary = self.holder(Role.SECONDARY)
         wanted = {Role.PRIMARY: primary, Role.SECONDARY: secondary}
-        if not all(self._may_give(role, source, player) for role, player in wanted.items()):
-            raise ValueError(f'{source} may not change who is in control')
+        for role, player in wanted.items():
+            if not self._may_give(role, source, player):
+                raise ValueError(
+                    f'{source} may not change who is in control: {self.holder(role)} has '
+                    f'{role.value} control, and the policy is {self._policy.value}')
         return [change for role, player in wanted.items()
                 if (change := self._give(role, source, player, now))]
 

@@ -31,6 +31,8 @@ from .parameters import ParameterError
 _OF_RCLPY = frozenset({'use_sim_time', 'start_type_description_service'})
 # Characters of a name that are compared with the names of parameters.
 COMPARED = 100
+# With this name misspelt, a node would use its default link.
+_URL = 'connection_url'
 # Patterns for wildcards in a name of a parameter file (rcl_yaml_param_parser).
 _WILDCARDS = {'*': '/[^/]+', '**': '(/[^/]+)*'}
 
@@ -91,9 +93,10 @@ def ignored_parameters(
     :param restrictions: names of parameters that must not be ignored.
     :param of_further_node: returns the parameters of a node that is made later, given its name
         without namespace; None if no node may have that name.
-    :raises ParameterError: if a restriction is ignored, or a file cannot be read. A section may be
-        for the node of another process with the same file, if a section for one of our nodes by
-        its name has the same restrictions.
+    :raises ParameterError: if a restriction is ignored, a connection URL is misspelt or given for
+        a wrong one of our nodes, or a file cannot be read. A section may be for the node of
+        another process with the same file: if it has restrictions, a section for one of our nodes
+        by its name must have them, too; its connection URL is that of another link.
     """
     known = {node.get_fully_qualified_name(): frozenset(node.list_parameters([], 0).names)
              for node in nodes}
@@ -133,7 +136,7 @@ def ignored_parameters(
             if close == name:
                 owners = (node for node, names in known.items() if name in names)
                 reason = f'is given for {section.pattern}, but is a parameter of {next(owners)}'
-            if close in restrictions:
+            if close in restrictions or close == _URL:
                 raise ParameterError(f'{name} {reason}')
             if close or not is_shared:
                 warnings[f'parameter {name!r} is ignored: it {reason}'] = None

@@ -226,8 +226,9 @@ def test_noise_and_silence_have_their_likely_causes(tmp_path: Path) -> None:
     noise = iter(range(1 << 30))
     line = Line(tmp_path)
     report = line.listen(lambda: bytes(next(noise) * 89 & 0xFF for _ in range(50)))
-    assert report['trouble'].startswith(f'1000 bytes, no valid frame: another baud rate '
-                                        f'(as in "discover {line.device.path},9600")')
+    assert report['trouble'].startswith(
+        '1000 bytes, no valid frame: another baud rate (give one, as in "ros2 run illuminator_ros '
+        f'discover {line.device.path},9600")')
     assert Line(tmp_path).listen()['trouble'].startswith('nothing is received: check the power')
 
 

@@ -80,12 +80,15 @@ def test_parameter_file_and_help_have_each_parameter_with_its_unit(spec: Paramet
     assert re.search(rf'^    (# )?{spec.name}: .+{unit}', YAML, re.MULTILINE)
 
 
-def test_the_readme_has_the_executables() -> None:
+def test_the_readme_has_each_executable_which_is_also_a_module() -> None:
     package = ROOT / 'illuminator_ros'
     modules = {*(path.stem for path in package.glob('[!_]*.py')),
                *(path.parent.name for path in package.glob('*/__main__.py'))}
+    scripts = (ROOT / 'setup.py').read_text().partition("'console_scripts'")[2]
+    executables = {name for names in re.findall(r'for name in \((.*?)\)', scripts)
+                   for name in re.findall(r'\w+', names)}
 
-    assert {row[0].strip('`') for row in table(README, 'executable')} == modules
+    assert {row[0].strip('`') for row in table(README, 'executable')} == modules == executables
 
 
 @pytest.mark.parametrize('message', [CommandAck, IlluminatorStatus, ComponentInformationBasic],

@@ -194,7 +194,8 @@ def test_a_manager_stops_its_device_and_follows_no_player_any_more(
     assert len(sent) == 1 or {turning for _, turning in sent} == {STILL}
     assert set(results) == {mavlink.MAV_RESULT_TEMPORARILY_REJECTED}
     assert {one.reason for one in of(RequestRefused, rig.events[known:])} - {
-        f'{GUEST} may not change who is in control'} == {ENDING}
+        f'{GUEST} may not change who is in control: {PILOT} has primary control, and the policy '
+        'is hold'} == {ENDING}
 
 
 def test_ros_as_a_player_of_its_own_manager_turns_the_gimbal_no_more() -> None:

@@ -138,7 +138,9 @@ def test_both_roles_change_together(
     one.configure(*before, 0.0)
 
     if changes is None:
-        with pytest.raises(ValueError, match='may not change'):
+        with pytest.raises(ValueError, match=(
+                '255/10 may not change who is in control: 255/20 has secondary control, and the '
+                'policy is hold')):
             one.configure(PLAYER, params, 1.0)
     else:
         assert one.configure(PLAYER, params, 1.0) == changes

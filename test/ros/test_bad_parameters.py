@@ -74,7 +74,7 @@ NUMBER, INTEGER, STRING, BOOLEAN = (
     *(({wrong: 1}, f"{wrong} is unknown; did you mean '{right}'\\?") for wrong, right in [
         ('max_brightnes', 'max_brightness'), ('min_strobe_peroid', 'min_strobe_period'),
         ('of_after_silence', 'off_after_silence'), ('off_on_shut_down', 'off_on_shutdown'),
-        ('signing-mode', 'signing_mode')]),
+        ('signing-mode', 'signing_mode'), ('conection_url', 'connection_url')]),
 ])
 def test_invalid_parameter_is_refused_with_its_name_value_and_range(
     ros: Ros, given: dict[str, Any], reason: str,
@@ -145,6 +145,22 @@ def test_section_for_a_node_of_another_process_is_warned_about_if_another_restri
     assert 'the section starboard matches no node and is ignored' in warning
     with pytest.raises(ParameterError, match='where other would have no effect'):
         ignored_parameters(arguments, nodes, {'limit', 'other'})
+
+
+@pytest.mark.parametrize(('section', 'name', 'outcome'), [
+    ('illuminator', 'connection_url', ''),
+    ('illuminator', 'conection_url', 'end'), ('/**', 'conection_url', 'end'),
+    ('gimbal', 'connection_url', 'end'), ('camera', 'conection_url', 'warning'),
+    ('camera', 'connection_url', 'warning')])
+def test_url_ends_the_start_if_it_is_misspelt_or_for_a_wrong_node_of_this_process_only(
+    node: Callable[..., Node], tmp_path: Path, section: str, name: str, outcome: str,
+) -> None:
+    arguments = write(tmp_path, f'{section}: {{ros__parameters: {{{name}: "udpin://:14551"}}}}')
+    nodes = [node('illuminator', 'connection_url'), node('gimbal', 'rate')]
+
+    with pytest.raises(ParameterError, match=name) if outcome == 'end' else (
+            contextlib.nullcontext()):
+        assert bool(ignored_parameters(arguments, nodes, set())) is (outcome == 'warning')
 
 
 # The reason for which a limit ends the start, which is '' where it has an effect.

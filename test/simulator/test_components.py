@@ -159,6 +159,8 @@ def test_an_error_in_a_file_names_its_place_and_the_reason(content: object, reas
     *(([option, '3', '--light', '1/2'], f'{option} is for lights that neither')
       for option in ('--count', '--system-id', '--component-id')),
     (['--fault', '1/9:drop'], "there is no light '1/9'"),
+    (['--fault', '1/243:drop,1/244:lie'],
+     'commas separate the faults of one light: repeat --fault for another one'),
     (['--fault', 'nope'], "no fault 'nope'"),
     (['--thermal', 'throttle_until=90'], 'throttling thresholds are not in order'),
     (['--modes', 'a'], "--modes: 'a' is not one of internal_control, external_sync"),

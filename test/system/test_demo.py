@@ -34,7 +34,7 @@ sys.exit(run.main())
 """
 
 
-def test_demo_says_that_ros2_is_missing_and_ends_with_three_commands_that_run() -> None:
+def test_demo_says_that_ros2_is_missing_and_ends_with_four_commands_that_run() -> None:
     with own_domain() as domain:
         demo = Program(sys.executable, '-c', DEMO,
                        env={'PATH': '/usr/bin:/bin', 'ROS_DOMAIN_ID': str(domain)})
@@ -46,5 +46,6 @@ def test_demo_says_that_ros2_is_missing_and_ends_with_three_commands_that_run() 
 
     told, command = (demo.log.find(text) for text in ('ros2 is not installed here', '$ ros2 '))
     assert 0 < told < command
-    for line in demo.lines[-3:]:
+    assert demo.lines[-5].endswith('in this folder:\n')
+    for line in demo.lines[-4:]:
         assert Program(*shlex.split(line, comments=True), '--help').wait() == 0, line

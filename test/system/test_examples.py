@@ -36,7 +36,7 @@ from illuminator_ros.simulation.simulated import SimulatedComponents, SimulatedD
 import pytest
 from sensor_msgs.msg import NavSatFix, NavSatStatus
 from std_msgs.msg import Bool, Header
-from std_srvs.srv import Trigger
+from std_srvs.srv import SetBool, Trigger
 from support.live_link import EndpointLink
 from support.ports import free_port
 from support.processes import ended, Program, python, ROOT
@@ -141,6 +141,39 @@ def test_the_search_ends_with_the_light_off_and_says_why(
 
         assert (program.wait(), program.log) == outcome
         assert not light.enabled
+
+
+def test_the_search_releases_the_gimbal_of_a_light_that_refuses_to_go_off_and_says_why(
+        own_ros: Ros, tmp_path: Path) -> None:
+    port, light = free_port(), SimulatedIlluminator(IlluminatorProperties())
+    gimbal = SimulatedManager(ManagerProperties())
+    with (node(own_ros, 'bridge', port, payloads='[illuminator, gimbal]'),
+          served(port, light, gimbal) as link,
+          ended(example(own_ros, 'search_pattern', tmp_path, DWELL='60.0')) as program):
+        eventually(lambda: light.enabled)
+        link.ask(lambda now: light.behave(light.faults.add(light.behaviour, 'refuse'), now))
+        program.send(signal.SIGINT)
+
+        assert program.wait() == 1
+        assert program.log.startswith('/illuminator/enable failed: refused: MAV_RESULT_DENIED')
+        own_ros.subscribe(Bool, '/gimbal/in_control').wait_value(False)
+
+
+@pytest.mark.parametrize(('name', 'changes', 'text'), [
+    ('searchlight', {'LIGHT': "'/lamp'"}, '/lamp/enable: no such service'),
+    ('search_pattern', {'LIGHT, GIMBAL': "'/lamp', '/gimbal'"}, '/lamp/enable: no such service'),
+    ('search_pattern', {'LIGHT, GIMBAL': "'/illuminator', 'mount'"},
+     '/mount/take_control: no such service'),
+    ('survey', {'CAMERA, FIX': "'/camera', '/gps/fix'"}, '/camera/capture: no such service'),
+    ('survey', {'CAMERA, FIX': "'/camera', 'gps'"}, '/gps: no publisher')])
+def test_an_example_names_the_service_or_topic_that_does_not_exist(
+        own_ros: Ros, tmp_path: Path, name: str, changes: dict[str, str], text: str) -> None:
+    enabled = own_ros.node.create_service(
+        SetBool, '/illuminator/enable', lambda request, response: response)
+    with ended(example(own_ros, name, tmp_path, **changes)) as program:
+        program.wait_for(text)
+        assert name == 'survey' or (program.wait(), program.lines) == (1, [f'{text}\n'])
+    own_ros.node.destroy_service(enabled)
 
 
 class Camera(SimulatedRedEdge):

@@ -21,7 +21,6 @@ import contextlib
 from pathlib import Path
 import re
 import shlex
-import sys
 from typing import Any
 
 import pytest
@@ -29,7 +28,7 @@ from std_srvs.srv import Trigger
 from support.gimbal_vehicle import Autopilot
 from support.live_link import EndpointLink
 from support.ports import free_port
-from support.processes import ended, Program, python, ROOT
+from support.processes import ended, python, ROOT
 from support.ros import Ros
 from support.waiting import eventually
 
@@ -67,10 +66,8 @@ def device(folder: Path, name: str, *arguments: str) -> Iterator[None]:
 
 def node(ros: Ros, program: str, arguments: list[str]) -> Any:
     """Run a node with the arguments of the page."""
-    function = 'main' if program == 'bridge' else program
-    return ended(Program(
-        sys.executable, '-c', f'import sys; from illuminator_ros.cli.bridge import {function}; '
-        f'sys.exit({function}())', *arguments, env={'ROS_DOMAIN_ID': str(ros.domain)}))
+    return ended(python(f'illuminator_ros.{program}', *arguments,
+                        env={'ROS_DOMAIN_ID': str(ros.domain)}))
 
 
 @contextlib.contextmanager

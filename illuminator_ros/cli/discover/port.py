@@ -43,8 +43,8 @@ OTHER_USER = 'a program of another user, which root can see'
 SILENT = ('nothing is received: check the power of the device, ground, and the wire from its TX '
           'to the RX of this port, which may be swapped; PX4 on USB may send only after it has '
           'received MAVLink')
-NOISE = ('{} bytes, no valid frame: another baud rate (as in "discover {},9600"), a bad wire or '
-         'ground, or not MAVLink')
+NOISE = ('{} bytes, no valid frame: another baud rate (give one, as in "{} {},9600"), a bad wire '
+         'or ground, or not MAVLink')
 NOT_SENT_HERE = 'nothing is received: the device or a router must send to this port'
 NOT_MAVLINK = '{} bytes, no valid frame: it is not MAVLink'
 NOT_ASKED = ('nothing is received: a router or device may send only to a program that sends, '
@@ -195,7 +195,8 @@ class Port:
         """Return the likely reason why no frame was heard."""
         bytes_ = self._receiver.traffic.bytes_received
         if isinstance(self.url, SerialUrl):
-            return NOISE.format(bytes_, self.url.device) if bytes_ else SILENT
+            return NOISE.format(
+                bytes_, invocation('discover'), self.url.device) if bytes_ else SILENT
         if bytes_:
             return NOT_MAVLINK.format(bytes_)
         return NOT_ASKED if isinstance(self.url, UdpUrl) and self.url.remote else NOT_SENT_HERE

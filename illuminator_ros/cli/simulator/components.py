@@ -245,7 +245,9 @@ def _faults(
         found = [one for one in listed
                  if not colon or selected in (str(one.address), one.name)]
         if not found:
-            raise SettingError(f'--fault {text}: there is no {noun} {selected!r}')
+            hint = (f'; commas separate the faults of one {noun}: repeat --fault for another one'
+                    if ',' in selected else '')
+            raise SettingError(f'--fault {text}: there is no {noun} {selected!r}{hint}')
         kinds = list({one.kind.noun: one.kind for one in found}.values())
         for name in names.split(','):
             read = _read([('--fault', 'fault', name)], kinds)
