@@ -146,7 +146,7 @@ def loss(bench: Bench) -> Iterator[Row]:
                        at_most(several, 0, 'with no or several outcomes')])
 
 
-COUNTS = (1, 10, 100)
+COUNTS = (1, 4, 16)
 # Frames per second, half of them statuses; the same for any number of lights, so that only the
 # number differs.
 RATE = 800
@@ -202,7 +202,7 @@ def frames(lights: int) -> Iterator[bytes]:
 
 def lights(bench: Bench) -> Iterator[Row]:
     """
-    Measure the CPU time for a status with 1, 10 and 100 lights on one link.
+    Measure the CPU time for a status with 1, 4 and 16 lights on one link.
 
     The link runs without ROS and without sockets, and does everything except publishing. Time is
     simulated, so that the numbers of lights are compared in turn within milliseconds: on a shared

@@ -96,6 +96,8 @@ class Light:
         self._order = StatusOrder()
         self._changing = ChangingStates()
         self._measures_temperature = False
+        # The deadline, and the version of the commands that it is from.
+        self._due: tuple[int, float] | None = None
 
     # Reception
 
@@ -109,6 +111,7 @@ class Light:
 
     def announce(self, now: float) -> None:
         """Note that it has proved to be a light."""
+        self._due = None
         self._queries.announce(now, is_heard=self.connected)
 
     def take_status(self, status: Status, now: float) -> None:
@@ -238,7 +241,7 @@ class Light:
         Only ``limits``, ``off_after_silence`` and the time-out of ``sources`` may differ. The
         silence begins again if ``off_after_silence`` differs.
         """
-        before, self._settings = self._settings, settings
+        before, self._settings, self._due = self._settings, settings, None
         if settings.limits != before.limits:
             self._configuration.change_limits(settings.limits, now)
         if settings.off_after_silence != before.off_after_silence:
@@ -320,6 +323,7 @@ class Light:
 
     def refresh(self, now: float, done: Done) -> None:
         """Ask for identity and status again; ``done`` is called once with the result."""
+        self._due = None
         closed = self._commands.refusal
         if refusal := closed or self.unreachable(now):
             done(Result(False, refusal, superseded=bool(closed)), now)
@@ -328,6 +332,7 @@ class Light:
 
     def request_status(self, now: float) -> None:
         """Ask for a status, unless such a request is under way."""
+        self._due = None
         self._queries.request_status(now)
 
     def _take_request(self, caller: Caller, desired: DesiredState, now: float) -> bool:
@@ -459,6 +464,7 @@ class Light:
     def _update(self, now: float) -> None:
         """Send what is desired now, and answer the callers whose requests have ended."""
         switch, configuration = self._switch, self._configuration
+        self._due = None
         while True:
             for outcome in (*switch.take_outcomes(now), *configuration.take_outcomes(now)):
                 self._finish(outcome, now)
@@ -534,7 +540,14 @@ class Light:
         self._update(now)
 
     def next_deadline(self) -> float:
-        """Return when :meth:`poll` has something to do."""
+        """Return when :meth:`poll` has something to do, or earlier."""
+        version = self._commands.version
+        # Kept, since each turn of the link asks all lights.
+        if self._due is None or self._due[0] != version:
+            self._due = version, self._next_deadline()
+        return self._due[1]
+
+    def _next_deadline(self) -> float:
         due = self._queries.next_deadline(
             self.liveness.heard_at if self.connected else math.inf)
         if self._sources.are_ranked:

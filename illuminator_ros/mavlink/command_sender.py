@@ -279,6 +279,7 @@ class CommandSender:
     :ivar outgoing: messages to send, each with the address that sends it.
     :ivar unanswering: the targets whose last command got no acknowledgement, at most
         :data:`MAX_TARGETS`.
+    :ivar version: counts what has happened to commands, for those who keep a deadline of theirs.
     :ivar round_trips: the last round-trip time of each target, s, at most :data:`MAX_TARGETS`.
     :raises ValueError: if ``timeout`` or ``retries`` is out of its range.
     """
@@ -290,6 +291,7 @@ class CommandSender:
     counters: CommandCounters = field(default_factory=CommandCounters)
     unanswering: dict[Address, None] = field(default_factory=dict)
     round_trips: dict[Address, float] = field(default_factory=dict)
+    version: int = 0
     _may_send: Callable[[Command | Message], bool] | None = None
     _pending: dict[CommandKind, Transmission] = field(default_factory=dict)
     # For how long the process was stopped, and until when, s.
@@ -399,6 +401,7 @@ class CommandSender:
         """
         if not messages.target_of(ack).includes(self.address):
             return
+        self.version += 1
         self.unanswering.pop(source, None)
         for pending in self._pending.values():
             if pending.command.command == ack.command and pending.command.target == source:
@@ -493,6 +496,7 @@ class CommandSender:
         if self._pending.get(key) is not pending:
             return
         del self._pending[key]
+        self.version += 1
         if status is CommandStatus.NO_ANSWER:
             self.counters.unanswered += 1
             _keep(self.unanswering, pending.command.target, None)
