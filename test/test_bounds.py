@@ -202,6 +202,7 @@ def ros_requests(limit: int) -> object:
 
     class BusyLink(list[object]):
         call = list.append
+        is_running = Mock()
 
     link: Any = BusyLink()
     calls = LinkCalls(link, Mock(), limit)

@@ -23,7 +23,6 @@ import itertools
 import logging
 import math
 import queue
-import sys
 import threading
 import time
 from typing import NamedTuple
@@ -62,8 +61,8 @@ from ..payload.payload_type import PayloadType
 OFF_LIMIT = 0.6
 STOP_LIMIT = 0.15
 ACKNOWLEDGEMENT_LIMIT = 0.05
-# s for which the interpreter runs one of several busy threads, at the end.
-SWITCH_INTERVAL = 0.0005
+# Callbacks of the executor after that.
+LAST_SPINS = 20
 # s between checks of the diagnostics, and from an event to the check that it causes.
 TICK = 1.0
 CHECK_INTERVAL = 0.02
@@ -169,16 +168,15 @@ class Bridge:
         """Serve until :meth:`end` is called or the context is shut down."""
         try:
             self._start_link()
-            while not self._closed.is_set() and self.node.context.ok():
+            while not self._ended.is_set() and self.node.context.ok():
                 self._spin_once()
         finally:
             self.end()
         self._closed.wait(OFF_LIMIT + STOP_LIMIT)
-        # The executor sends some answers. It runs the newest task first, so await two tasks.
-        for _ in range(2):
-            task = self._executor.create_task(lambda: None)
-            while self.node.context.ok() and not task.done():
-                self._spin_once()
+        # The executor sends some answers, and refuses the requests that came meanwhile.
+        for _ in range(LAST_SPINS):
+            if self.node.context.ok():
+                self._spin_once(0.0)
         for payload in self._served:
             payload.payload.close()
         self._await_acknowledgements()
@@ -195,9 +193,9 @@ class Bridge:
                 publisher.wait_for_all_acked(
                     Duration(seconds=max(deadline - time.monotonic(), 0.0)))
 
-    def _spin_once(self) -> None:
+    def _spin_once(self, timeout: float | None = None) -> None:
         try:
-            self._executor.spin_once()
+            self._executor.spin_once(timeout)
         except ExternalShutdownException:
             pass
         except Exception as error:
@@ -214,14 +212,12 @@ class Bridge:
             if self._ended.is_set():
                 return
             self._ended.set()
-        # By default the link's thread waits for 5 ms after each OFF that it sends while the
-        # executor's thread is busy.
-        sys.setswitchinterval(SWITCH_INTERVAL)
+        # It stops, so that the link's thread does not wait for it.
+        self._executor.wake()
         if self.link.is_running():
             self._shut_down_devices()
         self.link.stop(STOP_LIMIT)
         self._closed.set()
-        self._executor.wake()
 
     def _start_link(self) -> None:
         while not self._ended.is_set():

@@ -22,6 +22,7 @@ import threading
 from typing import TypeVar
 
 from .throttled_log import NodeLog
+from ..mavlink.command_sender import CommandStatus
 from ..mavlink.link import Link
 
 T = TypeVar('T')
@@ -60,6 +61,9 @@ class LinkCalls:
         :param refusal: returns the answer for a reason why the request cannot be executed.
         :param kind: an OFF is of another kind than an ON, so that no number of these refuses it.
         """
+        if not self._link.is_running():
+            answer(refusal(CommandStatus.CLOSED.value))
+            return
         with self._lock:
             is_busy = self._waiting[kind] >= self._limit
             self._waiting[kind] += not is_busy

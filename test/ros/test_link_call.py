@@ -52,6 +52,17 @@ def test_requests_of_a_kind_beyond_the_limit_are_refused_and_each_is_answered_on
     assert answered[1:] == ['done'] * 3
 
 
+def test_request_after_the_end_of_the_link_is_refused() -> None:
+    answered: list[str] = []
+    # Any: a link whose thread has ended.
+    link: Any = Mock(is_running=lambda: False)
+
+    LinkCalls(link, Mock()).ask(
+        lambda now, answer: answer('done'), answered.append, 'refused: {}'.format)
+
+    assert answered == ['refused: the bridge is ending']
+
+
 def test_off_is_asked_however_many_requests_of_an_on_wait(ros: Ros) -> None:
     asked: list[bool] = []
     node = Node('switched', context=ros.context)
