@@ -18,7 +18,7 @@ help:
 	@echo 'make lint    run ruff, mypy and the linters of ROS'
 	@echo 'make fuzz    send hostile input to both sides of the link for SECONDS=60'
 	@echo 'make soak    run simulator and bridge with random faults for SECONDS=60'
-	@echo 'make bench   measure each target beside its peers, 7 minutes; options in BENCH'
+	@echo 'make bench   measure each target beside its peers, 13 minutes; options in BENCH'
 	@echo 'make pictures  draw the pictures of the documentation again, half a minute'
 	@echo 'make doc-tables  write the tables of the documentation that the code knows'
 	@echo 'make environment  install the packages that the tests need'
