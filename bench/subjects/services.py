@@ -220,4 +220,4 @@ def startup(bench: Bench) -> Iterator[Row]:
                     took[name].append((time.monotonic() - began) * 1e3)
     found = {name: quantiles(values) for name, values in took.items()}
     yield Row('start of the process until ~/enable answers', 'ms', found[OURS],
-              {NODE: found[NODE]}, [times(found[OURS], found[NODE], 1.6, 'p50')])
+              {NODE: found[NODE]}, [times(found[OURS], found[NODE], 1.5, 'p50')])
