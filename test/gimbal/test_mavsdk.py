@@ -39,19 +39,13 @@ from illuminator_ros.simulation.simulated import SimulatedComponents
 import pytest
 from support.gimbal_vehicle import Autopilot, HERE, managed_vehicle, Vehicle
 from support.live_link import EndpointLink
+from support.mavsdk_peer import DENIED, player, plugin, result
 from support.ports import free_port
 from support.waiting import eventually
-
-pytest.importorskip('mavsdk.mavsdk', reason='the wheel of mavsdk is not installed')
-
-from mavsdk import mavsdk  # noqa: E402, I100
-from mavsdk.plugins.gimbal import gimbal as plugin  # noqa: E402
 
 OURS, FIRST, SECOND, DEVICE = (
     Address(1, 193), Address(1, 195), Address(1, 196), Address(1, 154))
 GIMBAL = 1
-# MAVSDK's name of MAV_RESULT_DENIED.
-DENIED = 'ERROR'
 # s; MAVSDK uses the clock of the machine, which may pause between two heartbeats.
 LEASE = 60.0
 T = TypeVar('T')
@@ -63,28 +57,6 @@ def served(endpoint: Endpoint) -> Iterator[int]:
     port = free_port()
     with EndpointLink(f'udpin://127.0.0.1:{port}', endpoint):
         yield port
-
-
-@contextlib.contextmanager
-def player(address: Address, port: int) -> Iterator[Any]:
-    """Return the Gimbal plugin of a MAVSDK that has found the gimbal."""
-    sdk = mavsdk.Mavsdk(mavsdk.Configuration.create_manual(*address, 1))
-    try:
-        assert sdk.add_any_connection(f'udpout://127.0.0.1:{port}') == 0
-        eventually(sdk.get_systems)
-        gimbal = plugin.Gimbal(sdk.get_systems()[0])
-        eventually(lambda: gimbal.gimbal_list().gimbals)
-        yield gimbal
-    finally:
-        sdk.destroy()
-
-
-def result(call: Callable[..., Any], *arguments: Any) -> str:
-    """Return the name of the result of a call."""
-    try:
-        return str(plugin.GimbalResult(call(*arguments)).name)
-    except plugin.GimbalError as error:
-        return str(error.result.name)
 
 
 def points_to(device: SimulatedGimbal, pitch: float, yaw: float) -> Callable[[], bool]:

@@ -23,44 +23,18 @@ from pathlib import Path
 from typing import Any
 
 from illuminator_ros.mavlink.dialect import mavlink
+from illuminator_ros.mavlink.messages import Address
 import pytest
 from std_msgs.msg import Bool
+from support.mavsdk_peer import connected, DENIED, mavlink_direct, plugin, result
 from support.ports import free_port
 from support.processes import ended, python
 from support.ros import own_domain, Ros
 from support.waiting import eventually
 
-pytest.importorskip('mavsdk.mavsdk', reason='the wheel of mavsdk is not installed')
-
-from mavsdk import mavsdk  # noqa: E402, I100
-from mavsdk.plugins.gimbal import gimbal as plugin  # noqa: E402
-from mavsdk.plugins.mavlink_direct import mavlink_direct  # noqa: E402
-
 GIMBAL = 1
-# MAVSDK's name of MAV_RESULT_DENIED.
-DENIED = 'ERROR'
 FOLLOW, ONCE, PRIMARY = (
     plugin.GimbalMode.YAW_FOLLOW, plugin.SendMode.ONCE, plugin.ControlMode.PRIMARY)
-
-
-@contextlib.contextmanager
-def program(system: int, component: int, port: int) -> Iterator[Any]:
-    """Return a MAVSDK that has found a system at a UDP port."""
-    sdk = mavsdk.Mavsdk(mavsdk.Configuration.create_manual(system, component, True))
-    try:
-        assert sdk.add_any_connection(f'udpout://127.0.0.1:{port}') == 0
-        eventually(sdk.get_systems)
-        yield sdk
-    finally:
-        sdk.destroy()
-
-
-def result(call: Any, *arguments: Any) -> str:
-    """Return the name of the result of a call."""
-    try:
-        return str(plugin.GimbalResult(call(*arguments)).name)
-    except plugin.GimbalError as error:
-        return str(error.result.name)
 
 
 def listed(player: plugin.Gimbal) -> tuple[int, int]:
@@ -93,9 +67,9 @@ def test_two_programs_use_the_gimbal_on_a_serial_line_of_the_manager(tmp_path: P
     port, device = free_port(), tmp_path / 'gimbal'
     with (own_domain() as domain, simulator(device, 'gimbal'),
           forwarding(domain, device, port, 'payloads:=[gimbal_manager]', 'lease:=3.0'),
-          program(1, 195, port) as one):
+          connected(Address(1, 195), port) as one):
         first = plugin.Gimbal(one.get_systems()[0])
-        with program(1, 196, port) as two:
+        with connected(Address(1, 196), port) as two:
             second = plugin.Gimbal(two.get_systems()[0])
             for player in (first, second):
                 assert listed(player) == (154, 193)
@@ -113,7 +87,7 @@ def test_two_programs_use_the_gimbal_on_a_serial_line_of_the_manager(tmp_path: P
 def test_a_ground_station_and_ros_use_the_light_on_one_serial_line(tmp_path: Path) -> None:
     port, device = free_port(), tmp_path / 'light'
     with (own_domain() as domain, simulator(device, 'illuminator'),
-          forwarding(domain, device, port), program(255, 190, port) as sdk,
+          forwarding(domain, device, port), connected(Address(255, 190), port) as sdk,
           contextlib.closing(Ros(domain)) as ros):
         enabled = ros.subscribe(Bool, '/illuminator/enabled')
         light = mavlink_direct.MavlinkDirect(sdk.get_systems()[0])

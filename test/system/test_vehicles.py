@@ -23,25 +23,20 @@ import re
 import shlex
 from typing import Any
 
+from illuminator_ros.mavlink.messages import Address
 import pytest
 from std_srvs.srv import Trigger
 from support.gimbal_vehicle import Autopilot
 from support.live_link import EndpointLink
+from support.mavsdk_peer import DENIED, player, plugin, result
 from support.ports import free_port
 from support.processes import ended, python, ROOT
 from support.ros import Ros
 from support.waiting import eventually
 
-pytest.importorskip('mavsdk.mavsdk', reason='the wheel of mavsdk is not installed')
-
-from mavsdk import mavsdk  # noqa: E402, I100
-from mavsdk.plugins.gimbal import gimbal as plugin  # noqa: E402
-
 PAGE = (ROOT / 'doc' / 'vehicles.md').read_text()
 STATION = 'udpout://192.168.1.20:14550'
 GIMBAL = 1
-# MAVSDK's name of MAV_RESULT_DENIED.
-DENIED = 'ERROR'
 pytestmark = pytest.mark.timeout(180)
 
 
@@ -70,26 +65,9 @@ def node(ros: Ros, program: str, arguments: list[str]) -> Any:
                         env={'ROS_DOMAIN_ID': str(ros.domain)}))
 
 
-@contextlib.contextmanager
-def ground_station(port: int) -> Iterator[plugin.Gimbal]:
-    """Yield the gimbals of a ground station that listens on a port, as QGroundControl does."""
-    sdk = mavsdk.Mavsdk(mavsdk.Configuration.create_manual(255, 190, 1))
-    try:
-        assert sdk.add_any_connection(f'udpin://127.0.0.1:{port}') == 0
-        eventually(sdk.get_systems)
-        gimbals = plugin.Gimbal(sdk.get_systems()[0])
-        eventually(lambda: gimbals.gimbal_list().gimbals)
-        yield gimbals
-    finally:
-        sdk.destroy()
-
-
-def result(call: Any, *arguments: Any) -> str:
-    """Return the name of the result of a call."""
-    try:
-        return str(plugin.GimbalResult(call(*arguments)).name)
-    except plugin.GimbalError as error:
-        return str(error.result.name)
+def ground_station(port: int) -> contextlib.AbstractContextManager[Any]:
+    """Return the gimbals of a ground station that listens on a port, as QGroundControl does."""
+    return player(Address(255, 190), port, 'udpin')
 
 
 def call(ros: Ros, node: str, name: str) -> Trigger.Response:
