@@ -21,6 +21,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
 import itertools
+import math
 from pathlib import Path
 import re
 import sys
@@ -105,7 +106,8 @@ def tool_tables() -> Tables:
              '' if field.unknown is None else str(field.unknown)]
             for cls, fields in FIELDS.items() for name, field in fields.items()],
         ('links', 'tried again'): [
-            [one.subject, f'{one.first:g}', f'{one.longest:g}', f'{one.tries or ""}']
+            [one.subject, f'{one.first:g}', f'{one.longest:g}',
+             '' if one.tries == math.inf else f'{one.tries:g}']
             for one in POLICIES],
         ('ros', 'argument of `bridge.launch.xml`'): launch_arguments('bridge.launch.xml'),
         ('simulator', 'command'): [

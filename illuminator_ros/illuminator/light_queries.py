@@ -106,7 +106,7 @@ class MessageQuery:
         """Ask again for a message that does not come, or give up."""
         if now < self.message_until:
             return
-        if self._questions < (MESSAGE.tries or 1):
+        if self._questions < MESSAGE.tries:
             self._send(now)
         else:
             self.finish('acknowledged, but not sent', now)

@@ -286,7 +286,7 @@ class CommandSender:
 
     address: Address
     timeout: float = COMMAND.first
-    retries: int = (COMMAND.tries or 1) - 1
+    retries: int = int(COMMAND.tries) - 1
     outgoing: deque[tuple[Address, Message]] = field(default_factory=deque)
     counters: CommandCounters = field(default_factory=CommandCounters)
     unanswering: dict[Address, None] = field(default_factory=dict)

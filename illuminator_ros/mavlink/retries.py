@@ -28,13 +28,13 @@ class RetryPolicy(NamedTuple):
     :param subject: what is tried, for people.
     :param first: s from the first try to the second.
     :param longest: s; each wait is twice as long as the one before, up to this or ``first``.
-    :param tries: how often, None until it succeeds or ends for another reason.
+    :param tries: how often, infinity until it succeeds or ends for another reason.
     """
 
     subject: str
     first: float
     longest: float
-    tries: int | None = None
+    tries: float = math.inf
 
     def wait(self, tried: int) -> float:
         """Return how long to wait after so many tries, >= 1, s."""
@@ -69,7 +69,7 @@ class Retries:
     @property
     def is_spent(self) -> bool:
         """Whether no try is left."""
-        return self.policy.tries is not None and self.tried >= self.policy.tries
+        return self.tried >= self.policy.tries
 
     def stop(self) -> None:
         """Try no more: it has succeeded, or has failed for good."""

@@ -233,7 +233,7 @@ class ConfirmedCommand(Generic[S]):
             terms.insists or is_fenced or self._is_accepted)
         self._repeat_due = math.inf
         if is_repeated:
-            is_slow = terms.insists and tried >= (UNCONFIRMED.tries or 0)
+            is_slow = terms.insists and tried >= UNCONFIRMED.tries
             self._repeat_due = now + (STILL_UNCONFIRMED if is_slow else UNCONFIRMED).first
             if is_fenced:
                 self._repeat_due = min(self._repeat_due, terms.fence)

@@ -37,7 +37,7 @@ class _Request(NamedTuple):
 
     @property
     def until(self) -> float:
-        return self.since + (PING.tries or 1) * PING.first
+        return self.since + PING.tries * PING.first
 
 
 class Pings:

@@ -34,7 +34,7 @@ RATE = 0.2
 OTHER = Address(1, 1)
 
 # s for which the zero is repeated.
-LIMIT = (ZERO_RATE.tries or 0) * ZERO_RATE.first
+LIMIT = ZERO_RATE.tries * ZERO_RATE.first
 
 
 class Turning(ManagerRig):
@@ -132,7 +132,7 @@ def test_a_device_that_goes_on_turning_is_reported_once_the_time_is_over(
 
     assert rig.results == [False]
     sent = len(rig.zeros)
-    assert sent >= (ZERO_RATE.tries or 0) - 1
+    assert sent >= ZERO_RATE.tries - 1
     rig.pass_time(0.5)
     assert len(rig.zeros) == sent
 
