@@ -198,6 +198,9 @@ class MonitorApp(App[None], inherit_bindings=False):
 
     def poll(self) -> None:
         """Take new values, and draw them."""
+        if not self.query('#head'):
+            # Its parts are being removed at the end.
+            return
         self._graph.poll()
         if isinstance(self._mode, Question) and self._graph.clock() > self._mode.deadline:
             self._mode = NORMAL
