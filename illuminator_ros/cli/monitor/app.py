@@ -198,8 +198,8 @@ class MonitorApp(App[None], inherit_bindings=False):
 
     def poll(self) -> None:
         """Take new values, and draw them."""
-        if not self.query('#head'):
-            # Its parts are being removed at the end.
+        if not self._table.is_attached:
+            # The screen is being removed at the end.
             return
         self._graph.poll()
         if isinstance(self._mode, Question) and self._graph.clock() > self._mode.deadline:
