@@ -31,7 +31,7 @@ from .frame import Frame
 from .link_state import LinkInput, LinkSnapshot, LinkState, LinkStatus
 from .link_thread import FaultLog
 from .messages import Address
-from .receiver import ReceivedFrame, Receiver
+from .receiver import Receiver
 from .retries import RESOURCE
 from .transport import Channel, Peer
 from .url import Url
@@ -49,7 +49,13 @@ _frame_log = logging.getLogger('illuminator_ros')
 
 
 class LineUser(ABC):
-    """The user of a line, which the line calls in the thread that waits with the selector."""
+    """
+    The user of a line, which the line calls in the thread that waits with the selector.
+
+    :ivar is_behind: whether it has not taken all received frames yet: no more must be read.
+    """
+
+    is_behind = False
 
     @abstractmethod
     def opened(self, now: float) -> None:
@@ -67,18 +73,13 @@ class LineUser(ABC):
     def silent(self, line: Line, now: float) -> None:
         """Note that no peer is heard over an open line; repeated."""
 
-    @property
-    @abstractmethod
-    def is_behind(self) -> bool:
-        """Whether it has not taken all received frames yet: no more must be read."""
-
     @abstractmethod
     def behind(self, line: Line, peer: Peer, now: float) -> None:
         """Note that the signing clock of a sender that is not a peer is behind."""
 
     @abstractmethod
     def receive(
-        self, line: Line, peer: Peer, frames: Sequence[ReceivedFrame], now: float,
+        self, line: Line, peer: Peer, frames: Sequence[Frame], now: float,
     ) -> None:
         """Take accepted frames of a peer, of which all may be of messages that only count."""
 
@@ -298,7 +299,7 @@ class Line:
             self._lost(error)
 
     def _handle(
-        self, channel: Channel, peer: Peer, frames: list[ReceivedFrame], now: float,
+        self, channel: Channel, peer: Peer, frames: list[Frame], now: float,
     ) -> None:
         """Take accepted frames of a peer, of which all may be of messages that are not handled."""
         if self.status.state is not LinkState.OPEN:

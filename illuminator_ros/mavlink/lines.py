@@ -16,6 +16,7 @@
 
 from __future__ import annotations
 
+from collections import deque
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 import logging
 import math
@@ -25,13 +26,13 @@ from .component import Endpoint
 from .dialect import decode, line_of
 from .duplicate_filter import DuplicateFilter
 from .forwarded_commands import ForwardedCommands
-from .frame import MAX_ID_V1
+from .frame import Frame, MAX_ID_V1
 from .frame_writer import FrameWriter
 from .line import ANNOUNCE_INTERVAL, Line, LineUser, SILENCE
 from .link_state import LinkSnapshot
-from .link_thread import FaultLog, TurnQueue
+from .link_thread import FaultLog
 from .messages import Address
-from .receiver import ReceivedFrame, Receiver
+from .receiver import Receiver
 from .routing_table import grouped, Router
 from .sender import Sender
 from .signing import Signing
@@ -74,9 +75,10 @@ class Lines(LineUser):
         self._classes = {cls.id: cls for cls in endpoint.messages}
         self._faults = faults
         self._clock = clock
-        # Messages, of one read, and their lines.
-        self._received: TurnQueue[tuple[Line, ReceivedFrame]] = TurnQueue(
-            self._take_received, call_first, is_turn_over)
+        self._call_first = call_first
+        self._is_turn_over = is_turn_over
+        # Frames of messages that were received, and their lines.
+        self._received: deque[tuple[Line, Frame]] = deque()
         self._version = mavlink_version
         self._duplicates = DuplicateFilter() if len(urls) > 1 else None
         self.forwarded_commands = ForwardedCommands()
@@ -168,7 +170,7 @@ class Lines(LineUser):
 
     def lost(self, heard: Sequence[Address], reason: str, now: float) -> None:
         """See :meth:`LineUser.lost`."""
-        self._received.keep(lambda one: one[0].is_open)
+        self._received = deque(one for one in self._received if one[0].is_open)
         if not any(line.is_open for line in self._lines):
             self._heard_at = -math.inf
             self._sender.clear()
@@ -206,40 +208,45 @@ class Lines(LineUser):
         line.write([*self._sender.heartbeats.values()], [peer], now)
 
     def receive(
-        self, line: Line, peer: Peer, frames: Sequence[ReceivedFrame], now: float,
+        self, line: Line, peer: Peer, frames: Sequence[Frame], now: float,
     ) -> None:
         """See :meth:`LineUser.receive`."""
         self._heard_at = now
         if self._duplicates is not None:
             self._faults.call(self._forward, line, peer, frames, now)
-        self._received.add(
-            ((line, one) for one in frames if one[0].message_id in self._classes), now)
+        self._received += [(line, one) for one in frames if one.message_id in self._classes]
+        if not self.is_behind:
+            self._take_received(now)
 
-    @property
-    def is_behind(self) -> bool:
-        """See :meth:`LineUser.is_behind`."""
-        return self._received.is_behind
+    def _take_received(self, now: float) -> None:
+        """Take received messages while the turn of the thread lasts, others in its next turn."""
+        self.is_behind = False
+        while self._received:
+            if self._is_turn_over():
+                self.is_behind = True
+                self._call_first(self._take_received)
+                return
+            self._take_frame(self._received.popleft()[1], now)
 
-    def _take_received(self, received: tuple[Line, ReceivedFrame], now: float) -> None:
-        frame, sender = received[1]
+    def _take_frame(self, frame: Frame, now: float) -> None:
         cls = self._classes[frame.message_id]
         if self._endpoint.inspect is not None:
             self._faults.call(self._endpoint.inspect, frame, cls)
-        message = decode(cls, frame.payload, sender)
+        message = decode(cls, frame.payload)
         if _frame_log.isEnabledFor(logging.DEBUG):
             _frame_log.debug('received from %s: %s', frame.source, line_of(message),
                              extra={'address': frame.source})
         self._faults.call(self._endpoint.receive, frame.source, message, now)
 
     def _forward(
-        self, line: Line, peer: Peer, frames: Sequence[ReceivedFrame], now: float,
+        self, line: Line, peer: Peer, frames: Sequence[Frame], now: float,
     ) -> None:
         # A neighbour that sends from another port than it listens on is one neighbour.
         peers = [other.others(peer, now) if other is line else other.peers(now)
                  for other in self._lines]
         if not any(peers):
             return
-        known = (frame for frame, _ in frames if frame.version <= self._version)
+        known = (frame for frame in frames if frame.version <= self._version)
         for towards, some in grouped(
                 (self._router.targets(frame, peers, now), frame) for frame in known):
             for other, receivers in zip(self._lines, towards, strict=False):

@@ -127,7 +127,8 @@ class Link:
         if self.clock() >= due:
             self._poll()
             due = self._next_deadline()
-        self._thread.pause(self.lines.pause(now))
+        if seconds := self.lines.pause(now):
+            self._thread.pause(seconds)
         return due
 
     def _next_deadline(self) -> float:
