@@ -141,7 +141,7 @@ class Light:
         switch, configuration, states = self._switch, self._configuration, self._changing
         switched_at, was_changing = switch.changes.sent_at, states.are_changing
         states.take(status, now, is_commanded=(
-            switch.changes.is_busy or configuration.changes.is_busy
+            switch.changes.command is not None or configuration.changes.command is not None
             or now <= max(switched_at, configuration.changes.sent_at) + IMPLIED_TIME))
         if states.are_changing and not was_changing:
             self._emit(events.StatesChanging(self.address, True))
@@ -171,7 +171,7 @@ class Light:
             self._emit(DeviceDisconnected(self.address, reason))
             message = self.unreachable(now)
             self._switch.cancel(message, now)
-            self._configuration.lost(message, now)
+            self._configuration.cancel(message, now, superseded=False)
             self._update(now)
 
     def link_opened(self, now: float) -> None:
@@ -420,7 +420,7 @@ class Light:
         """Forget what would switch the light on, if it was requested before a silence."""
         if now >= self._switch.silence.ends_at:
             self._sources.forget_on(
-                brightness_is_switch=self._configuration.brightness_is_switch)
+                brightness_is_switch=bool(self._configuration.brightness_is_switch))
 
     def _take_holder(self, change: HolderChanged[str] | None, now: float) -> None:
         """Take a change of the source that holds the light."""
@@ -466,9 +466,15 @@ class Light:
         switch, configuration = self._switch, self._configuration
         self._due = None
         while True:
-            for outcome in (*switch.take_outcomes(now), *configuration.take_outcomes(now)):
+            while switch.changes.outcomes:
+                outcome = switch.changes.outcomes.popleft()
+                switch.take(outcome, now)
                 self._finish(outcome, now)
-            if not self.connected:
+            while configuration.changes.outcomes:
+                outcome = configuration.changes.outcomes.popleft()
+                configuration.take(outcome, now)
+                self._finish(outcome, now)
+            if not self.liveness.connected:
                 return
             # First the configuration, so that an ON finds it.
             configuration.update(now, is_off_pending=switch.is_off_pending)
@@ -505,7 +511,7 @@ class Light:
         refusal = self._commands.refusal
         self._sources = LightSources(None)
         self._switch.close(refusal, now)
-        self._configuration.close(refusal, now)
+        self._configuration.cancel(refusal, now)
         self._queries.close(refusal, now)
         self._update(now)
 

@@ -117,6 +117,12 @@ class StrobeRange:
         low, high = self.min_strobe_period, self.max_strobe_period
         return 0 <= low <= high <= MAX_STROBE_PERIOD and high > 0
 
+    def nearest(self, period: float) -> float:
+        """Return the possible period, s, that is nearest to another one; 0 remains 0."""
+        if not (period and self.known):
+            return period
+        return min(max(period, shortest(self.min_strobe_period)), shortest(self.max_strobe_period))
+
 
 class InvalidValue(ValueError):
     """A value that the light must not get; the message names it and says why."""

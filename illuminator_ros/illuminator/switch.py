@@ -16,7 +16,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from dataclasses import dataclass
 import math
 
@@ -63,7 +63,7 @@ class Switch:
     :ivar enabled: as reported, None if unknown; while heat keeps the light off, as before, since
         it may light up once it has cooled down.
     :ivar silence: of all who may request something.
-    :ivar changes: the property of the light; :meth:`take_outcomes` returns its outcomes.
+    :ivar changes: the property of the light; :meth:`take` takes its outcomes.
     """
 
     def __init__(
@@ -200,14 +200,16 @@ class Switch:
         self._take_enabled(status)
         origin = (events.LATE_EFFECT if self._is_late(now) else
                   events.A_REQUEST if may_be_ours else events.OTHER_SENDER)
-        if self.enabled is False and not self.changes.is_busy:
+        is_busy = self.changes.command is not None
+        if self.enabled is False and not is_busy:
             self._required = None
-        elif self.enabled and is_told and not (self.changes.is_busy or was_off_by_heat) and (
+        elif self.enabled and is_told and not (is_busy or was_off_by_heat) and (
                 before is None or not before and origin == events.OTHER_SENDER):
             # Another sender has switched it on, or it was on when it was found.
             self.silence.requested_at = now
         self.changes.reported(status, now)
-        if not (self.changes.outcomes or self.changes.is_busy):
+        if self.enabled is not self._told and not (
+                self.changes.outcomes or self.changes.command is not None):
             shows_switch = not (status.is_dimmed or status.mode is Mode.EXTERNAL_SYNC)
             self._tell(origin if is_told and shows_switch and self._told is not None else '')
 
@@ -236,29 +238,26 @@ class Switch:
         self._tell('')
         self.changes.restarted(status, now)
 
-    def take_outcomes(self, now: float) -> Iterator[Outcome[Status]]:
-        """Return what has ended."""
-        while self.changes.outcomes:
-            outcome = self.changes.outcomes.popleft()
-            desired, result, on = outcome.desired, outcome.result, outcome.desired.change == ON
-            under_way = self.changes.desired
-            if self._asked and not (under_way and under_way.equals(self._asked)):
-                self._asked = None
-            if result.success:
-                self.enabled = on
-                self._required = None
-                self._is_finally_off = not on
-                self._off_due = now + UNCONFIRMED.first if not on else -math.inf
-                detail = next((one.detail for one in outcome.callers if one.detail), '')
-                self._tell(detail or desired.reason or events.A_REQUEST)
-                if self._report is not None and not on:
-                    self._report(result, now)
-            elif on and self._is_off_by_heat:
-                # It may light up once it has cooled down.
-                self.enabled = None
-            elif self._is_late(now):
-                self._tell(events.LATE_EFFECT)
-            yield outcome
+    def take(self, outcome: Outcome[Status], now: float) -> None:
+        """Take the end of a value."""
+        desired, result, on = outcome.desired, outcome.result, outcome.desired.change == ON
+        under_way = self.changes.desired
+        if self._asked and not (under_way and under_way.equals(self._asked)):
+            self._asked = None
+        if result.success:
+            self.enabled = on
+            self._required = None
+            self._is_finally_off = not on
+            self._off_due = now + UNCONFIRMED.first if not on else -math.inf
+            detail = next((one.detail for one in outcome.callers if one.detail), '')
+            self._tell(detail or desired.reason or events.A_REQUEST)
+            if self._report is not None and not on:
+                self._report(result, now)
+        elif on and self._is_off_by_heat:
+            # It may light up once it has cooled down.
+            self.enabled = None
+        elif self._is_late(now):
+            self._tell(events.LATE_EFFECT)
 
     # Time
 

@@ -51,9 +51,9 @@ class Lines(LineUser):
     All lines are equal. With one line nothing is forwarded, between its peers neither.
 
     :param urls: of each line, by its label.
-    :param call: calls a function in the thread of the link, given the time, s; ``call_first`` does
-        so before others that wait.
-    :param is_turn_over: returns whether no more messages must be taken in this turn of the thread.
+    :param call: calls a function in the thread of the link, given the time, s.
+    :param defer: if no more messages must be taken in this turn of the thread, has a function
+        called in the next turn before others that wait; returns whether it does.
     :param mavlink_version: 1 or 2, of the frames that are sent; both are received.
     :param wall_clock: s, Unix time, for the signing time stamps.
     :ivar forwarded_commands: the commands of others that were forwarded lately.
@@ -63,7 +63,7 @@ class Lines(LineUser):
     def __init__(
         self, urls: Sequence[tuple[str, Url]], endpoint: Endpoint, *, faults: FaultLog,
         selector: selectors.BaseSelector, call: Callable[[Callable[[float], None]], None],
-        call_first: Callable[[Callable[[float], None]], None], is_turn_over: Callable[[], bool],
+        defer: Callable[[Callable[[float], None]], bool],
         signing: Signing, mavlink_version: int, clock: Callable[[], float],
         wall_clock: Callable[[], float],
     ) -> None:
@@ -75,8 +75,7 @@ class Lines(LineUser):
         self._classes = {cls.id: cls for cls in endpoint.messages}
         self._faults = faults
         self._clock = clock
-        self._call_first = call_first
-        self._is_turn_over = is_turn_over
+        self._defer = defer
         # Frames of messages that were received, and their lines.
         self._received: deque[tuple[Line, Frame]] = deque()
         self._version = mavlink_version
@@ -222,9 +221,8 @@ class Lines(LineUser):
         """Take received messages while the turn of the thread lasts, others in its next turn."""
         self.is_behind = False
         while self._received:
-            if self._is_turn_over():
+            if self._defer(self._take_received):
                 self.is_behind = True
-                self._call_first(self._take_received)
                 return
             self._take_frame(self._received.popleft()[1], now)
 

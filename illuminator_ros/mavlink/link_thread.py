@@ -275,9 +275,16 @@ class LinkThread:
         if seconds >= 0.001 and not self._calls:
             self._waker.wait(seconds)
 
-    def is_turn_over(self) -> bool:
-        """Return whether this turn must begin no more messages and calls."""
-        return self._clock() >= self._turn_ends
+    def defer(self, function: Callable[[float], None]) -> bool:
+        """
+        Have ``function(now)`` called first in the next turn, if this turn is over.
+
+        :return: whether it is.
+        """
+        is_over = self._clock() >= self._turn_ends
+        if is_over:
+            self.call_first(function)
+        return is_over
 
     def run_once(self) -> None:
         """Wait once, and handle everything that is ready or due."""
