@@ -35,7 +35,6 @@ from ..mavlink.messages import (
     ComponentInformationBasic,
     Heartbeat,
     Message,
-    target_of,
 )
 from ..payload.confirmed_command import Done, Result
 from ..payload.discovery import Discovery
@@ -143,8 +142,7 @@ class IlluminatorClient(Payload):
                 light.heard(now)
             elif isinstance(message, CommandAck):
                 # An answer announces it: a heartbeat alone proves nothing.
-                if target_of(message).includes(self._commands.address):
-                    self.discovery.prove(source, now)
+                self.discovery.prove(source, now)
             elif isinstance(message, ComponentInformationBasic):
                 self.discovery.prove(source, now)
                 light.take_identity(Identity.from_message(message), now)

@@ -112,7 +112,7 @@ class Light:
     def announce(self, now: float) -> None:
         """Note that it has proved to be a light."""
         self._due = None
-        self._queries.announce(now, is_heard=self.connected)
+        self._queries.announce(now, is_heard=self.liveness.connected)
 
     def take_status(self, status: Status, now: float) -> None:
         """Take an ILLUMINATOR_STATUS, unless it is older than the one before."""
@@ -213,7 +213,7 @@ class Light:
     @property
     def _temperature(self) -> float | None:
         """Return the temperature, degC; None where it is not measured, or the sensor fails."""
-        status = self.status
+        status = self._order.newest
         if (status is None or not self._measures_temperature
                 or status.error_flags & mavlink.ILLUMINATOR_ERROR_FLAGS_THERMISTOR_FAILURE):
             return None
@@ -221,7 +221,7 @@ class Light:
 
     def unreachable(self, now: float) -> str:
         """Return why requests cannot reach the light, for people; '' if they can."""
-        return '' if self.connected else self.liveness.loss(f'light {self.address}', now)
+        return '' if self.liveness.connected else self.liveness.loss(f'light {self.address}', now)
 
     def snapshot(self, now: float) -> events.LightSnapshot:
         """Return the state, for any thread."""
@@ -455,7 +455,7 @@ class Light:
             self._switch.ask(False, now, caller)
         if desired.brightness is not None:
             self._configuration.set_brightness(desired.brightness)
-            self._configuration.update(now, is_off_pending=self._switch.is_off_pending)
+            self._configuration.update(now, is_off_pending=self._switch.is_pending(OFF))
         if desired.enabled:
             self._switch.ask(True, now, caller)
 
@@ -477,7 +477,7 @@ class Light:
             if not self.liveness.connected:
                 return
             # First the configuration, so that an ON finds it.
-            configuration.update(now, is_off_pending=switch.is_off_pending)
+            configuration.update(now, is_off_pending=switch.is_pending(OFF))
             if configuration.brightness_is_switch and switch.is_off_due(now):
                 self._prepare_off(now)
             switch.update(now)
@@ -539,7 +539,7 @@ class Light:
         if now >= self._changing.until:
             self._changing = ChangingStates()
             self._emit(events.StatesChanging(self.address, False))
-        self._queries.poll(now, self.liveness.heard_at if self.connected else math.inf)
+        self._queries.poll(now, self.liveness.heard_at if self.liveness.connected else math.inf)
         self._take_holder(self._sources.poll(now), now)
         self._switch.changes.poll(now)
         self._configuration.changes.poll(now)
@@ -555,10 +555,10 @@ class Light:
 
     def _next_deadline(self) -> float:
         due = self._queries.next_deadline(
-            self.liveness.heard_at if self.connected else math.inf)
+            self.liveness.heard_at if self.liveness.connected else math.inf)
         if self._sources.are_ranked:
             due = min(due, self._sources.next_deadline())
-        if self.connected:
+        if self.liveness.connected:
             due = min(due, self._switch.next_deadline(), self._configuration.next_deadline(),
                       self._changing.until, self.liveness.silent_at)
         return due

@@ -129,18 +129,15 @@ class ChangingStates:
 
     Several lights with one address cause that, or another controller.
 
-    :ivar until: the time until which the state counts as changing; infinity while it does not.
+    :ivar are_changing: whether the state goes back and forth.
+    :ivar until: the time until which it counts as changing; infinity while it does not.
     """
 
     def __init__(self) -> None:
+        self.are_changing = False
         self.until = math.inf
         self._states: deque[Status] = deque(maxlen=MAX_STATES)
         self._returns: deque[float] = deque(maxlen=MAX_RETURNS)
-
-    @property
-    def are_changing(self) -> bool:
-        """Whether the state goes back and forth."""
-        return self.until < math.inf
 
     def take(self, status: Status, now: float, *, is_commanded: bool) -> None:
         """
@@ -164,4 +161,4 @@ class ChangingStates:
             self._returns.append(now)
             if self.are_changing or (
                     len(self._returns) == MAX_RETURNS and now <= self._returns[0] + CALM_TIME):
-                self.until = now + CALM_TIME
+                self.are_changing, self.until = True, now + CALM_TIME

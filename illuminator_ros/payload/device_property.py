@@ -259,15 +259,6 @@ class Property(Generic[S]):
 
     # Known facts
 
-    @property
-    def is_busy(self) -> bool:
-        """Whether a command is under way."""
-        return self.command is not None
-
-    def is_pending(self, change: Change[S]) -> bool:
-        """Return whether a change is under way."""
-        return self.desired is not None and self.desired.change == change
-
     def expects(self, status: S) -> bool:
         """Return whether a status shows the change that is under way."""
         return self.desired is not None and self.desired.change.shown_by(status) is True

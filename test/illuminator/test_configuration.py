@@ -148,7 +148,7 @@ def test_a_light_that_reports_the_period_of_its_sync_signal_gets_one_within_its_
                     'max_strobe_period': 2.0}
     pair = Pair(fake).settle()
     assert pair.configure(brightness=40.0).success
-    assert sent(pair)[-1][:3] == (2, 40, pytest.approx(sent_period))
+    assert sent(pair)[-1][:3] == pytest.approx((2, 40, sent_period))
 
 
 def test_before_the_first_status_only_a_complete_set_is_sent() -> None:
