@@ -122,8 +122,7 @@ class Light:
             return
         # Lights that do not measure send 0 (ArduSub), and a sensor rarely reads exactly 0.
         self._measures_temperature |= bool(status.temperature)
-        if self._sources.are_ranked:
-            self._forget_silenced(now)
+        self._forget_silenced(now)
         if order is Order.RESTARTED:
             self._restarted(status, now)
         else:
@@ -418,7 +417,7 @@ class Light:
 
     def _forget_silenced(self, now: float) -> None:
         """Forget what would switch the light on, if it was requested before a silence."""
-        if now >= self._switch.silence.ends_at:
+        if self._sources.are_ranked and now >= self._switch.silence.ends_at:
             self._sources.forget_on(
                 brightness_is_switch=bool(self._configuration.brightness_is_switch))
 

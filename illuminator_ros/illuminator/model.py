@@ -309,8 +309,11 @@ class Status:
     def from_message(cls, message: IlluminatorStatus) -> Status:
         """Read a message. Any content is accepted: an invalid field is marked, not raised."""
         enabled, mode = _ENABLED.get(message.enable), _MODES.get(message.mode)
-        invalid = [f'{name} {getattr(message, name)}'
-                   for name, value in (('mode', mode), ('enable', enabled)) if value is None]
+        invalid = []
+        if mode is None:
+            invalid.append(f'mode {message.mode}')
+        if enabled is None:
+            invalid.append(f'enable {message.enable}')
         numbers: list[float | None] = []
         for name, (low, high) in _RANGES.items():
             number: float = getattr(message, name)

@@ -152,13 +152,11 @@ class ChangingStates:
             self._states.clear()
         if self._states and status.shows_the_state_of(self._states[-1]):
             return
-        known = next((one for one in self._states if status.shows_the_state_of(one)), None)
-        if known is None:
-            self._states.append(status)
-        else:
-            self._states.remove(known)
-            self._states.append(status)
+        known = [*filter(status.shows_the_state_of, self._states)]
+        if known:
+            self._states.remove(known[0])
             self._returns.append(now)
             if self.are_changing or (
                     len(self._returns) == MAX_RETURNS and now <= self._returns[0] + CALM_TIME):
                 self.are_changing, self.until = True, now + CALM_TIME
+        self._states.append(status)

@@ -207,13 +207,13 @@ class Switch:
             # Another sender has switched it on, or it was on when it was found.
             self.silence.requested_at = now
         self.changes.reported(status, now)
-        if not (self.changes.outcomes or self.changes.command is not None):
+        if origin and not (self.changes.outcomes or self.changes.command is not None):
             shows_switch = not (status.is_dimmed or status.mode is Mode.EXTERNAL_SYNC)
             self._tell(origin if is_told and shows_switch and self._told is not None else '')
 
     def _take_enabled(self, status: Status) -> None:
-        self._is_off_by_heat = status.is_off_by_heat or (
-            self._is_off_by_heat and not status.enabled)
+        self._is_off_by_heat = not status.enabled and (
+            self._is_off_by_heat or status.is_off_by_heat)
         if not self._is_off_by_heat:
             self.enabled = status.enabled
 
