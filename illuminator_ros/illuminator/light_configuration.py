@@ -40,7 +40,6 @@ from .model import (
     StrobeRange,
     unexpected_differences,
 )
-from ..mavlink.messages import Address
 from ..mavlink.retries import REQUIRED, Retries
 from ..payload.confirmed_command import Change, Result, Target
 from ..payload.device_property import Caller, Desired, Outcome, Property
@@ -302,28 +301,23 @@ class LightConfiguration:
             self._limits.check('brightness', brightness)
         except InvalidValue as error:
             brightness = self._limits.max_brightness
-            self._emit(events.SetpointClipped(self._address, str(error)))
+            self._emit(events.SetpointClipped(self.exceeded.key, str(error)))
         self._setpoint = brightness
 
     def require(self, values: Changes, now: float) -> None:
         """
-        Send overrides as soon as the light has reported its configuration.
+        Send overrides, and what is required already, once the light has reported its values.
 
-        :param values: by name, checked, except against the range that the light reports.
+        :param values: by name, checked, except against the range that the light reports; none if
+            the light is heard again.
         """
-        self._required = self._required.merged(values, Reason.OVERRIDE, self._first_due(now))
-
-    def _first_due(self, now: float) -> float:
-        return now if self.agreed else now + FIRST_STATUS_TIMEOUT
-
-    def found(self, now: float) -> None:
-        """Note that the light is heard again: required values are due."""
-        self._required.retries = Retries(REQUIRED, self._first_due(now))
+        due = now if self.agreed else now + FIRST_STATUS_TIMEOUT
+        self._required = self._required.merged(values, Reason.OVERRIDE, due)
 
     def cancel(self, message: str, now: float, *, superseded: bool = True) -> None:
         """End all requests; required values stay."""
         if self._setpoint is not None and not superseded:
-            self._emit(events.SetpointFailed(self._address, message))
+            self._emit(events.SetpointFailed(self.exceeded.key, message))
         self._setpoint = None
         self.changes.cancel(message, now, superseded=superseded)
 
@@ -348,10 +342,6 @@ class LightConfiguration:
             self._keep_limits(status.configuration(self.agreed or NOTHING), now)
 
     # Known facts
-
-    @property
-    def _address(self) -> Address:
-        return self.exceeded.key
 
     @property
     def strobe_range(self) -> StrobeRange:
@@ -483,7 +473,7 @@ class LightConfiguration:
         names = [name for name in FIELDS
                  if old is None or getattr(old, name) != getattr(configuration, name)]
         if names:
-            self._emit(events.ConfigurationChanged(self._address, configuration, names, cause))
+            self._emit(events.ConfigurationChanged(self.exceeded.key, configuration, names, cause))
 
     def _keep_limits(self, reported: Configuration, now: float) -> None:
         """Bring a light that exceeds a limit back within it."""
@@ -492,7 +482,7 @@ class LightConfiguration:
             self.exceeded.is_again if self.exceeded.excess
             else now < self._limited_at + LIMIT_INTERVAL)
         exceeded = events.LimitExceeded(
-            self._address, excess, self._limits.impossible(self.strobe_range), is_again)
+            self.exceeded.key, excess, self._limits.impossible(self.strobe_range), is_again)
         if exceeded != self.exceeded:
             self.exceeded = exceeded
             self._emit(exceeded)
@@ -520,7 +510,7 @@ class LightConfiguration:
         if desired.reason == _REQUIRED and not result.superseded:
             self._required_ended(result, now)
         elif desired.reason == _SETPOINT and not (result.success or result.superseded):
-            self._emit(events.SetpointFailed(self._address, result.message))
+            self._emit(events.SetpointFailed(self.exceeded.key, result.message))
 
     def _accepted(self, goal: Configuration, status: Status | None) -> None:
         """
@@ -554,7 +544,7 @@ class LightConfiguration:
             required.failure = result.message
 
     def _restored(self, success: bool, message: str, *, is_final: bool = True) -> None:
-        self._emit(events.ConfigurationRestored(self._address, success, message, is_final))
+        self._emit(events.ConfigurationRestored(self.exceeded.key, success, message, is_final))
 
     # Time
 

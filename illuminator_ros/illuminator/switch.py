@@ -160,7 +160,7 @@ class Switch:
         self.cancel(message, now, superseded=True)
 
     def switch_off_finally(self, now: float, report: Done) -> None:
-        """Switch the light off whenever it may be on; see :meth:`.light.Light.close`."""
+        """See :meth:`.light_control.LightControl.switch_off_finally`."""
         self._report, self._is_finally_off = report, False
         report(Result(False, 'sent, not confirmed' if now < self.changes.fence else ''), now)
 

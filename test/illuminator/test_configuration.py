@@ -20,7 +20,7 @@ from dataclasses import astuple, replace
 from typing import Any
 
 from illuminator_ros.illuminator.events import ChangeCause
-from illuminator_ros.illuminator.light import LightSettings
+from illuminator_ros.illuminator.light_control import LightSettings
 from illuminator_ros.illuminator.model import Configuration, float32, Mode, SafetyLimits
 from illuminator_ros.mavlink.dialect import mavlink
 from illuminator_ros.mavlink.messages import CommandAck, result_name
@@ -71,7 +71,7 @@ def test_a_confirmed_set_is_one_event_before_its_answer(pair: Pair) -> None:
     def done(result: Result, now: float) -> None:
         answers.append((result.message, pair.recorder.changes[-1]))
 
-    pair.light.configure({'brightness': 50, 'strobe_duty_cycle': 5}, pair.now, done)
+    pair.light.control.configure({'brightness': 50, 'strobe_duty_cycle': 5}, pair.now, done)
     pair.turn()
     pair.run(5.0)
     (message, event), = answers
@@ -293,7 +293,7 @@ def test_a_discrepancy_ends_when_another_sender_changes_the_light(
 
 def publish(pair: Pair, *values: float, rate: float = 0.0) -> None:
     for value in values:
-        pair.light.set_brightness(value, pair.now)
+        pair.light.control.set_brightness(value, pair.now)
         pair.turn()
         if rate:
             pair.run(1 / rate)
@@ -415,7 +415,7 @@ def test_a_setpoint_waits_for_a_set_and_does_not_end_it(fake: FakeLight, faked: 
 
 def test_a_stream_does_not_keep_overrides_from_being_sent(fake: FakeLight, faked: Pair) -> None:
     fake.results[CONFIGURE] = [None, None, None, ACCEPTED]
-    faked.light.set_desired({'strobe_period': 2.0}, faked.now)
+    faked.light.control.set_desired({'strobe_period': 2.0}, faked.now)
     publish(faked, *[value % 100 / 1.0 for value in range(400)], rate=50)
     assert fake.fields['strobe_period'] == 2.0
 
@@ -425,7 +425,7 @@ def test_a_stream_does_not_keep_overrides_from_being_sent(fake: FakeLight, faked
 def overriding(fake: FakeLight, settings: LightSettings | None = None, **values: Any) -> Pair:
     """Return a pair whose light must be configured as soon as it is found."""
     return Pair(fake, settings=settings,
-                on_light=lambda light: light.set_desired(values, START))
+                on_light=lambda light: light.control.set_desired(values, START))
 
 
 def successes(pair: Pair) -> list[bool]:
@@ -492,7 +492,7 @@ def test_overrides_and_a_restored_configuration_reach_a_light_that_answers_too_l
     fake: FakeLight, latency: float,
 ) -> None:
     pair = Pair(fake, there=Faults(latency=latency),
-                on_light=lambda light: light.set_desired({'brightness': 30.0}, START))
+                on_light=lambda light: light.control.set_desired({'brightness': 30.0}, START))
     for _ in range(2):
         at = pair.now
         fake.restart(at)
