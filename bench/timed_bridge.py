@@ -86,11 +86,10 @@ def _time_link_and_services() -> None:
     class TimedThread(link_thread.LinkThread):
 
         def __init__(
-            self, label: str, work: Any, finish: Any, faults: Any, clock: Any, selector: Any,
-            **options: Any,
+            self, work: Any, finish: Any, faults: Any, clock: Any, selector: Any, **options: Any,
         ) -> None:
             super().__init__(
-                label, work, finish, faults, clock, selector or _TimedSelector(), **options)
+                work, finish, faults, clock, selector or _TimedSelector(), **options)
 
     class TimedLine(line.Line):
 

@@ -34,6 +34,10 @@ from .url import Url
 STORE_INTERVAL = 30.0
 
 
+class LinkThreadError(RuntimeError):
+    """The thread of a link cannot be started; the message names the link and says why."""
+
+
 class Link:
     """
     Runs an endpoint over connection URLs in a thread of its own, and reopens lost transports.
@@ -65,6 +69,7 @@ class Link:
     ) -> None:
         self.endpoint = endpoint
         self.clock = clock
+        self._label = label
         self._wall_clock = wall_clock
         self._on_event = on_event
         self._signing = signing or Signing()
@@ -72,7 +77,7 @@ class Link:
         self._store_due = 0.0 if store else math.inf
         self._faults = FaultLog(clock)
         self._thread = LinkThread(
-            label, self._work, self._finish, self._faults, clock, selector,
+            self._work, self._finish, self._faults, clock, selector,
             stalled=lambda seconds: endpoint.stalled(seconds, clock()))
         self.lines = Lines(
             [(label, url), *further.items()], endpoint, faults=self._faults,
@@ -88,7 +93,10 @@ class Link:
 
         :raises LinkThreadError: if that fails; it may be tried again.
         """
-        self._thread.start()
+        try:
+            self._thread.start()
+        except RuntimeError as error:
+            raise LinkThreadError(f'{self._label}: {error} for the link') from None
 
     def stop(self, timeout: float = 1.0) -> None:
         """

@@ -45,10 +45,6 @@ STALL_TIME = 2.0
 _log = logging.getLogger(__name__)
 
 
-class LinkThreadError(RuntimeError):
-    """The thread of a link cannot be started; the message names the link and says why."""
-
-
 class FaultLog:
     """
     Logs exceptions of the functions that a loop calls.
@@ -135,48 +131,6 @@ class StallDetector:
         return stall if stall > STALL_TIME else 0.0
 
 
-class CallQueue:
-    """The calls of other threads, which wait while :data:`MAX_CALLS` wait."""
-
-    def __init__(self) -> None:
-        self._calls: deque[Callable[[float], None]] = deque()
-        # Set while few calls wait.
-        self._room = threading.Event()
-        self._room.set()
-
-    def __len__(self) -> int:
-        return len(self._calls)
-
-    def add(self, function: Callable[[float], None], *, waits: bool) -> None:
-        """
-        Add a call; from any thread.
-
-        :param waits: whether to wait for room before.
-        """
-        if waits:
-            self._room.wait(ROOM_TIMEOUT)
-        self._calls.append(function)
-        if len(self._calls) >= MAX_CALLS:
-            # The thread wakes after this, and sets it again.
-            self._room.clear()
-
-    def add_first(self, function: Callable[[float], None]) -> None:
-        """Add a call before those that wait."""
-        self._calls.appendleft(function)
-
-    def run(self, call: Callable[[Callable[[float], None]], bool]) -> None:
-        """
-        Make the calls that wait.
-
-        :param call: makes one; returns whether to make no more now.
-        """
-        for _ in range(len(self._calls)):
-            if call(self._calls.popleft()):
-                break
-        if len(self._calls) < MAX_CALLS:
-            self._room.set()
-
-
 class LinkThread:
     """
     Waits for descriptors, calls and deadlines, and handles each in this thread.
@@ -184,7 +138,6 @@ class LinkThread:
     No number of calls delays frames and deadlines: a turn begins no call after its time, except
     its first one, and other threads that call too often wait.
 
-    :param label: names the link in errors.
     :param work: called after each wait; returns when it must be called again, s.
     :param finish: called at the end.
     :param stalled: called with s for which the process was stopped, before the calls that wait.
@@ -195,14 +148,13 @@ class LinkThread:
     """
 
     def __init__(
-        self, label: str, work: Callable[[], float], finish: Callable[[], None],
+        self, work: Callable[[], float], finish: Callable[[], None],
         faults: FaultLog, clock: Callable[[], float],
         selector: selectors.BaseSelector | None = None, *,
         stalled: Callable[[float], None] = lambda seconds: None,
         monotonic: Callable[[], float] = time.monotonic,
     ) -> None:
         self.selector = selector or selectors.DefaultSelector()
-        self._label = label
         self._work = work
         self._finish = finish
         self._faults = faults
@@ -212,7 +164,10 @@ class LinkThread:
         self._detector = StallDetector(monotonic)
         # When the turn begins no more messages and calls, s.
         self._turn_ends = math.inf
-        self._calls = CallQueue()
+        self._calls: deque[Callable[[float], None]] = deque()
+        # Set while few calls wait.
+        self._room = threading.Event()
+        self._room.set()
         self._waker = Waker()
         self.selector.register(
             self._waker, selectors.EVENT_READ, lambda waker, events: waker.clear())
@@ -226,14 +181,11 @@ class LinkThread:
         """
         Start the thread.
 
-        :raises LinkThreadError: if that fails; it may be tried again.
+        :raises RuntimeError: if that fails; it may be tried again.
         """
         with self._starting:
             if not self._stopping.is_set():
-                try:
-                    self._thread.start()
-                except RuntimeError as error:
-                    raise LinkThreadError(f'{self._label}: {error} for the link') from None
+                self._thread.start()
 
     def stop(self, timeout: float) -> None:
         """
@@ -259,13 +211,17 @@ class LinkThread:
 
         Another thread waits first while :data:`MAX_CALLS` calls wait.
         """
-        self._calls.add(function, waits=(
-            threading.current_thread() is not self._thread and self._thread.is_alive()))
+        if threading.current_thread() is not self._thread and self._thread.is_alive():
+            self._room.wait(ROOM_TIMEOUT)
+        self._calls.append(function)
+        if len(self._calls) >= MAX_CALLS:
+            # The thread wakes after this, and sets it again.
+            self._room.clear()
         self._waker.wake()
 
     def call_first(self, function: Callable[[float], None]) -> None:
         """Have ``function(now)`` called in this thread, before the calls that wait."""
-        self._calls.add_first(function)
+        self._calls.appendleft(function)
         self._waker.wake()
 
     # In this thread
@@ -303,13 +259,17 @@ class LinkThread:
             key.data(key.fileobj, events)
             if self._clock() >= self._turn_ends:
                 break
-        self._calls.run(self._call)
+        self._make_calls()
         self._due = self._work()
 
-    def _call(self, function: Callable[[float], None]) -> bool:
-        """Make a call; return whether the turn is over."""
-        self._faults.call(function, self._clock())
-        return self._clock() >= self._turn_ends
+    def _make_calls(self) -> None:
+        """Make the calls that wait, until the turn is over."""
+        for _ in range(len(self._calls)):
+            self._faults.call(self._calls.popleft(), self._clock())
+            if self._clock() >= self._turn_ends:
+                break
+        if len(self._calls) < MAX_CALLS:
+            self._room.set()
 
     def _run(self) -> None:
         while not self._stopping.is_set():
@@ -319,7 +279,7 @@ class LinkThread:
                 self._faults.log()
                 self._stopping.wait(FAULT_PAUSE)
         self._turn_ends = math.inf
-        self._calls.run(self._call)
+        self._make_calls()
         self._faults.call(self._finish)
         self._release()
 

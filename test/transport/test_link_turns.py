@@ -173,7 +173,7 @@ def test_a_stop_of_the_process_is_noted_before_the_calls_that_waited_meanwhile(
         return now[0]
 
     thread = LinkThread(
-        'link', lambda: now[0] + 1.0, lambda: None, FaultLog(clock), clock, Selector(),
+        lambda: now[0] + 1.0, lambda: None, FaultLog(clock), clock, Selector(),
         stalled=lambda seconds: order.append(round(seconds, 6)), monotonic=clock)
     thread.run_once()
     thread.call(lambda at: order.append('call'))
@@ -200,7 +200,7 @@ def test_a_line_that_is_always_ready_ends_the_turn_and_keeps_no_other_one_waitin
         return now[0]
 
     thread = LinkThread(
-        'link', lambda: now[0], lambda: None, FaultLog(clock), clock, Selector(), monotonic=clock)
+        lambda: now[0], lambda: None, FaultLog(clock), clock, Selector(), monotonic=clock)
     for turn in range(100):
         thread.run_once()
         assert len(served) == turn + 1

@@ -42,9 +42,8 @@ from ...checks.report import as_json, as_junit, catalogue, lines, RunReport, unr
 from ...checks.requirement import AnyChecks, CheckResult, CheckVerdict
 from ...checks.runner import absence, CheckRunner
 from ...checks.session import Conditions, Session
-from ...mavlink.link import Link
+from ...mavlink.link import Link, LinkThreadError
 from ...mavlink.link_state import LinkEvent, LinkSnapshot
-from ...mavlink.link_thread import LinkThreadError
 from ...mavlink.messages import Address
 from ...mavlink.signing import Signing
 from ...mavlink.signing_files import TimestampStore
