@@ -42,9 +42,9 @@ from ..mavlink.messages import Address
 from ..mavlink.retries import GIMBAL_MESSAGE, Retries
 from ..payload.arbitration import Cause, HolderChanged
 from ..payload.command_sources import Sources, SourceSettings
-from ..payload.confirmed_command import Done, Result
+from ..payload.confirmed_command import Desired, Done, Result
 from ..payload.device_events import DeviceConnected, DeviceDisconnected, DeviceHeld
-from ..payload.device_property import answer, Caller, Desired, Outcome, Property
+from ..payload.device_property import answer, Caller, Outcome, Property
 from ..payload.liveness import Liveness
 from ..payload.messages import GeoPoint, GimbalDeviceAttitudeStatus
 from ..payload.mount_attitude import MountAttitude, Wxyz, YawFrame

@@ -22,8 +22,8 @@ from . import events
 from .commands import configure, Control
 from .remote_managers import RemoteManager
 from ..mavlink.messages import Address
-from ..payload.confirmed_command import Result
-from ..payload.device_property import Caller, Desired
+from ..payload.confirmed_command import Desired, Result
+from ..payload.device_property import Caller
 
 # s; the limit of a request, including its confirmation.
 REQUEST_LIMIT = 5.0

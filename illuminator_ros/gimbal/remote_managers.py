@@ -33,8 +33,8 @@ from ..mavlink.command_sender import (
 from ..mavlink.dialect import mavlink
 from ..mavlink.messages import Address
 from ..mavlink.retries import GIMBAL_MESSAGE, Retries
-from ..payload.confirmed_command import Result, Target
-from ..payload.device_property import Caller, Desired, Outcome, Property
+from ..payload.confirmed_command import Desired, Result, Target
+from ..payload.device_property import Caller, Outcome, Property
 from ..payload.liveness import Liveness
 from ..payload.messages import GimbalDeviceAttitudeStatus
 from ..payload.mount_attitude import yaw_frame, YawFrame

@@ -41,8 +41,8 @@ from .model import (
     unexpected_differences,
 )
 from ..mavlink.retries import REQUIRED, Retries
-from ..payload.confirmed_command import Change, Result, Target
-from ..payload.device_property import Caller, Desired, Outcome, Property
+from ..payload.confirmed_command import Change, Desired, Result, Target
+from ..payload.device_property import Caller, Outcome, Property
 
 # s; rqt_reconfigure gives up after 1.0 s, and the answer must arrive before. The middleware waits
 # up to 0.1 s before it sends an answer to a client that it has not discovered yet.

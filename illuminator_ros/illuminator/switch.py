@@ -25,8 +25,8 @@ from .commands import OnOff, SWITCHES
 from .model import Mode, Status
 from ..mavlink.command_sender import format_seconds
 from ..mavlink.retries import UNCONFIRMED
-from ..payload.confirmed_command import Done, Result, Target
-from ..payload.device_property import Caller, Desired, Outcome, Property
+from ..payload.confirmed_command import Desired, Done, Result, Target
+from ..payload.device_property import Caller, Outcome, Property
 
 ON, OFF = SWITCHES[True], SWITCHES[False]
 
@@ -116,8 +116,8 @@ class Switch:
         if desired is not None and desired is not under_way and not (
                 under_way and under_way.equals(desired)):
             self._want(desired, now)
-        command = self.changes.command
-        if command is not None and command.terms.insists:
+        command, under_way = self.changes.command, self.changes.desired
+        if command is not None and under_way is not None and under_way.insists:
             self._tell_failure(command.failure(), now)
         waits = self.silence.limit and self.may_be_on(now) and not self.is_pending(OFF)
         self._silence_due = self.silence.ends_at if waits else math.inf

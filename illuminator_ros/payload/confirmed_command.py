@@ -29,6 +29,7 @@ it. Nothing is concluded from the clock of the device.
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import dataclass
 import math
 from typing import Generic, NamedTuple, Protocol, TypeVar
 
@@ -60,6 +61,9 @@ PERMANENT_RESULTS = frozenset((
     mavlink.MAV_RESULT_DENIED, mavlink.MAV_RESULT_UNSUPPORTED,
     MAV_RESULT_COMMAND_UNSUPPORTED_MAV_FRAME,
     mavlink.MAV_RESULT_COMMAND_LONG_ONLY, mavlink.MAV_RESULT_COMMAND_INT_ONLY))
+
+# The values that a command sets: MAV_CMD, params and position.
+CommandedValue = tuple[int, tuple[float, ...], CommandPosition | None]
 
 # The ends of the protocol that end even a command that insists: nothing can be sent any more.
 ENDS_REPEATING = frozenset((CommandStatus.CLOSED, CommandStatus.LINK_LOST))
@@ -169,27 +173,33 @@ class Result(NamedTuple):
 Done = Callable[[Result, float], None]
 
 
-class Terms(NamedTuple):
+@dataclass(frozen=True)
+class Desired(Generic[S]):
     """
-    The terms under which a command is sent. Times are s.
+    A value that a property should have.
 
-    :param asked_at: when the change was requested.
-    :param limit_at: the time by which the command ends, infinity for none.
-    :param fence: the time before which frames of other commands may be under way.
-    :param is_sole_cause: whether none of these can have caused a status that shows the change.
-    :param insists: whether it goes on until a status shows the change: no refusal ends it.
-    :param is_awaited: whether a call waits for the result.
-    :param is_last: whether the process ends: within the fence a status counts after
-        :data:`ENOUGH_TRIES`.
+    :param reason: why, for people, '' for a request.
+    :param limit: s from the request within which a command ends.
+    :param insists: whether it is sent until a status shows it, whatever the device answers.
+    :param is_last: whether the process ends, which cannot await the end of the fence: within it a
+        status counts after :data:`ENOUGH_TRIES`.
     """
 
-    asked_at: float
-    limit_at: float = math.inf
-    fence: float = -math.inf
-    is_sole_cause: bool = False
+    change: Change[S]
+    reason: str = ''
+    limit: float = math.inf
     insists: bool = False
     is_last: bool = False
-    is_awaited: bool = False
+
+    @property
+    def value(self) -> CommandedValue:
+        """Return the values that the command sets."""
+        return self.change.command, self.change.params, self.change.position
+
+    def equals(self, other: Desired[S]) -> bool:
+        """Return whether both set the same value in the same way."""
+        return ((self.value, self.insists, self.is_last)
+                == (other.value, other.insists, other.is_last))
 
 
 class ConfirmedCommand(Generic[S]):
@@ -198,16 +208,24 @@ class ConfirmedCommand(Generic[S]):
 
     :meth:`reported` and :meth:`poll` return the result when the command has ended, else None.
 
+    :param asked_at: when the value was requested.
+    :param fence: the time before which frames of other commands may be under way.
+    :param is_sole_cause: whether none of these can have caused a status that shows the change.
+    :param is_awaited: whether a call waits for the result.
     :param gap: the time between the last two statuses, None if none has ever come.
     """
 
     def __init__(
-        self, target: Target, change: Change[S], now: float, terms: Terms, *,
+        self, target: Target, desired: Desired[S], now: float, *, asked_at: float,
+        fence: float = -math.inf, is_sole_cause: bool = False, is_awaited: bool = False,
         gap: float | None = None,
     ) -> None:
-        self.change = change
-        self.terms = terms
+        self._desired = desired
         self._target = target
+        self._asked_at = asked_at
+        self._fence = fence
+        self._is_sole_cause = is_sole_cause
+        self._is_awaited = is_awaited
         self._gap = gap
         # The end of the command protocol, which explains the outcome.
         self._answer: CommandResult | None = None
@@ -227,19 +245,18 @@ class ConfirmedCommand(Generic[S]):
 
         Where more tries are due whatever the device answers, each is sent once.
         """
-        change, target, terms = self.change, self._target, self.terms
-        is_fenced = now < terms.fence
-        is_repeated = change.is_idempotent and (
-            terms.insists or is_fenced or self._is_accepted)
+        change, target, insists = self._desired.change, self._target, self._desired.insists
+        is_fenced = now < self._fence
+        is_repeated = change.is_idempotent and (insists or is_fenced or self._is_accepted)
         self._repeat_due = math.inf
         if is_repeated:
-            is_slow = terms.insists and tried >= UNCONFIRMED.tries
+            is_slow = insists and tried >= UNCONFIRMED.tries
             self._repeat_due = now + (STILL_UNCONFIRMED if is_slow else UNCONFIRMED).first
             if is_fenced:
-                self._repeat_due = min(self._repeat_due, terms.fence)
+                self._repeat_due = min(self._repeat_due, self._fence)
         elif is_fenced:
-            self._ends_at = terms.fence + CONFIRMATION_TIMEOUT
-            self._requests = Retries(STATUS, terms.fence, 1)
+            self._ends_at = self._fence + CONFIRMATION_TIMEOUT
+            self._requests = Retries(STATUS, self._fence, 1)
         self._sending = target.commands.start(
             Command(target.address, change.command, change.params, position=change.position),
             now, self._answered, deadline=self._limit,
@@ -249,9 +266,8 @@ class ConfirmedCommand(Generic[S]):
     @property
     def _limit(self) -> float:
         """Return when it ends even if the device still reports progress."""
-        terms = self.terms
-        return min(terms.limit_at,
-                   math.inf if terms.insists else terms.asked_at + PROGRESS_LIMIT)
+        longest = math.inf if self._desired.insists else PROGRESS_LIMIT
+        return self._asked_at + min(self._desired.limit, longest)
 
     @property
     def is_under_way(self) -> bool:
@@ -266,8 +282,8 @@ class ConfirmedCommand(Generic[S]):
     def restarted(self, now: float) -> None:
         """Send it again: the device has restarted, and nothing from before counts."""
         self._has_restarted = True
-        if self.change.is_idempotent:
-            self.terms = self.terms._replace(fence=now + FENCE, is_sole_cause=False)
+        if self._desired.change.is_idempotent:
+            self._fence, self._is_sole_cause = now + FENCE, False
             self._answer = self._instead = None
             self._ends_at = math.inf
             self._requests.stop()
@@ -287,9 +303,9 @@ class ConfirmedCommand(Generic[S]):
         if answer.status is CommandStatus.ANSWERED:
             # Within the fence it may be the answer to an earlier command. It counts where no call
             # waits for the result: one lost answer would otherwise slow down a stream for ever.
-            is_fenced = now < self.terms.fence
-            self._acknowledged += not (is_fenced and self.terms.is_awaited)
-            if is_fenced or self._answer is not None and not self.terms.insists:
+            is_fenced = now < self._fence
+            self._acknowledged += not (is_fenced and self._is_awaited)
+            if is_fenced or self._answer is not None and not self._desired.insists:
                 return
             if self._answer is None:
                 self._ends_at = now + CONFIRMATION_TIMEOUT
@@ -311,11 +327,11 @@ class ConfirmedCommand(Generic[S]):
     def _counts(self, now: float) -> bool:
         """Return whether a status that comes now was sent after the command, as far as known."""
         sending = self._sending
-        if now < self.terms.fence:
-            return self.terms.is_last and sending.tries >= ENOUGH_TRIES
+        if now < self._fence:
+            return self._desired.is_last and sending.tries >= ENOUGH_TRIES
         if sending.result is not None or self._answer is not None:
             return True
-        return sending.tries >= ENOUGH_TRIES if self.terms.insists else sending.is_last_try
+        return sending.tries >= ENOUGH_TRIES if self._desired.insists else sending.is_last_try
 
     def reported(self, status: S, gap: float, now: float) -> Result | None:
         """
@@ -324,9 +340,9 @@ class ConfirmedCommand(Generic[S]):
         :param gap: since the one before.
         """
         self._gap = gap
-        change, terms = self.change, self.terms
+        change = self._desired.change
         shown = change.shown_by(status)
-        if not (self._counts(now) or shown and terms.is_sole_cause and now < terms.fence):
+        if not (self._counts(now) or shown and self._is_sole_cause and now < self._fence):
             return None
         if shown or shown is None and self._is_accepted:
             answer = self._protocol()
@@ -335,7 +351,7 @@ class ConfirmedCommand(Generic[S]):
                 else f': {result_name(answer.result)}'), now, success=True)
         if shown is False:
             self._instead = status
-        if self.terms.insists:
+        if self._desired.insists:
             return None
         if self._answer is not None and self._answer.refused:
             return self._expired(now)
@@ -358,7 +374,7 @@ class ConfirmedCommand(Generic[S]):
     @property
     def _end(self) -> float:
         """Return when it ends without success, s."""
-        if not self.terms.insists:
+        if not self._desired.insists:
             return min(self._ends_at, self._limit)
         is_over = self._answer is not None and self._answer.status in ENDS_REPEATING
         return self._ends_at if is_over else math.inf
@@ -383,17 +399,18 @@ class ConfirmedCommand(Generic[S]):
         if answer is None or answer.refused:
             return '' if answer is None else answer.describe_failure()
         shown = self._shown_instead()
-        return f'{self.change.goal} not confirmed: {answer.describe()}{shown and ", but " + shown}'
+        return (f'{self._desired.change.goal} not confirmed: {answer.describe()}'
+                f'{shown and ", but " + shown}')
 
     def _shown_instead(self) -> str:
         if self._instead is None:
             return ''
-        return f'{self._target.status_name} shows {self.change.actual(self._instead)}'
+        return f'{self._target.status_name} shows {self._desired.change.actual(self._instead)}'
 
     def _expired(self, now: float) -> Result:
-        change, target, answer = self.change, self._target, self._answer
+        change, target, answer = self._desired.change, self._target, self._answer
         shown = self._shown_instead()
-        if answer is None and now < self.terms.fence:
+        if answer is None and now < self._fence:
             text = 'an earlier command may still be under way'
             return self._result(f'{change.goal} not confirmed: {text}', now)
         if answer is None or not (answer.accepted or answer.refused):
@@ -426,6 +443,6 @@ class ConfirmedCommand(Generic[S]):
             return Result(False, text, superseded=True)
         if self._has_restarted:
             text += f'; the {self._target.kind} restarted meanwhile'
-        took = timing(self._sending.tries, now - self.terms.asked_at)
-        return Result(success, f'{text} ({took})', note=self.change.note if success else '',
-                      **flags)
+        took = timing(self._sending.tries, now - self._asked_at)
+        note = self._desired.change.note if success else ''
+        return Result(success, f'{text} ({took})', note=note, **flags)

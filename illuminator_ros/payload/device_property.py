@@ -29,12 +29,18 @@ from dataclasses import dataclass
 import math
 from typing import Generic, NamedTuple, TypeVar
 
-from .confirmed_command import Change, ConfirmedCommand, Done, FENCE, Result, Target, Terms
-from ..mavlink.command_sender import CommandPosition
+from .confirmed_command import (
+    Change,
+    CommandedValue,
+    ConfirmedCommand,
+    Desired,
+    Done,
+    FENCE,
+    Result,
+    Target,
+)
 
 S = TypeVar('S')
-# The values that a command sets: MAV_CMD, params and position.
-CommandedValue = tuple[int, tuple[float, ...], CommandPosition | None]
 # Callers that may wait for one value.
 MAX_CALLERS = 32
 # s in which a command that ended unconfirmed may still take effect.
@@ -58,33 +64,6 @@ class Caller(NamedTuple):
     source: str = ''
     is_stream: bool = False
     detail: str = ''
-
-
-@dataclass(frozen=True)
-class Desired(Generic[S]):
-    """
-    A value that a property should have.
-
-    :param reason: why, for people, '' for a request.
-    :param limit: s from the request within which a command ends.
-    :param insists: whether it is sent until a status shows it, whatever the device answers.
-    :param is_last: whether the process ends, which cannot await the end of the fence.
-    """
-
-    change: Change[S]
-    reason: str = ''
-    limit: float = math.inf
-    insists: bool = False
-    is_last: bool = False
-
-    def equals(self, other: Desired[S]) -> bool:
-        """Return whether both set the same value in the same way."""
-        return ((_value(self.change), self.insists, self.is_last)
-                == (_value(other.change), other.insists, other.is_last))
-
-
-def _value(change: Change[S]) -> CommandedValue:
-    return change.command, change.params, change.position
 
 
 @dataclass(frozen=True)
@@ -172,11 +151,10 @@ class Property(Generic[S]):
         if self._under_way:
             self._under_way = {value: end for value, end in self._under_way.items() if now < end}
         self.desired, self._callers, self.sent_at = desired, callers, now
-        terms = Terms(asked_at, asked_at + desired.limit, self.fence,
-                      self._is_sole_cause(desired), desired.insists, desired.is_last,
-                      is_awaited=not all(one.is_stream for one in callers))
         self.command = ConfirmedCommand(
-            self._target, desired.change, now, terms, gap=self._gap)
+            self._target, desired, now, asked_at=asked_at, fence=self.fence,
+            is_sole_cause=self._is_sole_cause(desired),
+            is_awaited=not all(one.is_stream for one in callers), gap=self._gap)
 
     def _is_sole_cause(self, desired: Desired[S]) -> bool:
         """
@@ -188,10 +166,10 @@ class Property(Generic[S]):
         """
         if desired.limit > FENCE:
             return False
-        change = desired.change
-        others = self._under_way.keys() - {_value(change)}
+        others = self._under_way.keys() - {desired.value}
         is_new = len(others) == len(self._under_way) < MAX_VALUES or not others
-        return is_new and self.newest is not None and change.shown_by(self.newest) is False
+        return (is_new and self.newest is not None
+                and desired.change.shown_by(self.newest) is False)
 
     def fence_until(self, fence: float) -> None:
         """Count nothing before a time: other commands that may set the property are under way."""
@@ -251,7 +229,7 @@ class Property(Generic[S]):
         if command.is_under_way or result.superseded:
             self.fence_until(command.last_sent + FENCE)
         if now < self.fence and len(self._under_way) < MAX_VALUES:
-            self._under_way[_value(desired.change)] = self.fence
+            self._under_way[desired.value] = self.fence
         if waiting and goes_on:
             self._start(desired, waiting, now)
         else:

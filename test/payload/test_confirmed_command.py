@@ -20,7 +20,7 @@ import math
 from typing import Any
 
 from illuminator_ros.mavlink.command_sender import CommandStatus, timing
-from illuminator_ros.payload.confirmed_command import ConfirmedCommand, FENCE, Result, Terms
+from illuminator_ros.payload.confirmed_command import ConfirmedCommand, Desired, FENCE, Result
 import pytest
 from support.level_device import (
     ACCEPTED,
@@ -44,7 +44,9 @@ class CommandBench(Bench):
         self.result: Result | None = None
         self.ended_at = math.nan
         self.command: ConfirmedCommand[int | None] = ConfirmedCommand(
-            self.target(**target or {}), change, self.now, Terms(self.now, **arguments), gap=gap)
+            self.target(**target or {}), Desired(change, **{
+                name: arguments.pop(name) for name in ('limit', 'insists', 'is_last')
+                if name in arguments}), self.now, asked_at=self.now, gap=gap, **arguments)
         self.gap = gap
         return self
 
@@ -102,10 +104,10 @@ SINGLE, REPEATED = ({'change': Level(5, is_idempotent=False)},
      'level 5, confirmed by STATUS: MAV_RESULT_IN_PROGRESS', ONCE, 0.02, ()),
     # Without an acknowledgement a status counts after the last try.
     (OBEYS, {}, True, NOT_ACKNOWLEDGED, SILENT, 1.77, ()),
-    (OBEYS, {'limit_at': 0.9}, True, NOT_ACKNOWLEDGED, SILENT[:3], 0.77, ()),
+    (OBEYS, {'limit': 0.9}, True, NOT_ACKNOWLEDGED, SILENT[:3], 0.77, ()),
     # It shows something else.
     ({'executes': []}, {}, False, INSTEAD, ONCE, 1.02, CONTRADICTED),
-    ({'executes': []}, {'limit_at': 0.9}, False, INSTEAD, ONCE, 0.9, CONTRADICTED),
+    ({'executes': []}, {'limit': 0.9}, False, INSTEAD, ONCE, 0.9, CONTRADICTED),
     ({'executes': []}, REPEATED, False, INSTEAD, [0.0, 0.25, 0.5, 0.75, 1.0], 1.02, CONTRADICTED),
     ({'results': [None]}, REPEATED, False, f'{NO_ANSWER}, and {LEVEL_0}', SILENT, 2.75, ()),
     ({'results': [IN_PROGRESS]}, REPEATED, False, IN_PROGRESS_STOPPED, ONCE, 3.02, ()),
@@ -144,7 +146,7 @@ SINGLE, REPEATED = ({'change': Level(5, is_idempotent=False)},
     ({'results': [None]}, {'fence': 0.6}, False, f'{NO_ANSWER}, and {LEVEL_0}',
      [*FENCED, 0.85, 1.35, 2.35], 3.35, ()),
     (MUTE, {'fence': 0.6, 'gap': None}, True, SENDS_NONE, FENCED, 1.62, ()),
-    ({}, {'fence': FENCE, 'limit_at': 0.9}, False,
+    ({}, {'fence': FENCE, 'limit': 0.9}, False,
      'level 5 not confirmed: an earlier command may still be under way', [0.0, 0.25, 0.5, 0.75],
      0.9, ()),
     # But a status that only this command can have caused counts.

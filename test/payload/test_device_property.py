@@ -25,10 +25,9 @@ import math
 from typing import Any
 
 from hypothesis import given, strategies
-from illuminator_ros.payload.confirmed_command import FENCE, Result
+from illuminator_ros.payload.confirmed_command import Desired, FENCE, Result
 from illuminator_ros.payload.device_property import (
     Caller,
-    Desired,
     LATE_TIME,
     MAX_CALLERS,
     MAX_VALUES,
@@ -165,8 +164,8 @@ def test_an_equal_value_that_is_sent_in_another_way_replaces_the_command(
     bench.want(3, reason='silence', **changes)
     (outcome,) = bench.outcomes()
     assert outcome.result.message == 'silence'
-    assert bench.property.command is not None
-    assert bench.property.command.terms.insists
+    assert bench.property.desired is not None
+    assert bench.property.desired.insists
 
 
 # The fence

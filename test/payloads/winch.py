@@ -33,8 +33,8 @@ from illuminator_ros.mavlink.command_sender import CommandSender
 from illuminator_ros.mavlink.component import Payload
 from illuminator_ros.mavlink.dialect import mavlink
 from illuminator_ros.mavlink.messages import Address, AnyCommand, Heartbeat, Message
-from illuminator_ros.payload.confirmed_command import Done, Result, Target
-from illuminator_ros.payload.device_property import answer, Caller, Desired, Property
+from illuminator_ros.payload.confirmed_command import Desired, Done, Result, Target
+from illuminator_ros.payload.device_property import answer, Caller, Property
 from illuminator_ros.payload.discovery import Discovery
 from illuminator_ros.payload.listeners import Listeners
 from illuminator_ros.payload.liveness import Liveness
