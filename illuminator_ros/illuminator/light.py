@@ -68,10 +68,9 @@ class Light:
         """Take a heartbeat, or anything else that shows that the light is alive."""
         if self.liveness.hear(now):
             self._due = None
-            self.control.configuration.require({}, now)
             self._queries.begin(now)
             self._emit(DeviceConnected(self.address))
-            self.control.update(now)
+            self.control.set_desired({}, now)
 
     def announce(self, now: float) -> None:
         """Note that it has proved to be a light."""

@@ -180,13 +180,13 @@ class LightControl:
 
     def set_desired(self, values: Changes, now: float) -> None:
         """
-        Send values as soon as the light has reported its configuration.
+        Send values, and what is required already, once the light has reported its configuration.
 
-        :param values: by name, checked, except against the limits that the light reports.
+        :param values: by name, checked, except against the limits that the light reports; none if
+            the light is heard again.
         """
-        if not self._commands.refusal:
-            self.configuration.require(values, now)
-            self.update(now)
+        self.configuration.require(values, now)
+        self.update(now)
 
     def _take_request(self, caller: Caller, desired: DesiredState, now: float) -> bool:
         """
