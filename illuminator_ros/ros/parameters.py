@@ -30,6 +30,7 @@ from rclpy.node import Node
 from rclpy.parameter import Parameter
 
 from .rclpy_private import parameter_overrides
+from .ros_home import state_folder
 from .throttled_log import NodeLog
 from ..mavlink.messages import Address
 from ..mavlink.signing import Signing, SigningMode
@@ -196,7 +197,8 @@ class LinkParameters(NamedTuple):
         """
         try:
             return load_signing(
-                self.signing_mode, self.signing_key_file, f'bridge {self.address}', time.time())
+                self.signing_mode, self.signing_key_file, f'bridge {self.address}', time.time(),
+                state_folder)
         except KeyFileError as error:
             raise ParameterError(f'signing_key_file: {error}') from None
 
