@@ -105,7 +105,7 @@ def encode(message: mavlink.MAVLink_message) -> bytes:
     return message.unpacker.pack(*values)
 
 
-def decode(cls: type[M], payload: bytes, sender: int = 0) -> M:
+def decode(cls: type[M], payload: bytes) -> M:
     """
     Return the message of a checked payload.
 
@@ -114,8 +114,6 @@ def decode(cls: type[M], payload: bytes, sender: int = 0) -> M:
 
     ``MAVLink.decode`` of the whole frame would check it again and take twice the time. It strips
     zeros from strings, and fills in the header, with which equal messages are unequal.
-
-    :param sender: see :func:`~.messages.sender_of`.
     """
     size = cls.unpacker.size
     values = cls.unpacker.unpack(payload[:size].ljust(size, b'\0'))
@@ -124,9 +122,7 @@ def decode(cls: type[M], payload: bytes, sender: int = 0) -> M:
         values = tuple(values[end - 1] if length == 1 else values[end - length:end]
                        for end, length in zip(ends, cls.lengths, strict=True))
     # The constructors of the classes have the fields as parameters.
-    message = cast('Callable[..., M]', cls)(*[values[at] for at in cls.orders])
-    vars(message)['sender'] = sender
-    return message
+    return cast('Callable[..., M]', cls)(*[values[at] for at in cls.orders])
 
 
 def replaced(message: M, **fields: Any) -> M:

@@ -31,7 +31,7 @@ from .frame import Frame
 from .link_state import LinkInput, LinkSnapshot, LinkState, LinkStatus
 from .link_thread import FaultLog
 from .messages import Address
-from .receiver import ReceivedFrame, Receiver
+from .receiver import Receiver
 from .retries import RESOURCE
 from .transport import Channel, Peer
 from .url import Url
@@ -78,7 +78,7 @@ class LineUser(ABC):
 
     @abstractmethod
     def receive(
-        self, line: Line, peer: Peer, frames: Sequence[ReceivedFrame], now: float,
+        self, line: Line, peer: Peer, frames: Sequence[Frame], now: float,
     ) -> None:
         """Take accepted frames of a peer, of which all may be of messages that only count."""
 
@@ -298,7 +298,7 @@ class Line:
             self._lost(error)
 
     def _handle(
-        self, channel: Channel, peer: Peer, frames: list[ReceivedFrame], now: float,
+        self, channel: Channel, peer: Peer, frames: list[Frame], now: float,
     ) -> None:
         """Take accepted frames of a peer, of which all may be of messages that are not handled."""
         if self.status.state is not LinkState.OPEN:

@@ -25,13 +25,13 @@ from .component import Endpoint
 from .dialect import decode, line_of
 from .duplicate_filter import DuplicateFilter
 from .forwarded_commands import ForwardedCommands
-from .frame import MAX_ID_V1
+from .frame import Frame, MAX_ID_V1
 from .frame_writer import FrameWriter
 from .line import ANNOUNCE_INTERVAL, Line, LineUser, SILENCE
 from .link_state import LinkSnapshot
 from .link_thread import FaultLog, TurnQueue
 from .messages import Address
-from .receiver import ReceivedFrame, Receiver
+from .receiver import Receiver
 from .routing_table import grouped, Router
 from .sender import Sender
 from .signing import Signing
@@ -75,7 +75,7 @@ class Lines(LineUser):
         self._faults = faults
         self._clock = clock
         # Messages, of one read, and their lines.
-        self._received: TurnQueue[tuple[Line, ReceivedFrame]] = TurnQueue(
+        self._received: TurnQueue[tuple[Line, Frame]] = TurnQueue(
             self._take_received, call_first, is_turn_over)
         self._version = mavlink_version
         self._duplicates = DuplicateFilter() if len(urls) > 1 else None
@@ -206,40 +206,40 @@ class Lines(LineUser):
         line.write([*self._sender.heartbeats.values()], [peer], now)
 
     def receive(
-        self, line: Line, peer: Peer, frames: Sequence[ReceivedFrame], now: float,
+        self, line: Line, peer: Peer, frames: Sequence[Frame], now: float,
     ) -> None:
         """See :meth:`LineUser.receive`."""
         self._heard_at = now
         if self._duplicates is not None:
             self._faults.call(self._forward, line, peer, frames, now)
         self._received.add(
-            ((line, one) for one in frames if one[0].message_id in self._classes), now)
+            ((line, one) for one in frames if one.message_id in self._classes), now)
 
     @property
     def is_behind(self) -> bool:
         """See :meth:`LineUser.is_behind`."""
         return self._received.is_behind
 
-    def _take_received(self, received: tuple[Line, ReceivedFrame], now: float) -> None:
-        frame, sender = received[1]
+    def _take_received(self, received: tuple[Line, Frame], now: float) -> None:
+        frame = received[1]
         cls = self._classes[frame.message_id]
         if self._endpoint.inspect is not None:
             self._faults.call(self._endpoint.inspect, frame, cls)
-        message = decode(cls, frame.payload, sender)
+        message = decode(cls, frame.payload)
         if _frame_log.isEnabledFor(logging.DEBUG):
             _frame_log.debug('received from %s: %s', frame.source, line_of(message),
                              extra={'address': frame.source})
         self._faults.call(self._endpoint.receive, frame.source, message, now)
 
     def _forward(
-        self, line: Line, peer: Peer, frames: Sequence[ReceivedFrame], now: float,
+        self, line: Line, peer: Peer, frames: Sequence[Frame], now: float,
     ) -> None:
         # A neighbour that sends from another port than it listens on is one neighbour.
         peers = [other.others(peer, now) if other is line else other.peers(now)
                  for other in self._lines]
         if not any(peers):
             return
-        known = (frame for frame, _ in frames if frame.version <= self._version)
+        known = (frame for frame in frames if frame.version <= self._version)
         for towards, some in grouped(
                 (self._router.targets(frame, peers, now), frame) for frame in known):
             for other, receivers in zip(self._lines, towards, strict=False):

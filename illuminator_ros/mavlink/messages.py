@@ -64,15 +64,6 @@ def target_of(message: Message) -> Address:
     return Address(getattr(message, 'target_system', 0), getattr(message, 'target_component', 0))
 
 
-def sender_of(message: Message) -> int:
-    """
-    Return which of several senders with one address has sent a received message.
-
-    See :class:`~.statistics.SequenceCounter`, which distinguishes them by their sequence numbers.
-    """
-    return int(getattr(message, 'sender', 0))
-
-
 def result_name(result: int) -> str:
     """Return the name of a MAV_RESULT, for example ``MAV_RESULT_DENIED``; any int is accepted."""
     return entry_names('MAV_RESULT').get(result, f'MAV_RESULT {result} (unknown)')

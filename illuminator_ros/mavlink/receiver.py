@@ -42,9 +42,6 @@ BATCH_THRESHOLD = 1000.0
 BATCH_TIME = 0.02
 BATCH_SIZE = 128
 
-# A frame and its sender, see :class:`~.statistics.SequenceCounter`.
-ReceivedFrame = tuple[Frame, int]
-
 
 class _Wait(NamedTuple):
     """The wait for the rest of a frame: its position, the bytes taken by then, the time (s)."""
@@ -116,7 +113,7 @@ class Receiver:
         """Return the number of peers whose bytes are kept apart."""
         return len(self._streams)
 
-    def take(self, peer: Peer, data: bytes, now: float) -> list[ReceivedFrame] | None:
+    def take(self, peer: Peer, data: bytes, now: float) -> list[Frame] | None:
         """
         Return the frames to handle that bytes of a peer complete.
 
@@ -131,7 +128,7 @@ class Receiver:
             self._watch(peer, stream.decoder, now)
         return self._accept(peer, stream, frames, now)
 
-    def give_up(self, now: float) -> list[tuple[Peer, list[ReceivedFrame]]]:
+    def give_up(self, now: float) -> list[tuple[Peer, list[Frame]]]:
         """
         Return the frames behind beginnings of frames that are older than :data:`STALL`, by peer.
 
@@ -191,8 +188,8 @@ class Receiver:
 
     def _accept(
         self, peer: Peer, stream: _Stream, frames: Iterable[Frame | ForeignFrames], now: float,
-    ) -> list[ReceivedFrame] | None:
-        accepted: list[ReceivedFrame] = []
+    ) -> list[Frame] | None:
+        accepted: list[Frame] = []
         heard = set()
         own, duplicates = self._writer.sequences, self._duplicates
         # An unsigned frame is accepted where signing is off; this test saves a call.
@@ -213,7 +210,8 @@ class Receiver:
                     continue
             elif trusted and frame.signature is None or (verdict := self.signing.check(
                     frame, self._wall_clock())) is Verdict.ACCEPTED:
-                accepted.append((frame, self.traffic.count(frame)))
+                accepted.append(frame)
+                self.traffic.count(frame)
                 if duplicates is not None:
                     duplicates.add(frame.data, stream.path, now)
             else:

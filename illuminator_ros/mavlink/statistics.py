@@ -16,7 +16,6 @@
 
 from __future__ import annotations
 
-from array import array
 from dataclasses import dataclass, field
 from typing import NamedTuple
 
@@ -35,9 +34,6 @@ _CONSECUTIVE = bytes(range(256)) * 8
 # many frames, by at most this many.
 INTERLEAVED = 32
 CONTINUED = 4
-# Bits of the hash of a frame that are kept.
-_HASH_BITS = 24
-_HASH_MASK = (1 << _HASH_BITS) - 1
 # s
 RECENT = 10.0
 
@@ -73,12 +69,14 @@ class SourceCounts(NamedTuple):
 
 
 class _Place(NamedTuple):
-    """The state in which a sender left off, see the fields of :class:`SequenceCounter`."""
+    """
+    The state in which a sender left off, see the fields of :class:`SequenceCounter`.
 
-    sender: int
+    :param left_at: how many frames had been received by then.
+    """
+
     newest: int
     seen: int
-    contents: array[int] | None
     left_at: int
 
 
@@ -90,12 +88,9 @@ class SequenceCounter:
     A frame that comes twice is a duplicate and one that comes late is reordered; neither is a
     loss. A missing number is a loss only where each frame of the source should have come.
 
-    Two senders with one address count independently, so the numbers jump back and forth, or frames
-    with the same number differ.
+    Two senders with one address count independently, so the numbers jump back and forth.
 
     :ivar is_complete: whether each frame should have come, so that a missing one is lost.
-    :ivar sender: the number of the sender of the newest frame. A sender that was heard before
-        keeps its number; a sender that loses many frames gets a new one.
     """
 
     received: int = 0
@@ -103,12 +98,7 @@ class SequenceCounter:
     duplicate: int = 0
     reordered: int = 0
     is_complete: bool = True
-    sender: int = 0
-    _senders: int = 1
     _left: _Place | None = None
-    # By sequence number: how many frames had been received by then and, in the low bits, the hash;
-    # None while no hash is known. A dict takes 45 KB.
-    _contents: array[int] | None = None
     _newest: int = -1
     # The number that follows, -1 while that is not known.
     _next: int = -1
@@ -116,23 +106,15 @@ class SequenceCounter:
     _seen: int = 0
     _recent: Window = field(default_factory=Window, compare=False)
 
-    def add(self, sequence: int, content: int | None = None) -> None:
-        """
-        Take the number of a frame that has come.
-
-        :param content: a hash of the frame, None where it is not known.
-        """
+    def add(self, sequence: int) -> None:
+        """Take the number of a frame that has come."""
         self.received += 1
         if sequence == self._next:
             self._newest, self._next = sequence, (sequence + 1) & 0xFF
             self._seen = (self._seen << 1 | 1) & _ALL_SEEN
         else:
-            self._add_irregular(sequence, content)
+            self._add_irregular(sequence)
             self._next = (self._newest + 1) & 0xFF
-        if content is not None:
-            if self._contents is None:
-                self._contents = array('Q', bytes(256 * 8))
-            self._contents[sequence] = self.received << _HASH_BITS | content & _HASH_MASK
 
     def add_run(self, sequences: bytes | bytearray) -> None:
         """Take the numbers of frames, in order; consecutive ones, which most are, in one step."""
@@ -145,25 +127,22 @@ class SequenceCounter:
             for sequence in sequences:
                 self.add(sequence)
 
-    def _add_irregular(self, sequence: int, content: int | None) -> None:
+    def _add_irregular(self, sequence: int) -> None:
         if self._newest < 0:
             # The frames before the first one are not known, so they do not count as lost.
             self._newest, self._seen = sequence, _ALL_SEEN
             return
         back = (self._newest - sequence) & 0xFF
-        is_seen = back < WINDOW and bool(self._seen >> back & 1)
-        if is_seen and not self._differs(sequence, content):
+        if back < WINDOW and self._seen >> back & 1:
             self.duplicate += 1
             return
-        is_late = back < WINDOW and not is_seen
-        if not is_late and self._return_to_left(sequence):
+        if back >= WINDOW and self._return_to_left(sequence):
             back = (self._newest - sequence) & 0xFF
-        elif is_seen or back >= WINDOW and 256 - back > WINDOW:
+        elif back >= WINDOW and 256 - back > WINDOW:
             # The frame is of another sender, or comes after a long loss.
-            self.lost += 255 - back if not is_seen and back >= 128 else 0
+            self.lost += 255 - back if back >= 128 else 0
             self._left = self._place()
-            self.sender, self._senders = self._senders, self._senders + 1
-            self._newest, self._seen, self._contents = sequence, _ALL_SEEN, None
+            self._newest, self._seen = sequence, _ALL_SEEN
             return
         if back < WINDOW:
             self._seen |= 1 << back
@@ -175,16 +154,8 @@ class SequenceCounter:
             self._seen = (self._seen << ahead | 1) & _ALL_SEEN
             self._newest = sequence
 
-    def _differs(self, sequence: int, content: int | None) -> bool:
-        """Return whether an earlier frame with this number had another content."""
-        known = self._contents[sequence] if self._contents else 0
-        if content is None or not known:
-            return False
-        return ((known ^ content) & _HASH_MASK != 0
-                and self.received - (known >> _HASH_BITS) <= 2 * WINDOW)
-
     def _place(self) -> _Place:
-        return _Place(self.sender, self._newest, self._seen, self._contents, self.received)
+        return _Place(self._newest, self._seen, self.received)
 
     def _return_to_left(self, sequence: int) -> bool:
         """Return to the sender before if its numbers continue; return whether they do."""
@@ -196,14 +167,13 @@ class SequenceCounter:
         if continues or not continues_left:
             return False
         self._left = self._place()
-        self.sender, self._newest, self._seen, self._contents, _ = left
+        self._newest, self._seen, _ = left
         return True
 
     def restart(self) -> None:
         """Forget the numbers but not the counts: the next frame has no predecessor."""
         self._newest = self._next = -1
         self._left = None
-        self._contents = None
 
     def reset_loss(self) -> None:
         """Forget recent losses: the sequence numbers of the sender have restarted."""
@@ -266,14 +236,12 @@ class Traffic:
             self.frames_received, self.frames_sent, self.frames_dropped, received_rate, sent_rate,
             {source: counter.snapshot(now) for source, counter in self.sources.items()})
 
-    def count(self, frame: Frame) -> int:
-        """Count a frame, and return its sender; see :class:`SequenceCounter`."""
+    def count(self, frame: Frame) -> None:
+        """Count a frame."""
         self.frames_received += 1
         counter = self._counter_of(frame.source)
-        if counter is None:
-            return 0
-        counter.add(frame.sequence, hash((frame.message_id, frame.payload)))
-        return counter.sender
+        if counter is not None:
+            counter.add(frame.sequence)
 
     def count_run(self, source: Address, sequences: bytes | bytearray) -> None:
         """

@@ -20,9 +20,10 @@ from collections.abc import Collection
 import math
 
 from illuminator_ros.mavlink.dialect import CRC_EXTRA
+from illuminator_ros.mavlink.frame import Frame
 from illuminator_ros.mavlink.frame_writer import FrameWriter
 from illuminator_ros.mavlink.messages import Address
-from illuminator_ros.mavlink.receiver import MAX_DECODERS, ReceivedFrame, Receiver, STALL
+from illuminator_ros.mavlink.receiver import MAX_DECODERS, Receiver, STALL
 from illuminator_ros.mavlink.signing import Signing, SigningMode
 import pytest
 from support.frames import frame_of, heartbeat_frame, LIGHT, raw_v1
@@ -42,8 +43,8 @@ def receiver() -> Receiver:
     return make(Signing())
 
 
-def sources(frames: list[ReceivedFrame] | None) -> list[Address]:
-    return [frame.source for frame, _ in frames or ()]
+def sources(frames: list[Frame] | None) -> list[Address]:
+    return [frame.source for frame in frames or ()]
 
 
 def test_pieces_are_put_together_for_each_peer_and_counted_over_all(receiver: Receiver) -> None:

@@ -60,28 +60,17 @@ def test_lost_duplicate_and_reordered_frames_are_counted_apart(
     assert counts(after(sequences)) == expected
 
 
-@pytest.mark.parametrize(('frames', 'senders', 'lost'), [
-    # Numbers far apart; the first jump looks like a loss.
-    ([(10, 0), (100, 0), (11, 1), (101, 1), (13, 2), (102, 2), (14, 3)], '0101010', 90),
-    ([(10, 0), (200, 0), (11, 1), (201, 1), (12, 2)], '01010', 0),
-    # Equal numbers: different frames are of two senders, equal frames are one frame.
-    ([(10, 1), (10, 1), (11, 2), (11, 3), (12, 4), (12, 5), (13, 6)], '0001100', 0),
-    # One sender: repeated, late and lost frames, a restart, and unknown contents.
-    ([(10, 1), (10, 1), (12, 3), (11, 2), (11, 2), (40, 4)], '000000', 27),
-    ([(10, 1), (9, 2), (11, 3)], '000', 0),
-    ([(10, 1), (11, 2), (200, 3), (201, 4), (202, 5)], '00111', 0),
-    # A frame later than the window; late frames after it do not switch the sender again.
-    ([*((number, number) for number in range(100, 195) if number not in (129, 192)),
-      (129, 129), (192, 192), (200, 200), (196, 196), (201, 201)], '0' * 93 + '1' * 5, 70),
-    ([(10, None), (10, None), (9, None), (11, None)], '0000', 0),
-    ([*((number % 256, number) for number in range(254, 600)), (80, 592)], '0' * 347, 0)])
-def test_senders_with_one_address_are_told_apart_by_numbers_and_contents(
-        frames: list[tuple[int, int | None]], senders: str, lost: int) -> None:
-    counter, found = statistics.SequenceCounter(), ''
-    for number, content in frames:
-        counter.add(number, content)
-        found += str(counter.sender)
-    assert (found, counter.lost) == (senders, lost)
+@pytest.mark.parametrize(('sequences', 'lost'), [
+    # The first jump looks like a loss, except to a number that is half of all ahead.
+    ([10, 100, 11, 101, 13, 102, 14], 90), ([10, 200, 11, 201, 12], 0),
+    # One sender: a late frame within the window, and one later than that; the late frames after it
+    # do not switch to the other numbers again.
+    ([10, 10, 12, 11, 11, 40], 27),
+    ([*(number for number in range(100, 195) if number not in (129, 192)), 129, 192, 200, 196,
+      201], 70)])
+def test_senders_with_one_address_count_their_losses_apart(
+        sequences: Iterable[int], lost: int) -> None:
+    assert after(sequences).lost == lost
 
 
 @st.composite
@@ -200,7 +189,7 @@ def test_sources_beyond_the_bound_count_in_the_total_only(in_runs: bool) -> None
         if in_runs:
             traffic.count_run(source, bytes((sequence,)))
         else:
-            assert traffic.count(Frame(2, sequence, source, 0, b'')) == 0
+            traffic.count(Frame(2, sequence, source, 0, b''))
 
     for number in range(2 * statistics.MAX_SOURCES):
         count(Address(2 + number // 256, number % 256), 0)

@@ -28,7 +28,6 @@ from illuminator_ros.mavlink import messages as mav
 from illuminator_ros.mavlink.component import Endpoint
 from illuminator_ros.mavlink.dialect import decode
 from illuminator_ros.mavlink.frame import Decoder
-from illuminator_ros.mavlink.statistics import Traffic
 from illuminator_ros.payload.confirmed_command import Result
 from illuminator_ros.payload.device_events import DeviceFound
 from illuminator_ros.simulation.simulated import SimulatedComponent, SimulatedComponents
@@ -56,7 +55,6 @@ class _End:
         self.sent: list[tuple[float, Any]] = []
         self.received: list[tuple[float, mav.Address, Any]] = []
         self._codec = Codec()
-        self._traffic = Traffic()
 
     def flush(self, now: float) -> None:
         while self.endpoint.outgoing:
@@ -70,7 +68,7 @@ class _End:
         for frame in self.decoder.feed(data):
             cls = self.classes.get(frame.message_id)
             if cls is not None:
-                message = decode(cls, frame.payload, self._traffic.count(frame))
+                message = decode(cls, frame.payload)
                 self.received.append((now, frame.source, message))
                 self.endpoint.receive(frame.source, message, now)
                 self.flush(now)

@@ -27,9 +27,10 @@ from typing import Any
 from .ports import users_of
 from ..arguments import invocation
 from ...mavlink.dialect import CRC_EXTRA, decode
+from ...mavlink.frame import Frame
 from ...mavlink.frame_writer import FrameWriter
 from ...mavlink.messages import Address, Heartbeat
-from ...mavlink.receiver import ReceivedFrame, Receiver
+from ...mavlink.receiver import Receiver
 from ...mavlink.signing import Signing
 from ...mavlink.statistics import MAX_SOURCES
 from ...mavlink.transport import Channel, open_channel
@@ -152,8 +153,8 @@ class Port:
         except OSError as error:
             self.close(f'lost: {error.strerror or error}')
 
-    def _take(self, frames: Iterable[ReceivedFrame]) -> None:
-        for frame, _ in frames:
+    def _take(self, frames: Iterable[Frame]) -> None:
+        for frame in frames:
             if frame.source not in self.components and len(self.components) >= MAX_SOURCES:
                 continue
             one = self.components.setdefault(frame.source, Heard())
