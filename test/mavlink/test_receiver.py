@@ -53,7 +53,7 @@ def test_pieces_are_put_together_for_each_peer_and_counted_over_all(receiver: Re
         assert receiver.take(peer, frame[:9], 0.0) is None
     for peer, frame in frames.items():
         assert sources(receiver.take(peer, frame[9:], 0.1)) == [Address(1, peer)]
-    assert receiver.counters.frames == 2
+    assert receiver.traffic.frames_received == 2
 
 
 @pytest.mark.parametrize('noise', [*FALSE_STARTS, b''.join(FALSE_STARTS * 5)])
