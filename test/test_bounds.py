@@ -26,7 +26,7 @@ from unittest.mock import Mock
 
 from illuminator_ros.cli.discover.port import Port
 from illuminator_ros.gimbal.manager_state import MAX_OTHER_DEVICES
-from illuminator_ros.illuminator.light import LightSettings
+from illuminator_ros.illuminator.light_control import LightSettings
 from illuminator_ros.illuminator.mount_orientation import MAX_MOUNTS, MountOrientations
 from illuminator_ros.illuminator.simulated import SimulatedIlluminator
 from illuminator_ros.illuminator.simulated_properties import (
@@ -118,7 +118,7 @@ def requests() -> object:
     client = Client(OURS, LightSettings())
     link = linked(client, frame_of(status_message(100)))
     light = client.lights[LIGHT]
-    link.ask(lambda now: [light.enable(True, now, lambda result, now: None)
+    link.ask(lambda now: [light.control.enable(True, now, lambda result, now: None)
                           for _ in range(COUNT)])
     return link
 

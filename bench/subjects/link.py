@@ -25,7 +25,7 @@ import tempfile
 import time
 
 from illuminator_ros.illuminator.events import LightEvent, StatusReceived
-from illuminator_ros.illuminator.light import LightSettings
+from illuminator_ros.illuminator.light_control import LightSettings
 from illuminator_ros.illuminator.messages import IlluminatorStatus
 from illuminator_ros.mavlink.dialect import mavlink
 from illuminator_ros.mavlink.messages import Address, heartbeat

@@ -22,7 +22,8 @@ import itertools
 
 from .commands import SWITCHES
 from .events import LightEvent
-from .light import Light, LightSettings
+from .light import Light
+from .light_control import LightSettings
 from .messages import IlluminatorStatus
 from .model import Status
 from .mount_orientation import MountOrientations
@@ -35,7 +36,6 @@ from ..mavlink.messages import (
     ComponentInformationBasic,
     Heartbeat,
     Message,
-    target_of,
 )
 from ..payload.confirmed_command import Done, Result
 from ..payload.discovery import Discovery
@@ -89,10 +89,10 @@ class IlluminatorClient(Payload):
         return [self.lights[address] for address in sorted(self.lights)]
 
     def change_settings(self, settings: LightSettings, now: float) -> None:
-        """Take other settings, see :meth:`Light.change_settings`."""
+        """Take other settings, see :meth:`.light_control.LightControl.change_settings`."""
         self.settings = settings
         for light in self.discovery:
-            light.change_settings(settings, now)
+            light.control.change_settings(settings, now)
 
     def _make(self, address: Address) -> Light:
         def emit(event: LightEvent) -> None:
@@ -143,8 +143,7 @@ class IlluminatorClient(Payload):
                 light.heard(now)
             elif isinstance(message, CommandAck):
                 # An answer announces it: a heartbeat alone proves nothing.
-                if target_of(message).includes(self._commands.address):
-                    self.discovery.prove(source, now)
+                self.discovery.prove(source, now)
             elif isinstance(message, ComponentInformationBasic):
                 self.discovery.prove(source, now)
                 light.take_identity(Identity.from_message(message), now)
@@ -162,14 +161,18 @@ class IlluminatorClient(Payload):
     def switch_off_finally(
         self, now: float, report: Callable[[Light, Result, float], None],
     ) -> None:
-        """Switch off all lights, and those found later; see :meth:`Light.switch_off_finally`."""
+        """
+        Switch off all lights, and those found later.
+
+        See :meth:`.light_control.LightControl.switch_off_finally`.
+        """
         self._report_off = report
         for light in self.lights_by_address:
             self._switch_off_finally(light, now)
 
     def _switch_off_finally(self, light: Light, now: float) -> None:
         if self._report_off is not None:
-            light.switch_off_finally(now, functools.partial(self._report_off, light))
+            light.control.switch_off_finally(now, functools.partial(self._report_off, light))
 
     def poll(self, now: float) -> None:
         """See :meth:`Payload.poll`."""
@@ -192,7 +195,7 @@ def enable_all(
         one light is connected and all connected lights succeeded; the message has the outcome of
         each light.
     :param name: returns the name of a light, for people.
-    :param detail: as for :meth:`Light.enable`, and ``is_stream``.
+    :param detail: as for :meth:`.light_control.LightControl.enable`, and ``is_stream``.
     """
     connected = [light for light in lights if light.connected]
     outcomes: dict[Light, Result] = {}
@@ -205,8 +208,8 @@ def enable_all(
 
     # A lost light fails at once, but an OFF replaces a remembered ON.
     for light in lights:
-        light.enable(on, now, functools.partial(outcome, light), detail=detail,
-                     is_stream=is_stream)
+        light.control.enable(on, now, functools.partial(outcome, light), detail=detail,
+                             is_stream=is_stream)
 
 
 def _summary(

@@ -21,7 +21,7 @@ are required (restored after a restart, overrides, limits), and the agreed ones 
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Collection, Iterable
 from dataclasses import dataclass, field, replace
 from enum import Enum
 import math
@@ -40,7 +40,6 @@ from .model import (
     StrobeRange,
     unexpected_differences,
 )
-from ..mavlink.messages import Address
 from ..mavlink.retries import REQUIRED, Retries
 from ..payload.confirmed_command import Change, Result, Target
 from ..payload.device_property import Caller, Desired, Outcome, Property
@@ -56,6 +55,11 @@ LIMIT_INTERVAL = 10.0
 IMPLIED_TIME = 2.0
 # %; set together with a strobe period where the duty cycle is 0, at which a light does not strobe.
 DEFAULT_DUTY_CYCLE = 50.0
+# The reasons of values that no request asks for.
+_REQUIRED, _SETPOINT = 'required values', 'a setpoint'
+# Of a request that is refused before a command is made.
+NOTHING_CHANGED = Configure(NOTHING, [])
+NO_FAILURE = ('', None, None)
 
 
 class Reason(Enum):
@@ -82,26 +86,22 @@ class Required:
     is_tried: bool = False
     failure: str = ''
 
-    @property
-    def values(self) -> dict[str, float]:
-        """Return the values by field."""
-        return {name: value for name, (value, _) in self.fields.items()}
-
     def drop(self, names: Iterable[str]) -> None:
         """Require some fields no more."""
         for name in names:
             self.fields.pop(name, None)
         if not self.fields:
-            self.retries, self.is_tried, self.failure = Retries(REQUIRED, math.inf), False, ''
+            self.is_tried, self.failure = False, ''
+
+    def with_reason(self, reason: Reason) -> list[str]:
+        """Return the fields that are required for a reason."""
+        return [name for name, (_, one) in self.fields.items() if one is reason]
 
     def merged(self, values: Changes, reason: Reason, due: float) -> Required:
         """Return these and other values; only restored ones do not replace those that wait."""
         newer = {name: (value, reason) for name, value in values.items()}
         return Required({**newer, **self.fields} if reason is Reason.RESTORED
                         else {**self.fields, **newer}, Retries(REQUIRED, due))
-
-
-NO_FAILURE = ('', None, None)
 
 
 class LightConfiguration:
@@ -114,7 +114,9 @@ class LightConfiguration:
     :ivar agreed: the configuration that the light last accepted from us or, if another sender has
         changed it since, last reported; None before either.
     :ivar exceeded: how the light exceeds the limits.
-    :ivar changes: the property of the light; :meth:`take_outcomes` returns its outcomes.
+    :ivar brightness_is_switch: whether a brightness above 0 switches the light on, as in ArduSub:
+        it reports 0 while it is off; None if unknown.
+    :ivar changes: the property of the light; :meth:`take` takes its outcomes.
     """
 
     def __init__(
@@ -123,12 +125,15 @@ class LightConfiguration:
     ) -> None:
         self.agreed: Configuration | None = None
         self.exceeded = events.LimitExceeded(target.address, (), '')
+        self.brightness_is_switch: bool | None = None
+        self.changes: Property[Status] = Property(target)
         self._emit = emit
         self._commands = target.commands
         self._limits = limits
         self._restores = restores
-        self.changes: Property[Status] = Property(target)
         self._required = Required({})
+        # When the required values are sent, infinity while none may be sent.
+        self._due = math.inf
         self._setpoint: float | None = None
         # Small steps away from it add up to a change.
         self._reference: Configuration | None = None
@@ -136,8 +141,6 @@ class LightConfiguration:
         # and what the light showed instead.
         self._failure: tuple[str, Configuration | None, Status | None] = NO_FAILURE
         self._limited_at = -math.inf
-        # The brightness that it reports while it is off, None if unknown.
-        self._off_brightness: float | None = None
         self._is_off_pending = False
 
     # The desired value
@@ -150,33 +153,28 @@ class LightConfiguration:
 
         :raises InvalidValue: if the light must not get it.
         """
-        values = self._sendable()
-        if values and now >= self._required.retries.due:
+        if now >= self._due:
             return Desired(self._change({}), _REQUIRED)
-        if self._setpoint is not None and not (self._is_dark or self._must_wait):
+        if self._setpoint is not None and 'brightness' in self._sendable:
             return Desired(self._change({'brightness': self._setpoint}), _SETPOINT,
                            limit=CONFIGURE_LIMIT)
         return None
 
-    def _sendable(self) -> dict[str, float]:
-        """Return the required values that do not wait until the light is on."""
-        if not self._required.fields or self._must_wait:
-            return {}
-        values = self._required.values
-        if self._is_dark:
-            values.pop('brightness', None)
-        return values
-
     @property
-    def _must_wait(self) -> bool:
-        """Whether the process ends, or an OFF is under way that a brightness may undo."""
-        return bool(self._commands.refusal) or (
-            self._is_off_pending and self._off_brightness in (None, 0.0))
-
-    @property
-    def _is_dark(self) -> bool:
+    def _sendable(self) -> Collection[str]:
+        """Return the fields that may be sent now though no request asks for them."""
+        if self._commands.refusal or (
+                self._is_off_pending and self.brightness_is_switch is not False):
+            # The process ends, or the configuration may undo an OFF.
+            return ()
         status = self.changes.newest
-        return status is not None and status.is_dark
+        return FIELDS if status is None or not status.is_dark else [
+            name for name in FIELDS if name != 'brightness']
+
+    def _required_values(self) -> dict[str, float]:
+        """Return the required values that may be sent now."""
+        return {name: value for name, (value, _) in self._required.fields.items()
+                if name in self._sendable}
 
     def update(self, now: float, *, is_off_pending: bool) -> None:
         """
@@ -184,47 +182,65 @@ class LightConfiguration:
 
         :param is_off_pending: whether an OFF is under way, which a brightness may undo.
         """
-        self._is_off_pending = is_off_pending
-        if self.changes.desired is not None or not (
-                self._required.fields or self._setpoint is not None):
+        self._is_off_pending, self._due = is_off_pending, math.inf
+        if self.changes.desired is not None:
             return
-        self._check_required()
+        if self._required.fields:
+            self._check_required()
+            if self._required_values():
+                self._due = self._required.retries.due
+        setpoint = self._setpoint
+        if setpoint is None and now < self._due:
+            return
         try:
             desired = self.goal(now)
         except InvalidValue as error:
-            self._not_sent(str(error), now)
+            if now >= self._due:
+                self._not_sent(f'{", ".join(self._required.fields)} not sent: {error}', _REQUIRED)
+            else:
+                self._not_sent(str(error), _SETPOINT)
             return
         if desired is None:
             return
         if desired.reason == _SETPOINT:
-            value, self._setpoint = self._setpoint, None
-            if (self.agreed is not None and self.agreed.brightness == value
+            self._setpoint = None
+            if (self.agreed is not None and self.agreed.brightness == setpoint
                     and self.changes.unconfirmed(now) is None):
                 return
         else:
             self._required.is_tried = True
-            if any(reason is Reason.LIMIT for _, reason in self._required.fields.values()):
+            if self._required.with_reason(Reason.LIMIT):
                 self._limited_at = now
+        self._due = math.inf
         self.changes.want(desired, now)
 
     def _check_required(self) -> None:
         """Drop required values that are outside the range that the light reports."""
-        for name, value in self._required.values.items():
+        for name, (value, _) in list(self._required.fields.items()):
             try:
                 checked(name, value, self.strobe_range)
             except InvalidValue as error:
                 self._required.drop([name])
                 self._restored(False, str(error))
+                if self.agreed is not None and (status := self.changes.newest) is not None:
+                    # Other fields are sent with the value that the light has.
+                    kept = getattr(status.configuration(self.agreed), name)
+                    self._adopt(replace(self.agreed, **{name: kept}), events.ChangeCause.LIGHT)
 
-    def _not_sent(self, reason: str, now: float) -> None:
-        """Note that the goal cannot be sent before the first status."""
-        if self._required.values and now >= self._required.retries.due:
-            self._required.retries.due = math.inf
-            self._required.failure = f'{", ".join(self._required.values)} not sent: {reason}'
-            self._restored(False, self._required.failure)
-        elif self._setpoint is not None:
+    def _not_sent(self, message: str, reason: str, *callers: Caller) -> None:
+        """Note that the light must not get a value."""
+        if reason == _SETPOINT:
             self._setpoint = None
-            self._emit(events.SetpointFailed(self._address, reason))
+        self.changes.outcomes.append(Outcome(
+            Desired(NOTHING_CHANGED, reason), Result(False, message, permanent=not reason), None,
+            callers))
+
+    @property
+    def _under_way(self) -> Configure | None:
+        """Return the change that is under way, None if there is none."""
+        desired = self.changes.desired
+        return (desired.change if desired is not None and isinstance(desired.change, Configure)
+                else None)
 
     def _change(self, values: Changes) -> Configure:
         """
@@ -232,13 +248,11 @@ class LightConfiguration:
 
         :raises InvalidValue: if nothing is agreed yet and the values are not complete.
         """
-        desired, note = self.changes.desired, ''
-        names = [*values, *self._sendable()]
-        values = {**self._sendable(), **values}
-        base = self.agreed
-        if desired is not None and isinstance(desired.change, Configure):
+        values = {**self._required_values(), **values}
+        base, names, note = self.agreed, [*values], ''
+        if under_way := self._under_way:
             # A newer request carries the values of the one that it replaces.
-            base, names = desired.change.configuration, [*desired.change.names, *names]
+            base, names = under_way.configuration, [*under_way.names, *names]
         if base is None:
             if missing := [name for name in FIELDS if name not in values]:
                 raise InvalidValue(
@@ -248,34 +262,18 @@ class LightConfiguration:
         else:
             if (values.get('strobe_period') and 'strobe_duty_cycle' not in values
                     and not base.strobe_duty_cycle):
-                values = {**values, 'strobe_duty_cycle': DEFAULT_DUTY_CYCLE}
+                values['strobe_duty_cycle'] = DEFAULT_DUTY_CYCLE
                 names.append('strobe_duty_cycle')
                 note = ('strobe_duty_cycle was 0 %, at which the light does not strobe, and was '
                         f'set to {DEFAULT_DUTY_CYCLE:g} %')
-            goal = replace(self._within_range(base, values), **values)
+            # Under external sync a light may report the period of the signal, which it denies.
+            period = self.strobe_range.nearest(base.strobe_period)
+            goal = replace(base, **{'strobe_period': period, **values})
         # Each command is made here, so the limits apply to every command.
         limited = self._limits.clipped(goal, self.strobe_range)
         ordered = [name for name in FIELDS
                    if name in names or name in goal.differences(limited)]
         return Configure(limited, ordered, note)
-
-    def _within_range(self, base: Configuration, changes: Changes) -> Configuration:
-        """
-        Return a configuration with reported values where its own are out of range.
-
-        Otherwise a light that once reported a value out of its range would deny every change.
-        """
-        status = self.changes.newest
-        if status is None:
-            return base
-        reported, ruled_out = status.configuration(base), {}
-        for name in FIELDS:
-            try:
-                if name != 'mode' and name not in changes:
-                    checked(name, getattr(base, name), self.strobe_range)
-            except InvalidValue:
-                ruled_out[name] = getattr(reported, name)
-        return replace(base, **ruled_out)
 
     # Requests
 
@@ -293,11 +291,9 @@ class LightConfiguration:
                 self._limits.check(name, value)
             change = self._change(values)
         except InvalidValue as error:
-            self.changes.outcomes.append(Outcome(
-                Desired(NOTHING_CHANGED), Result(False, str(error), permanent=True), None,
-                (caller,)))
-            return
-        self.changes.want(Desired(change, limit=CONFIGURE_LIMIT), now, caller)
+            self._not_sent(str(error), '', caller)
+        else:
+            self.changes.want(Desired(change, limit=CONFIGURE_LIMIT), now, caller)
 
     def set_brightness(self, brightness: float) -> None:
         """Take a setpoint of a stream, %, checked; the next update sends it."""
@@ -305,55 +301,34 @@ class LightConfiguration:
             self._limits.check('brightness', brightness)
         except InvalidValue as error:
             brightness = self._limits.max_brightness
-            self._emit(events.SetpointClipped(self._address, str(error)))
+            self._emit(events.SetpointClipped(self.exceeded.key, str(error)))
         self._setpoint = brightness
-        desired = self.changes.desired
-        if (desired is not None and desired.reason == _SETPOINT
-                and isinstance(desired.change, Configure)
-                and desired.change.configuration.brightness == brightness):
-            # A command with this value is under way; a setpoint that waits is outdated.
-            self._setpoint = None
 
     def require(self, values: Changes, now: float) -> None:
         """
-        Send overrides as soon as the light has reported its configuration.
+        Send overrides, and what is required already, once the light has reported its values.
 
-        :param values: by name, checked, except against the range that the light reports.
+        :param values: by name, checked, except against the range that the light reports; none if
+            the light is heard again.
         """
-        self._required = self._required.merged(values, Reason.OVERRIDE, self._first_due(now))
+        due = now if self.agreed else now + FIRST_STATUS_TIMEOUT
+        self._required = self._required.merged(values, Reason.OVERRIDE, due)
 
-    def _first_due(self, now: float) -> float:
-        return now if self.agreed else now + FIRST_STATUS_TIMEOUT
-
-    def found(self, now: float) -> None:
-        """Note that the light is heard again: required values are due."""
-        if self._required.fields:
-            self._required.retries = Retries(REQUIRED, self._first_due(now))
-
-    def cancel(self, message: str, now: float) -> None:
+    def cancel(self, message: str, now: float, *, superseded: bool = True) -> None:
         """End all requests; required values stay."""
+        if self._setpoint is not None and not superseded:
+            self._emit(events.SetpointFailed(self.exceeded.key, message))
         self._setpoint = None
-        self.changes.cancel(message, now, superseded=True)
-
-    def lost(self, message: str, now: float) -> None:
-        """End all requests, since the light is lost."""
-        if self._setpoint is not None:
-            self._setpoint = None
-            self._emit(events.SetpointFailed(self._address, message))
-        self.changes.cancel(message, now)
-
-    def close(self, message: str, now: float) -> None:
-        """End everything, since the process ends."""
-        self._required = Required({})
-        self.cancel(message, now)
+        self.changes.cancel(message, now, superseded=superseded)
 
     def change_limits(self, limits: SafetyLimits, now: float) -> None:
         """Replace the limits, and bring a light that exceeds them back within them."""
-        self._limits, self._limited_at = limits, -math.inf
-        self._drop_limits()
+        # The next update sends what they demand.
+        self._limits, self._limited_at, self._due = limits, -math.inf, -math.inf
+        self._required.drop(self._required.with_reason(Reason.LIMIT))
         desired = self.changes.desired
-        if desired is not None and isinstance(desired.change, Configure):
-            goal = desired.change.configuration
+        if desired is not None and (under_way := self._under_way):
+            goal = under_way.configuration
             limited = limits.clipped(goal, self.strobe_range)
             if limited != goal or desired.reason == _REQUIRED:
                 # A resend would exceed the limits. The newest setpoint is sent as the limit.
@@ -362,18 +337,11 @@ class LightConfiguration:
                 self.changes.cancel(
                     ', '.join(limits.excess(goal)) or 'a limit was changed', now,
                     superseded=bool(desired.reason))
-        if status := self.changes.newest:
-            self._keep_limits(status, now)
-
-    def _drop_limits(self) -> None:
-        self._required.drop([name for name, (_, reason) in self._required.fields.items()
-                             if reason is Reason.LIMIT])
+        status = self.changes.newest
+        if status is not None and (self.agreed or status.complete):
+            self._keep_limits(status.configuration(self.agreed or NOTHING), now)
 
     # Known facts
-
-    @property
-    def _address(self) -> Address:
-        return self.exceeded.key
 
     @property
     def strobe_range(self) -> StrobeRange:
@@ -386,15 +354,10 @@ class LightConfiguration:
         """Why the light does not have a configuration that it should have, '' if it has."""
         return self._required.failure or self._failure[0]
 
-    @property
-    def brightness_is_switch(self) -> bool:
-        """Whether a brightness above 0 switches the light on, as in ArduSub."""
-        return self._off_brightness == 0.0
-
     def may_switch(self, now: float) -> bool:
         """Return whether a command of ours may have switched the light by its brightness."""
-        return self.brightness_is_switch and (
-            self.changes.is_busy or now <= self.changes.sent_at + IMPLIED_TIME)
+        return bool(self.brightness_is_switch) and (
+            self.changes.command is not None or now <= self.changes.sent_at + IMPLIED_TIME)
 
     def excess(self, status: Status) -> tuple[str, ...]:
         """Describe how a status exceeds the limits."""
@@ -411,72 +374,71 @@ class LightConfiguration:
         :param can_follow: whether the parameters follow what it shows.
         :param switched_at: when the light was last switched by us, s.
         """
-        was_pending = self.changes.is_busy
-        if status.enabled is False:
-            self._off_brightness = status.brightness
-        late = self.changes.unconfirmed(now)
+        if status.enabled is False and status.brightness is not None:
+            self.brightness_is_switch = status.brightness == 0.0
+        was_busy, late = self.changes.command is not None, self.changes.unconfirmed(now)
         self.changes.reported(status, now)
-        if not was_pending:
-            self._compare(status, now, late=late, can_follow=can_follow, switched_at=switched_at)
-        self._keep_limits(status, now)
+        self._compare(status, now, None if was_busy else (can_follow, late, switched_at))
 
     def restarted(self, status: Status, now: float) -> None:
         """Take the first status after a restart: the configuration may be lost."""
-        desired, wanted = self.changes.desired, self.agreed
-        if desired is not None and isinstance(desired.change, Configure):
-            # A set ends before the fence of the restart, and its values must not be lost with it.
-            wanted = desired.change.configuration
+        under_way = self._under_way
+        # A set ends before the fence of the restart, and its values must not be lost with it.
+        wanted = under_way.configuration if under_way else self.agreed
         if self._restores and wanted is not None:
             values = {name: getattr(wanted, name) for name in FIELDS
                       if name != 'mode' or wanted.mode}
             self._required = self._required.merged(values, Reason.RESTORED, now)
         else:
             # The light has other values now.
-            self._drop_limits()
+            self._required.drop(self._required.with_reason(Reason.LIMIT))
         self._limited_at = -math.inf
         self.changes.restarted(status, now)
-        if desired is None:
-            self._compare(status, now, late=None, can_follow=True, switched_at=-math.inf)
-        self._keep_limits(status, now)
+        self._compare(status, now, None if under_way else (True, None, -math.inf))
 
     def _compare(
-        self, status: Status, now: float, *, late: Change[Status] | None, can_follow: bool,
-        switched_at: float,
+        self, status: Status, now: float,
+        unchanged: tuple[bool, Change[Status] | None, float] | None,
     ) -> None:
-        """Compare a status with what was agreed and with what is required."""
+        """
+        Compare a status with what was agreed, with what is required, and with the limits.
+
+        :param unchanged: if no command was under way: whether the parameters follow the status,
+            the change of ours that may have a late effect, and when we switched the light, s.
+        """
         if self.agreed is None and not status.complete:
             return
         reported = status.configuration(self.agreed or NOTHING)
-        _, goal, instead = self._failure
-        # It was applied late, or another sender has replaced it.
-        if goal is not None and instead is not None and (
-                not _differ(goal, status) or _differ(instead.configuration(NOTHING), status)):
-            self._failure = NO_FAILURE
-        if self.agreed is None:
-            self._adopt(reported, events.ChangeCause.FIRST_STATUS)
-            if self._required.fields:
+        if unchanged is not None:
+            can_follow, late, switched_at = unchanged
+            _, goal, instead = self._failure
+            # It was applied late, or another sender has replaced it.
+            if goal is not None and instead is not None and (
+                    not _differ(goal, status) or _differ(instead.configuration(NOTHING), status)):
+                self._failure = NO_FAILURE
+            if self.agreed is None:
+                self._adopt(reported, events.ChangeCause.FIRST_STATUS)
                 self._required.retries.due = min(self._required.retries.due, now)
-        self._drop_shown(status, reported)
-        if can_follow:
-            self._follow(status, reported, now, late=late, switched_at=switched_at)
+            if self._required.fields:
+                self._drop_shown(status, reported)
+            if can_follow and reported != self.agreed:
+                self._follow(status, reported, now, late=late, switched_at=switched_at)
+        if self.exceeded.excess or self._limits != SafetyLimits():
+            self._keep_limits(reported, now)
 
     def _drop_shown(self, status: Status, reported: Configuration) -> None:
         """Drop the required values that a status shows; overrides are sent once nevertheless."""
-        required = self._required
-        if not required.fields:
-            return
+        required, was_tried = self._required, self._required.is_tried
         assert self.agreed is not None
-        values: Changes = required.values
+        values: Changes = {name: value for name, (value, _) in required.fields.items()}
         goal = self._limits.clipped(replace(self.agreed, **values), self.strobe_range)
-        hidden = {'brightness'} if status.is_dimmed else set()
-        shown = [name for name, (_, reason) in required.fields.items()
-                 if name not in {*goal.differences(reported), *hidden}
-                 and (required.is_tried or reason is not Reason.OVERRIDE)]
-        was_tried = required.is_tried
+        hidden = [*goal.differences(reported), *(['brightness'] if status.is_dimmed else [])]
+        if not was_tried:
+            hidden += required.with_reason(Reason.OVERRIDE)
+        shown = [name for name in FIELDS if name in required.fields and name not in hidden]
         required.drop(shown)
         if was_tried and not required.fields:
-            text = goal.describe([name for name in FIELDS if name in shown])
-            self._restored(True, f'{text}, {CONFIRMED}')
+            self._restored(True, f'{goal.describe(shown)}, {CONFIRMED}')
 
     def _follow(
         self, status: Status, reported: Configuration, now: float, *,
@@ -484,9 +446,7 @@ class LightConfiguration:
     ) -> None:
         """Follow a change that no command under way has made."""
         assert self.agreed is not None
-        waiting = set() if self._required.is_tried else {
-            name for name, (_, reason) in self._required.fields.items()
-            if reason is Reason.RESTORED}
+        waiting = [] if self._required.is_tried else self._required.with_reason(Reason.RESTORED)
         flags = status.error_flags
         names = [name for name in unexpected_differences(self.agreed, reported, flags, step=False)
                  if name not in waiting]
@@ -513,53 +473,44 @@ class LightConfiguration:
         names = [name for name in FIELDS
                  if old is None or getattr(old, name) != getattr(configuration, name)]
         if names:
-            self._emit(events.ConfigurationChanged(self._address, configuration, names, cause))
+            self._emit(events.ConfigurationChanged(self.exceeded.key, configuration, names, cause))
 
-    def _keep_limits(self, status: Status, now: float) -> None:
+    def _keep_limits(self, reported: Configuration, now: float) -> None:
         """Bring a light that exceeds a limit back within it."""
-        if self._limits == SafetyLimits() and not self.exceeded.excess or not (
-                self.agreed or status.complete):
-            return
-        reported = status.configuration(self.agreed or NOTHING)
         excess = self._limits.excess(reported)
         is_again = bool(excess) and (
             self.exceeded.is_again if self.exceeded.excess
             else now < self._limited_at + LIMIT_INTERVAL)
         exceeded = events.LimitExceeded(
-            self._address, excess, self._limits.impossible(self.strobe_range), is_again)
+            self.exceeded.key, excess, self._limits.impossible(self.strobe_range), is_again)
         if exceeded != self.exceeded:
             self.exceeded = exceeded
             self._emit(exceeded)
         limited = self._limits.clipped(reported, self.strobe_range)
-        beyond = reported.differences(limited)
-        known = [name for name, (_, reason) in self._required.fields.items()
-                 if reason is Reason.LIMIT]
+        beyond, known = reported.differences(limited), self._required.with_reason(Reason.LIMIT)
         self._required.drop([name for name in known if name not in beyond])
         values = {name: getattr(limited, name) for name in beyond if name not in known}
-        if excess and values and not self.changes.is_busy:
+        if excess and values and self.changes.command is None:
             self._required = self._required.merged(
                 values, Reason.LIMIT, max(now, self._limited_at + LIMIT_INTERVAL))
 
     # Outcomes
 
-    def take_outcomes(self, now: float) -> Iterator[Outcome[Status]]:
-        """Return what has ended."""
-        while self.changes.outcomes:
-            outcome = self.changes.outcomes.popleft()
-            desired, result, change = outcome.desired, outcome.result, outcome.desired.change
-            assert isinstance(change, Configure)
-            if result.success:
-                self._accepted(change.configuration, outcome.status)
-                self._required.drop([
-                    name for name, value in self._required.values.items()
-                    if name in change.names or value == getattr(change.configuration, name)])
-            elif result.contradicted:
-                self._failure = result.message, change.configuration, self.changes.newest
-            if desired.reason == _REQUIRED and not result.superseded:
-                self._required_ended(result, now)
-            elif desired.reason == _SETPOINT and not (result.success or result.superseded):
-                self._emit(events.SetpointFailed(self._address, result.message))
-            yield outcome
+    def take(self, outcome: Outcome[Status], now: float) -> None:
+        """Take the end of a value."""
+        desired, result, change = outcome.desired, outcome.result, outcome.desired.change
+        assert isinstance(change, Configure)
+        if result.success:
+            self._accepted(change.configuration, outcome.status)
+            self._required.drop([
+                name for name, (value, _) in [*self._required.fields.items()]
+                if name in change.names or value == getattr(change.configuration, name)])
+        elif result.contradicted:
+            self._failure = result.message, change.configuration, self.changes.newest
+        if desired.reason == _REQUIRED and not result.superseded:
+            self._required_ended(result, now)
+        elif desired.reason == _SETPOINT and not (result.success or result.superseded):
+            self._emit(events.SetpointFailed(self.exceeded.key, result.message))
 
     def _accepted(self, goal: Configuration, status: Status | None) -> None:
         """
@@ -593,22 +544,13 @@ class LightConfiguration:
             required.failure = result.message
 
     def _restored(self, success: bool, message: str, *, is_final: bool = True) -> None:
-        self._emit(events.ConfigurationRestored(self._address, success, message, is_final))
+        self._emit(events.ConfigurationRestored(self.exceeded.key, success, message, is_final))
 
     # Time
 
     def next_deadline(self) -> float:
         """Return when ``changes.poll`` or :meth:`update` has something to do."""
-        due = self.changes.next_deadline()
-        if self.changes.desired is None and self._sendable():
-            due = min(due, self._required.retries.due)
-        return due
-
-
-# The reasons of values that no request asks for.
-_REQUIRED, _SETPOINT = 'required values', 'a setpoint'
-# Of a request that is refused before a command is made.
-NOTHING_CHANGED = Configure(NOTHING, [])
+        return min(self.changes.next_deadline(), self._due)
 
 
 def _differ(configuration: Configuration, status: Status) -> bool:

@@ -117,6 +117,12 @@ class StrobeRange:
         low, high = self.min_strobe_period, self.max_strobe_period
         return 0 <= low <= high <= MAX_STROBE_PERIOD and high > 0
 
+    def nearest(self, period: float) -> float:
+        """Return the possible period, s, that is nearest to another one; 0 remains 0."""
+        if not (period and self.known):
+            return period
+        return min(max(period, shortest(self.min_strobe_period)), shortest(self.max_strobe_period))
+
 
 class InvalidValue(ValueError):
     """A value that the light must not get; the message names it and says why."""
@@ -303,8 +309,11 @@ class Status:
     def from_message(cls, message: IlluminatorStatus) -> Status:
         """Read a message. Any content is accepted: an invalid field is marked, not raised."""
         enabled, mode = _ENABLED.get(message.enable), _MODES.get(message.mode)
-        invalid = [f'{name} {getattr(message, name)}'
-                   for name, value in (('mode', mode), ('enable', enabled)) if value is None]
+        invalid = []
+        if mode is None:
+            invalid.append(f'mode {message.mode}')
+        if enabled is None:
+            invalid.append(f'enable {message.enable}')
         numbers: list[float | None] = []
         for name, (low, high) in _RANGES.items():
             number: float = getattr(message, name)

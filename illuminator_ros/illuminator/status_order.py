@@ -129,39 +129,37 @@ class ChangingStates:
 
     Several lights with one address cause that, or another controller.
 
-    :ivar until: the time until which the state counts as changing; infinity while it does not.
+    :ivar are_changing: whether the state goes back and forth.
+    :ivar until: the time until which it counts as changing; infinity while it does not.
     """
 
     def __init__(self) -> None:
+        self.are_changing = False
         self.until = math.inf
         self._states: deque[Status] = deque(maxlen=MAX_STATES)
         self._returns: deque[float] = deque(maxlen=MAX_RETURNS)
 
-    @property
-    def are_changing(self) -> bool:
-        """Whether the state goes back and forth."""
-        return self.until < math.inf
-
-    def take(self, status: Status, now: float, *, is_commanded: bool) -> None:
+    def take(self, status: Status, now: float, *, is_commanded: bool) -> bool:
         """
         Take a status that counts.
 
         :param is_commanded: whether a command of ours may have changed the light.
+        :return: whether it shows that the state has begun to go back and forth.
         """
+        were_changing = self.are_changing
         # Under external sync the output follows another signal, and heat dims.
         if status.is_dimmed or status.mode is Mode.EXTERNAL_SYNC:
-            return
-        if is_commanded and not self.are_changing:
+            return False
+        if is_commanded and not were_changing:
             self._states.clear()
         if self._states and status.shows_the_state_of(self._states[-1]):
-            return
-        known = next((one for one in self._states if status.shows_the_state_of(one)), None)
-        if known is None:
-            self._states.append(status)
-        else:
-            self._states.remove(known)
-            self._states.append(status)
+            return False
+        known = [*filter(status.shows_the_state_of, self._states)]
+        if known:
+            self._states.remove(known[0])
             self._returns.append(now)
-            if self.are_changing or (
+            if were_changing or (
                     len(self._returns) == MAX_RETURNS and now <= self._returns[0] + CALM_TIME):
-                self.until = now + CALM_TIME
+                self.are_changing, self.until = True, now + CALM_TIME
+        self._states.append(status)
+        return self.are_changing and not were_changing

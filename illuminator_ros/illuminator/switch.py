@@ -16,12 +16,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from dataclasses import dataclass
 import math
 
 from . import events
-from .commands import SWITCHES
+from .commands import OnOff, SWITCHES
 from .model import Mode, Status
 from ..mavlink.command_sender import format_seconds
 from ..mavlink.retries import UNCONFIRMED
@@ -63,7 +63,7 @@ class Switch:
     :ivar enabled: as reported, None if unknown; while heat keeps the light off, as before, since
         it may light up once it has cooled down.
     :ivar silence: of all who may request something.
-    :ivar changes: the property of the light; :meth:`take_outcomes` returns its outcomes.
+    :ivar changes: the property of the light; :meth:`take` takes its outcomes.
     """
 
     def __init__(
@@ -74,7 +74,6 @@ class Switch:
         self._emit = emit
         self.silence = Silence(off_after_silence)
         self.changes: Property[Status] = Property(target)
-        self._asked: Desired[Status] | None = None
         # The OFF of a release, until the light shows it.
         self._required: Desired[Status] | None = None
         # Takes the results of the OFF at the end of the process.
@@ -96,15 +95,15 @@ class Switch:
         if self._report is not None:
             is_due = self.enabled or not self._is_finally_off
             return Desired(OFF, 'the end', insists=True, is_last=True) if is_due else None
-        if now >= self.silence.ends_at and self.may_be_on(now):
+        if self.silence.limit and now >= self.silence.ends_at and self.may_be_on(now):
             return Desired(OFF, 'off_after_silence: no request for '
                            f'{format_seconds(self.silence.limit)}', insists=True)
-        return self._asked or self._required
+        return self.changes.desired or self._required
 
     def is_off_due(self, now: float) -> bool:
         """Return whether an OFF is desired that is not under way."""
         desired = self.goal(now)
-        return desired is not None and desired.change == OFF and not self.is_off_pending
+        return desired is not None and desired.change == OFF and not self.is_pending(OFF)
 
     def update(self, now: float) -> None:
         """Send what the goal asks for; the light must be connected."""
@@ -114,12 +113,13 @@ class Switch:
             # Two lights with one address end an OFF and need the next at the speed of the line.
             self._silence_due = self._off_due
             return
-        if desired is not None and (under_way is None or not under_way.equals(desired)):
+        if desired is not None and desired is not under_way and not (
+                under_way and under_way.equals(desired)):
             self._want(desired, now)
         command = self.changes.command
         if command is not None and command.terms.insists:
             self._tell_failure(command.failure(), now)
-        waits = self.silence.limit and self.may_be_on(now) and not self.is_off_pending
+        waits = self.silence.limit and self.may_be_on(now) and not self.is_pending(OFF)
         self._silence_due = self.silence.ends_at if waits else math.inf
 
     def _want(self, desired: Desired[Status], now: float, caller: Caller | None = None) -> None:
@@ -144,8 +144,7 @@ class Switch:
 
     def ask(self, on: bool, now: float, caller: Caller) -> None:
         """Switch the light on or off; the light must be connected."""
-        self._asked = Desired(SWITCHES[on])
-        self._want(self._asked, now, caller)
+        self._want(Desired(SWITCHES[on]), now, caller)
 
     def require_off(self, reason: str) -> None:
         """Switch the light off until it shows that, or a request switches it on."""
@@ -153,7 +152,6 @@ class Switch:
 
     def cancel(self, message: str, now: float, *, superseded: bool = False) -> None:
         """End the command under way; an automatic OFF is sent again by the next update."""
-        self._asked = None
         self.changes.cancel(message, now, superseded=superseded)
 
     def close(self, message: str, now: float) -> None:
@@ -162,21 +160,21 @@ class Switch:
         self.cancel(message, now, superseded=True)
 
     def switch_off_finally(self, now: float, report: Done) -> None:
-        """Switch the light off whenever it may be on; see :meth:`.light.Light.close`."""
+        """See :meth:`.light_control.LightControl.switch_off_finally`."""
         self._report, self._is_finally_off = report, False
         report(Result(False, 'sent, not confirmed' if now < self.changes.fence else ''), now)
 
     # Known facts
 
-    @property
-    def is_off_pending(self) -> bool:
-        """Whether an OFF is under way."""
-        return self.changes.is_pending(OFF)
+    def is_pending(self, change: OnOff) -> bool:
+        """Return whether a change is under way."""
+        desired = self.changes.desired
+        return desired is not None and desired.change == change
 
     def may_be_on(self, now: float) -> bool:
         """Return whether the light is on, or may go on by an ON of ours."""
         return bool(
-            self.enabled or self.changes.is_pending(ON)
+            self.enabled or self.is_pending(ON)
             or self.changes.unconfirmed(now) == ON
             and (self.enabled is None or now < self.changes.fence))
 
@@ -198,22 +196,24 @@ class Switch:
         """
         before, was_off_by_heat = self.enabled, self._is_off_by_heat
         self._take_enabled(status)
-        origin = (events.LATE_EFFECT if self._is_late(now) else
-                  events.A_REQUEST if may_be_ours else events.OTHER_SENDER)
-        if self.enabled is False and not self.changes.is_busy:
+        is_busy, origin = self.changes.command is not None, ''
+        if self.enabled is not before or self.enabled is not self._told:
+            origin = (events.LATE_EFFECT if self._is_late(now) else
+                      events.A_REQUEST if may_be_ours else events.OTHER_SENDER)
+        if self.enabled is False and not is_busy:
             self._required = None
-        elif self.enabled and is_told and not (self.changes.is_busy or was_off_by_heat) and (
+        elif self.enabled and is_told and not (is_busy or was_off_by_heat) and (
                 before is None or not before and origin == events.OTHER_SENDER):
             # Another sender has switched it on, or it was on when it was found.
             self.silence.requested_at = now
         self.changes.reported(status, now)
-        if not (self.changes.outcomes or self.changes.is_busy):
+        if origin and not (self.changes.outcomes or self.changes.command is not None):
             shows_switch = not (status.is_dimmed or status.mode is Mode.EXTERNAL_SYNC)
             self._tell(origin if is_told and shows_switch and self._told is not None else '')
 
     def _take_enabled(self, status: Status) -> None:
-        self._is_off_by_heat = status.is_off_by_heat or (
-            self._is_off_by_heat and not status.enabled)
+        self._is_off_by_heat = not status.enabled and (
+            self._is_off_by_heat or status.is_off_by_heat)
         if not self._is_off_by_heat:
             self.enabled = status.enabled
 
@@ -236,29 +236,23 @@ class Switch:
         self._tell('')
         self.changes.restarted(status, now)
 
-    def take_outcomes(self, now: float) -> Iterator[Outcome[Status]]:
-        """Return what has ended."""
-        while self.changes.outcomes:
-            outcome = self.changes.outcomes.popleft()
-            desired, result, on = outcome.desired, outcome.result, outcome.desired.change == ON
-            under_way = self.changes.desired
-            if self._asked and not (under_way and under_way.equals(self._asked)):
-                self._asked = None
-            if result.success:
-                self.enabled = on
-                self._required = None
-                self._is_finally_off = not on
-                self._off_due = now + UNCONFIRMED.first if not on else -math.inf
-                detail = next((one.detail for one in outcome.callers if one.detail), '')
-                self._tell(detail or desired.reason or events.A_REQUEST)
-                if self._report is not None and not on:
-                    self._report(result, now)
-            elif on and self._is_off_by_heat:
-                # It may light up once it has cooled down.
-                self.enabled = None
-            elif self._is_late(now):
-                self._tell(events.LATE_EFFECT)
-            yield outcome
+    def take(self, outcome: Outcome[Status], now: float) -> None:
+        """Take the end of a value."""
+        desired, result, on = outcome.desired, outcome.result, outcome.desired.change == ON
+        if result.success:
+            self.enabled = on
+            self._required = None
+            self._is_finally_off = not on
+            self._off_due = now + UNCONFIRMED.first if not on else -math.inf
+            detail = next((one.detail for one in outcome.callers if one.detail), '')
+            self._tell(detail or desired.reason or events.A_REQUEST)
+            if self._report is not None and not on:
+                self._report(result, now)
+        elif on and self._is_off_by_heat:
+            # It may light up once it has cooled down.
+            self.enabled = None
+        elif self._is_late(now):
+            self._tell(events.LATE_EFFECT)
 
     # Time
 

@@ -395,21 +395,24 @@ class CommandSender:
         """End a command with CANCELLED, if it has not ended."""
         self._end(sending, CommandStatus.CANCELLED, now)
 
-    def acknowledge(self, source: Address, ack: messages.CommandAck, now: float) -> None:
+    def acknowledge(self, source: Address, ack: messages.CommandAck, now: float) -> bool:
         """
         Receive a COMMAND_ACK.
 
         It counts if its source and command match a command that was sent, and if its target is our
         address or 0, since the extension fields may be missing.
+
+        :return: whether it is for our address.
         """
         if not messages.target_of(ack).includes(self.address):
-            return
+            return False
         self.version += 1
         self.unanswering.pop(source, None)
         for pending in self._pending.values():
             if pending.command.command == ack.command and pending.command.target == source:
                 self._answered(pending, ack, now)
-                return
+                break
+        return True
 
     def _answered(self, pending: Transmission, ack: messages.CommandAck, now: float) -> None:
         if (pending.state is CommandState.IN_PROGRESS

@@ -111,7 +111,8 @@ class Payload(MessageHandler):
     A part of a component: the client of a light, a winch, a camera ...
 
     It names HEARTBEAT among its ``messages`` if it needs heartbeats, and COMMAND_LONG and
-    COMMAND_INT if it executes commands. It receives no messages from the component's own address.
+    COMMAND_INT if it executes commands. It receives no messages from the component's own address,
+    and no acknowledgements for other components.
     All its commands have ended when :meth:`link_closed` is called.
     """
 
@@ -266,8 +267,8 @@ class Component(Endpoint):
             for payload in self._receivers.get(type(message), ()):
                 payload.receive_conflicting(message, now)
             return
-        if isinstance(message, CommandAck):
-            self.commands.acknowledge(source, message, now)
+        if isinstance(message, CommandAck) and not self.commands.acknowledge(source, message, now):
+            return
         if isinstance(message, AnyCommand):
             self._take_command(source, message, now)
             return

@@ -22,7 +22,7 @@ of the one here as soon as it has the same fields.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from functools import cache
+from functools import cache, partial
 from itertools import accumulate
 import struct
 from typing import Any, cast, TypeVar
@@ -98,7 +98,7 @@ def encode(message: mavlink.MAVLink_message) -> bytes:
     :raises struct.error: if a value does not fit into its field.
     """
     cls: Any = type(message)  # its __hash__ confuses mypy
-    values = [getattr(message, name) for name in _attributes(cls).values()]
+    values = [*map(partial(getattr, message), _attributes(cls).values())]
     if max(message.lengths) > 1:
         values = [one for value, length in zip(values, message.lengths, strict=True)
                   for one in (value if length > 1 else (value,))]
@@ -122,7 +122,7 @@ def decode(cls: type[M], payload: bytes) -> M:
         values = tuple(values[end - 1] if length == 1 else values[end - length:end]
                        for end, length in zip(ends, cls.lengths, strict=True))
     # The constructors of the classes have the fields as parameters.
-    return cast('Callable[..., M]', cls)(*[values[at] for at in cls.orders])
+    return cast('Callable[..., M]', cls)(*map(values.__getitem__, cls.orders))
 
 
 def replaced(message: M, **fields: Any) -> M:

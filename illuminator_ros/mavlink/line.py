@@ -49,7 +49,13 @@ _frame_log = logging.getLogger('illuminator_ros')
 
 
 class LineUser(ABC):
-    """The user of a line, which the line calls in the thread that waits with the selector."""
+    """
+    The user of a line, which the line calls in the thread that waits with the selector.
+
+    :ivar is_behind: whether it has not taken all received frames yet: no more must be read.
+    """
+
+    is_behind = False
 
     @abstractmethod
     def opened(self, now: float) -> None:
@@ -66,11 +72,6 @@ class LineUser(ABC):
     @abstractmethod
     def silent(self, line: Line, now: float) -> None:
         """Note that no peer is heard over an open line; repeated."""
-
-    @property
-    @abstractmethod
-    def is_behind(self) -> bool:
-        """Whether it has not taken all received frames yet: no more must be read."""
 
     @abstractmethod
     def behind(self, line: Line, peer: Peer, now: float) -> None:

@@ -16,6 +16,7 @@
 
 from __future__ import annotations
 
+from collections import deque
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 import logging
 import math
@@ -29,7 +30,7 @@ from .frame import Frame, MAX_ID_V1
 from .frame_writer import FrameWriter
 from .line import ANNOUNCE_INTERVAL, Line, LineUser, SILENCE
 from .link_state import LinkSnapshot
-from .link_thread import FaultLog, TurnQueue
+from .link_thread import FaultLog
 from .messages import Address
 from .receiver import Receiver
 from .routing_table import grouped, Router
@@ -50,9 +51,9 @@ class Lines(LineUser):
     All lines are equal. With one line nothing is forwarded, between its peers neither.
 
     :param urls: of each line, by its label.
-    :param call: calls a function in the thread of the link, given the time, s; ``call_first`` does
-        so before others that wait.
-    :param is_turn_over: returns whether no more messages must be taken in this turn of the thread.
+    :param call: calls a function in the thread of the link, given the time, s.
+    :param defer: if no more messages must be taken in this turn of the thread, has a function
+        called in the next turn before others that wait; returns whether it does.
     :param mavlink_version: 1 or 2, of the frames that are sent; both are received.
     :param wall_clock: s, Unix time, for the signing time stamps.
     :ivar forwarded_commands: the commands of others that were forwarded lately.
@@ -62,7 +63,7 @@ class Lines(LineUser):
     def __init__(
         self, urls: Sequence[tuple[str, Url]], endpoint: Endpoint, *, faults: FaultLog,
         selector: selectors.BaseSelector, call: Callable[[Callable[[float], None]], None],
-        call_first: Callable[[Callable[[float], None]], None], is_turn_over: Callable[[], bool],
+        defer: Callable[[Callable[[float], None]], bool],
         signing: Signing, mavlink_version: int, clock: Callable[[], float],
         wall_clock: Callable[[], float],
     ) -> None:
@@ -74,9 +75,9 @@ class Lines(LineUser):
         self._classes = {cls.id: cls for cls in endpoint.messages}
         self._faults = faults
         self._clock = clock
-        # Messages, of one read, and their lines.
-        self._received: TurnQueue[tuple[Line, Frame]] = TurnQueue(
-            self._take_received, call_first, is_turn_over)
+        self._defer = defer
+        # Frames of messages that were received, and their lines.
+        self._received: deque[tuple[Line, Frame]] = deque()
         self._version = mavlink_version
         self._duplicates = DuplicateFilter() if len(urls) > 1 else None
         self.forwarded_commands = ForwardedCommands()
@@ -168,7 +169,7 @@ class Lines(LineUser):
 
     def lost(self, heard: Sequence[Address], reason: str, now: float) -> None:
         """See :meth:`LineUser.lost`."""
-        self._received.keep(lambda one: one[0].is_open)
+        self._received = deque(one for one in self._received if one[0].is_open)
         if not any(line.is_open for line in self._lines):
             self._heard_at = -math.inf
             self._sender.clear()
@@ -212,16 +213,20 @@ class Lines(LineUser):
         self._heard_at = now
         if self._duplicates is not None:
             self._faults.call(self._forward, line, peer, frames, now)
-        self._received.add(
-            ((line, one) for one in frames if one.message_id in self._classes), now)
+        self._received += [(line, one) for one in frames if one.message_id in self._classes]
+        if not self.is_behind:
+            self._take_received(now)
 
-    @property
-    def is_behind(self) -> bool:
-        """See :meth:`LineUser.is_behind`."""
-        return self._received.is_behind
+    def _take_received(self, now: float) -> None:
+        """Take received messages while the turn of the thread lasts, others in its next turn."""
+        self.is_behind = False
+        while self._received:
+            if self._defer(self._take_received):
+                self.is_behind = True
+                return
+            self._take_frame(self._received.popleft()[1], now)
 
-    def _take_received(self, received: tuple[Line, Frame], now: float) -> None:
-        frame = received[1]
+    def _take_frame(self, frame: Frame, now: float) -> None:
         cls = self._classes[frame.message_id]
         if self._endpoint.inspect is not None:
             self._faults.call(self._endpoint.inspect, frame, cls)

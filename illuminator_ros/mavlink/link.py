@@ -77,9 +77,8 @@ class Link:
         self.lines = Lines(
             [(label, url), *further.items()], endpoint, faults=self._faults,
             selector=self._thread.selector, call=self._thread.call,
-            call_first=self._thread.call_first, is_turn_over=self._thread.is_turn_over,
-            signing=self._signing,
-            mavlink_version=mavlink_version, clock=clock, wall_clock=wall_clock)
+            defer=self._thread.defer, signing=self._signing, mavlink_version=mavlink_version,
+            clock=clock, wall_clock=wall_clock)
 
     # From any thread
 
@@ -127,7 +126,8 @@ class Link:
         if self.clock() >= due:
             self._poll()
             due = self._next_deadline()
-        self._thread.pause(self.lines.pause(now))
+        if seconds := self.lines.pause(now):
+            self._thread.pause(seconds)
         return due
 
     def _next_deadline(self) -> float:

@@ -17,7 +17,7 @@
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Callable, Iterable
+from collections.abc import Callable
 import contextlib
 import logging
 import math
@@ -27,9 +27,6 @@ import selectors
 import socket
 import threading
 import time
-from typing import Generic, TypeVar
-
-T = TypeVar('T')
 
 # s; the longest wait.
 MAX_WAIT = 10.0
@@ -136,52 +133,6 @@ class StallDetector:
         before, self._woken_at = self._woken_at, self._monotonic()
         stall = self._woken_at - before - seconds
         return stall if stall > STALL_TIME else 0.0
-
-
-class TurnQueue(Generic[T]):
-    """
-    Entries that the thread of a link handles while its turn lasts, the rest in its next turn.
-
-    :param handle: handles an entry, given the time, s.
-    :param call_first: has a function called in the next turn, before the calls that wait.
-    :param is_turn_over: returns whether this turn must handle no more entries.
-    :ivar is_behind: whether the next turn goes on.
-    """
-
-    def __init__(
-        self, handle: Callable[[T, float], None],
-        call_first: Callable[[Callable[[float], None]], None], is_turn_over: Callable[[], bool],
-    ) -> None:
-        self.is_behind = False
-        self._handle = handle
-        self._call_first = call_first
-        self._is_turn_over = is_turn_over
-        self._entries: deque[T] = deque()
-
-    def add(self, entries: Iterable[T], now: float) -> None:
-        """Handle entries, after those that wait."""
-        self._entries += entries
-        if not (self.is_behind or self._must_wait()):
-            self._work(now)
-
-    def keep(self, is_kept: Callable[[T], bool]) -> None:
-        """Drop the other entries that wait."""
-        self._entries = deque(filter(is_kept, self._entries))
-
-    def _work(self, now: float) -> None:
-        self.is_behind = False
-        while self._entries:
-            self._handle(self._entries.popleft(), now)
-            if self._must_wait():
-                return
-
-    def _must_wait(self) -> bool:
-        """Return whether entries wait for the next turn, and have it handle them."""
-        if not self._entries or not self._is_turn_over():
-            return False
-        self.is_behind = True
-        self._call_first(self._work)
-        return True
 
 
 class CallQueue:
@@ -324,9 +275,16 @@ class LinkThread:
         if seconds >= 0.001 and not self._calls:
             self._waker.wait(seconds)
 
-    def is_turn_over(self) -> bool:
-        """Return whether this turn must begin no more messages and calls."""
-        return self._clock() >= self._turn_ends
+    def defer(self, function: Callable[[float], None]) -> bool:
+        """
+        Have ``function(now)`` called first in the next turn, if this turn is over.
+
+        :return: whether it is.
+        """
+        is_over = self._clock() >= self._turn_ends
+        if is_over:
+            self.call_first(function)
+        return is_over
 
     def run_once(self) -> None:
         """Wait once, and handle everything that is ready or due."""
@@ -343,7 +301,7 @@ class LinkThread:
         first = random.randrange(len(ready)) if len(ready) > 1 else 0
         for key, events in ready[first:] + ready[:first]:
             key.data(key.fileobj, events)
-            if self.is_turn_over():
+            if self._clock() >= self._turn_ends:
                 break
         self._calls.run(self._call)
         self._due = self._work()
@@ -351,7 +309,7 @@ class LinkThread:
     def _call(self, function: Callable[[float], None]) -> bool:
         """Make a call; return whether the turn is over."""
         self._faults.call(function, self._clock())
-        return self.is_turn_over()
+        return self._clock() >= self._turn_ends
 
     def _run(self) -> None:
         while not self._stopping.is_set():

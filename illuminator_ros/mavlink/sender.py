@@ -48,6 +48,7 @@ class Sender:
 
     :param streams: messages that newer ones replace while the line is busy.
     :ivar answer_expected_until: s.
+    :ivar is_holding: whether messages of streams are held.
     :ivar heartbeats: the last heartbeat frame of each of our addresses.
     """
 
@@ -57,6 +58,7 @@ class Sender:
         wall_clock: Callable[[], float],
     ) -> None:
         self.answer_expected_until = -math.inf
+        self.is_holding = False
         self.heartbeats: dict[Address, bytes] = {}
         self._writer = writer
         self._streams = ConflatingQueue(streams)
@@ -66,23 +68,18 @@ class Sender:
         self._clock = clock
         self._wall_clock = wall_clock
 
-    @property
-    def is_holding(self) -> bool:
-        """Return whether messages of streams are held."""
-        return bool(self._streams)
-
     def send(self, messages: Iterable[tuple[Address, Message]], now: float) -> None:
         """Send messages, and those of streams for which the line has room."""
         dropped = self._streams.dropped
         self._send_now([one for one in messages if not self._streams.hold(*one, now)], now)
-        while self._streams and self.next_deadline() <= now:
+        self.is_holding = bool(self._streams)
+        while self.is_holding and self.next_deadline() <= now:
             self._send_now(self._streams.take(now), now)
+            self.is_holding = bool(self._streams)
         self._lines[0].receiver.traffic.frames_dropped += self._streams.dropped - dropped
 
     def next_deadline(self) -> float:
-        """Return when messages of streams can be sent; infinity while each line is full."""
-        if not self._streams:
-            return math.inf
+        """Return when held messages of streams can be sent; infinity while each line is full."""
         now = self._clock()
         target = target_of(self._streams.first)
         towards = self._router.towards(target, [line.peers(now) for line in self._lines], now)
@@ -95,6 +92,7 @@ class Sender:
     def clear(self) -> None:
         """Drop all messages of streams: the lines are closed."""
         self._streams.clear()
+        self.is_holding = False
 
     def _send_now(self, messages: Sequence[tuple[Address, Message]], now: float) -> None:
         everywhere = [tuple(line.peers(now)) for line in self._lines]

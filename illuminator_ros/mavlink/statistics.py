@@ -69,11 +69,7 @@ class SourceCounts(NamedTuple):
 
 
 class _Place(NamedTuple):
-    """
-    The state in which a sender left off, see the fields of :class:`SequenceCounter`.
-
-    :param left_at: how many frames had been received by then.
-    """
+    """The state in which a sender left off, see the fields of :class:`SequenceCounter`."""
 
     newest: int
     seen: int
@@ -88,7 +84,8 @@ class SequenceCounter:
     A frame that comes twice is a duplicate and one that comes late is reordered; neither is a
     loss. A missing number is a loss only where each frame of the source should have come.
 
-    Two senders with one address count independently, so the numbers jump back and forth.
+    Two senders with one address count independently, so the numbers jump back and forth; so do
+    those of a component with two counters.
 
     :ivar is_complete: whether each frame should have come, so that a missing one is lost.
     """
@@ -141,7 +138,7 @@ class SequenceCounter:
         elif back >= WINDOW and 256 - back > WINDOW:
             # The frame is of another sender, or comes after a long loss.
             self.lost += 255 - back if back >= 128 else 0
-            self._left = self._place()
+            self._left = _Place(self._newest, self._seen, self.received)
             self._newest, self._seen = sequence, _ALL_SEEN
             return
         if back < WINDOW:
@@ -154,9 +151,6 @@ class SequenceCounter:
             self._seen = (self._seen << ahead | 1) & _ALL_SEEN
             self._newest = sequence
 
-    def _place(self) -> _Place:
-        return _Place(self._newest, self._seen, self.received)
-
     def _return_to_left(self, sequence: int) -> bool:
         """Return to the sender before if its numbers continue; return whether they do."""
         left = self._left
@@ -166,7 +160,7 @@ class SequenceCounter:
             0 < (sequence - newest) & 0xFF <= CONTINUED for newest in (left.newest, self._newest))
         if continues or not continues_left:
             return False
-        self._left = self._place()
+        self._left = _Place(self._newest, self._seen, self.received)
         self._newest, self._seen, _ = left
         return True
 
@@ -239,7 +233,7 @@ class Traffic:
     def count(self, frame: Frame) -> None:
         """Count a frame."""
         self.frames_received += 1
-        counter = self._counter_of(frame.source)
+        counter = self.sources.get(frame.source) or self._new_counter(frame.source)
         if counter is not None:
             counter.add(frame.sequence)
 
@@ -250,13 +244,13 @@ class Traffic:
         :param sequences: their sequence numbers, at least one.
         """
         self.frames_received += len(sequences)
-        counter = self._counter_of(source)
+        counter = self.sources.get(source) or self._new_counter(source)
         if counter is not None:
             counter.add_run(sequences)
 
-    def _counter_of(self, source: Address) -> SequenceCounter | None:
-        """Return the counter of a source, None if there are too many sources."""
-        counter = self.sources.get(source)
-        if counter is None and len(self.sources) < MAX_SOURCES:
-            counter = self.sources[source] = SequenceCounter()
+    def _new_counter(self, source: Address) -> SequenceCounter | None:
+        """Return the counter of a new source, None if there are too many sources."""
+        if len(self.sources) >= MAX_SOURCES:
+            return None
+        counter = self.sources[source] = SequenceCounter()
         return counter

@@ -169,7 +169,8 @@ class Property(Generic[S]):
 
     def _start(self, desired: Desired[S], callers: list[Caller], now: float) -> None:
         asked_at = callers[0].asked_at if callers else now
-        self._under_way = {value: end for value, end in self._under_way.items() if now < end}
+        if self._under_way:
+            self._under_way = {value: end for value, end in self._under_way.items() if now < end}
         self.desired, self._callers, self.sent_at = desired, callers, now
         terms = Terms(asked_at, asked_at + desired.limit, self.fence,
                       self._is_sole_cause(desired), desired.insists, desired.is_last,
@@ -258,15 +259,6 @@ class Property(Generic[S]):
         self.outcomes.append(Outcome(desired, result, status, tuple(callers)))
 
     # Known facts
-
-    @property
-    def is_busy(self) -> bool:
-        """Whether a command is under way."""
-        return self.command is not None
-
-    def is_pending(self, change: Change[S]) -> bool:
-        """Return whether a change is under way."""
-        return self.desired is not None and self.desired.change == change
 
     def expects(self, status: S) -> bool:
         """Return whether a status shows the change that is under way."""

@@ -16,7 +16,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Mapping
 import contextlib
 from dataclasses import dataclass
 import math
@@ -138,16 +138,21 @@ class NodeInterface:
                 endpoint.qos or COMMAND_QOS)
 
     def publish(self, name: str, value: object) -> None:
-        """
-        Publish a value; callable from any thread, but only from one at a time.
+        """See :meth:`publish_all`."""
+        self.publish_all({name: value})
 
-        :param value: the message, or ``data`` of a message of std_msgs.
+    def publish_all(self, values: Mapping[str, object]) -> None:
         """
-        type_ = self._types[name]
-        message = value if isinstance(value, type_) else type_(data=value)
+        Publish values by topic; callable from any thread, but only from one at a time.
+
+        :param values: each the message, or ``data`` of a message of std_msgs.
+        """
         # On a busy machine the nodes leave before the link's thread has ended.
         with contextlib.suppress(InvalidHandle):
-            self._publishers[name].publish(message)
+            for name, value in values.items():
+                type_ = self._types[name]
+                self._publishers[name].publish(
+                    value if isinstance(value, type_) else type_(data=value))
 
     def publish_to_subscribers(self, name: str, make: Callable[[], object]) -> None:
         """

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Each program of examples/ is shown whole in the page that teaches it."""
+"""Pages show each program of examples/ whole, and import what there is."""
 
 from pathlib import Path
 import re
@@ -31,3 +31,9 @@ def test_an_example_is_whole_in_one_page_but_for_its_licence(example: Path) -> N
     assert [page.count(f'```python\n{program}```') for page in PAGES
             if f'examples/{example.name}' in page] == [1]
     assert len(re.findall('^# Change these: ', program, re.M)) == 1
+
+
+@pytest.mark.parametrize('line', sorted(
+    {*re.findall('^from illuminator_ros.* import .*', '\n'.join(PAGES), re.M)}))
+def test_a_page_imports_what_the_package_has(line: str) -> None:
+    exec(line, {})

@@ -21,7 +21,7 @@ import random
 
 from illuminator_ros.illuminator.client import enable_all
 from illuminator_ros.illuminator.events import AutomaticSwitch, DesiredStateFailed
-from illuminator_ros.illuminator.light import LightSettings
+from illuminator_ros.illuminator.light_control import LightSettings
 from illuminator_ros.illuminator.model import SafetyLimits
 from illuminator_ros.mavlink.dialect import mavlink
 from illuminator_ros.payload.arbitration import Cause
@@ -51,7 +51,8 @@ class Shared:
 
     def enable(self, source: str, on: bool, *, is_stream: bool = True) -> Answer:
         answer = Answer(self.pair.now)
-        self.pair.light.enable(on, self.pair.now, answer, source=source, is_stream=is_stream)
+        self.pair.light.control.enable(
+            on, self.pair.now, answer, source=source, is_stream=is_stream)
         self.pair.turn()
         return answer
 
@@ -60,11 +61,11 @@ class Shared:
         return self.enable(source, on, is_stream=False)
 
     def dim(self, source: str, brightness: float) -> None:
-        self.pair.light.set_brightness(brightness, self.pair.now, source=source)
+        self.pair.light.control.set_brightness(brightness, self.pair.now, source=source)
         self.pair.turn()
 
     def release(self, source: str) -> None:
-        self.pair.light.release(source, self.pair.now)
+        self.pair.light.control.release(source, self.pair.now)
         self.pair.turn()
 
     def take_over(self) -> float:
@@ -338,7 +339,7 @@ def test_values_that_wait_when_a_light_is_released_do_not_switch_it_on_later() -
     pair.run(1.0)
     pair.wait_for(shared.enable('operator', False))
     light.results[CONFIGURE] = None
-    pair.light.set_desired({'brightness': 20.0}, pair.now)
+    pair.light.control.set_desired({'brightness': 20.0}, pair.now)
     # The second try of the values was sent 2.4 s ago, and the third one is due in 0.3 s.
     pair.run(4.4)
     shared.release('operator')

@@ -20,7 +20,7 @@ from dataclasses import astuple, replace
 from typing import Any
 
 from illuminator_ros.illuminator.events import ChangeCause
-from illuminator_ros.illuminator.light import LightSettings
+from illuminator_ros.illuminator.light_control import LightSettings
 from illuminator_ros.illuminator.model import Configuration, float32, Mode, SafetyLimits
 from illuminator_ros.mavlink.dialect import mavlink
 from illuminator_ros.mavlink.messages import CommandAck, result_name
@@ -71,7 +71,7 @@ def test_a_confirmed_set_is_one_event_before_its_answer(pair: Pair) -> None:
     def done(result: Result, now: float) -> None:
         answers.append((result.message, pair.recorder.changes[-1]))
 
-    pair.light.configure({'brightness': 50, 'strobe_duty_cycle': 5}, pair.now, done)
+    pair.light.control.configure({'brightness': 50, 'strobe_duty_cycle': 5}, pair.now, done)
     pair.turn()
     pair.run(5.0)
     (message, event), = answers
@@ -138,6 +138,17 @@ def test_a_value_beyond_the_range_of_a_restarted_light_prevents_no_other_change(
     faked.run(5.0)
     assert faked.configure(brightness=40.0).success
     assert sent(faked)[-1][:3] == (1, 40, 0)
+
+
+@pytest.mark.parametrize(('reported', 'sent_period'), [(0.01, 0.05), (25.0, 2.0), (0.0, 0.0)])
+def test_a_light_that_reports_the_period_of_its_sync_signal_gets_one_within_its_own_range(
+    fake: FakeLight, reported: float, sent_period: float,
+) -> None:
+    fake.fields |= {'mode': 2, 'strobe_period': reported, 'min_strobe_period': 0.05,
+                    'max_strobe_period': 2.0}
+    pair = Pair(fake).settle()
+    assert pair.configure(brightness=40.0).success
+    assert sent(pair)[-1][:3] == pytest.approx((2, 40, sent_period))
 
 
 def test_before_the_first_status_only_a_complete_set_is_sent() -> None:
@@ -282,7 +293,7 @@ def test_a_discrepancy_ends_when_another_sender_changes_the_light(
 
 def publish(pair: Pair, *values: float, rate: float = 0.0) -> None:
     for value in values:
-        pair.light.set_brightness(value, pair.now)
+        pair.light.control.set_brightness(value, pair.now)
         pair.turn()
         if rate:
             pair.run(1 / rate)
@@ -404,7 +415,7 @@ def test_a_setpoint_waits_for_a_set_and_does_not_end_it(fake: FakeLight, faked: 
 
 def test_a_stream_does_not_keep_overrides_from_being_sent(fake: FakeLight, faked: Pair) -> None:
     fake.results[CONFIGURE] = [None, None, None, ACCEPTED]
-    faked.light.set_desired({'strobe_period': 2.0}, faked.now)
+    faked.light.control.set_desired({'strobe_period': 2.0}, faked.now)
     publish(faked, *[value % 100 / 1.0 for value in range(400)], rate=50)
     assert fake.fields['strobe_period'] == 2.0
 
@@ -414,7 +425,7 @@ def test_a_stream_does_not_keep_overrides_from_being_sent(fake: FakeLight, faked
 def overriding(fake: FakeLight, settings: LightSettings | None = None, **values: Any) -> Pair:
     """Return a pair whose light must be configured as soon as it is found."""
     return Pair(fake, settings=settings,
-                on_light=lambda light: light.set_desired(values, START))
+                on_light=lambda light: light.control.set_desired(values, START))
 
 
 def successes(pair: Pair) -> list[bool]:
@@ -481,7 +492,7 @@ def test_overrides_and_a_restored_configuration_reach_a_light_that_answers_too_l
     fake: FakeLight, latency: float,
 ) -> None:
     pair = Pair(fake, there=Faults(latency=latency),
-                on_light=lambda light: light.set_desired({'brightness': 30.0}, START))
+                on_light=lambda light: light.control.set_desired({'brightness': 30.0}, START))
     for _ in range(2):
         at = pair.now
         fake.restart(at)
@@ -570,7 +581,7 @@ def test_overrides_that_wait_for_a_status_are_reported_once(fake: FakeLight) -> 
     (success, message), = pair.recorder.restorations
     assert not success
     assert message.startswith('brightness not sent: the light has not reported its configuration')
-    assert pair.snapshot.discrepancy == message
+    assert message.startswith(pair.snapshot.discrepancy)
     fake.fields['strobe_duty_cycle'] = 0.0
     pair.run(3.0)
     assert fake.fields['brightness'] == 60.0

@@ -135,7 +135,7 @@ def test_a_set_ends_within_0_9_s_in_a_flood_that_never_ends(
     if fault:
         bridge.disturb(fault)
     begun = link.now
-    link.call(lambda now: light.configure(
+    link.call(lambda now: light.control.configure(
         {'brightness': 55.0}, now,
         lambda result, now: ended.append((result.success, now - begun))))
     bridge.genuine(1.2)
@@ -161,7 +161,7 @@ def test_a_flood_of_requests_is_refused_beyond_a_limit_and_all_are_answered(
 
     def ask(now: float) -> None:
         for results in answers:
-            light.enable(True, now, lambda result, now, to=results: to.append(result))
+            light.control.enable(True, now, lambda result, now, to=results: to.append(result))
 
     bridge.link.ask(ask)
     bridge.check_bounds()

@@ -19,7 +19,7 @@ from __future__ import annotations
 import functools
 from typing import Any
 
-from illuminator_ros.illuminator.light import LightSettings
+from illuminator_ros.illuminator.light_control import LightSettings
 from illuminator_ros.illuminator.light_queries import SETTLING_TIME
 from illuminator_ros.illuminator.messages import STATUS_ID
 from illuminator_ros.illuminator.simulated_properties import IlluminatorProperties
@@ -84,7 +84,7 @@ def test_a_line_that_is_lost_beside_another_one_takes_its_lights_and_their_reque
     first, second = pair.controller.lights.values()
     results: dict[mav.Address, Any] = {}
     for light in (first, second):
-        light.enable(True, pair.now, functools.partial(
+        light.control.enable(True, pair.now, functools.partial(
             lambda address, result, now: results.update({address: result}), light.address))
     pair.controller.components_lost([first.address], pair.now, 'unplugged')
     assert (first.connected, second.connected) == (False, True)

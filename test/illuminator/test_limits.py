@@ -18,8 +18,8 @@ from typing import Any
 
 from hypothesis import given, settings, strategies
 from illuminator_ros.illuminator.events import LimitExceeded, SetpointClipped
-from illuminator_ros.illuminator.light import LightSettings
 from illuminator_ros.illuminator.light_configuration import LIMIT_INTERVAL
+from illuminator_ros.illuminator.light_control import LightSettings
 from illuminator_ros.illuminator.model import float32, SafetyLimits
 from illuminator_ros.mavlink.dialect import mavlink
 import pytest
@@ -61,9 +61,9 @@ def test_limits_hold_for_each_frame_on_the_wire(
             pair.ask_configure(strobe_period=strobe_period)
             pair.ask_configure(brightness=brightness, strobe_duty_cycle=10.0)
         elif way == 'stream':
-            pair.light.set_brightness(brightness, pair.now)
+            pair.light.control.set_brightness(brightness, pair.now)
         elif way == 'override':
-            pair.light.set_desired(
+            pair.light.control.set_desired(
                 {'brightness': brightness, 'strobe_period': strobe_period}, pair.now)
         elif way == 'restart':
             pair.device.restart(pair.now)
@@ -93,7 +93,7 @@ def test_a_stream_beyond_a_limit_is_clipped_and_reported() -> None:
     _, pair = limited(brightness=50.0)
 
     for _ in range(20):
-        pair.light.set_brightness(90.0, pair.now)
+        pair.light.control.set_brightness(90.0, pair.now)
         pair.run(0.1)
 
     assert {command.param2 for command in pair.commands(CONFIGURE)} == {60.0}

@@ -55,7 +55,7 @@ def test_each_kind_of_light_is_found_switched_configured_restored_and_never_lost
     assert pair.configure(mode='internal_control').success
     pair.run(60.0)
     assert pair.recorder.events == ['connected']
-    assert pair.light.strobe_range.known is strobes
+    assert pair.light.control.configuration.strobe_range.known is strobes
     assert (pair.snapshot.temperature is not None) is strobes
     identity = pair.snapshot.identity
     assert (identity is not None) is strobes

@@ -158,7 +158,7 @@ def test_requests_to_a_lost_light_fail_at_once_with_the_reason(
     faked.run(10.0 - (faked.now - faked.light.liveness.heard_at))
     sent = len(faked.commands())
     answers = [faked.ask_enable(True), faked.ask_configure(brightness=50), faked.ask_refresh()]
-    faked.light.set_brightness(50.0, faked.now)
+    faked.light.control.set_brightness(50.0, faked.now)
     assert {(answer.seconds, answer.result.message) for answer in answers} == {
         (0.0, f'light 1/243 is lost: {reason}')}
     assert faked.recorder.failed_setpoints == [f'light 1/243 is lost: {reason}']
@@ -260,7 +260,7 @@ def test_a_stream_of_brightness_is_followed_again_after_a_lost_acknowledgement(
     for number in range(500):
         if number == 400:
             begun = faked.now
-        faked.light.set_brightness(10.0 + number % 80, faked.now)
+        faked.light.control.set_brightness(10.0 + number % 80, faked.now)
         faked.turn()
         faked.run(0.02)
 
@@ -355,9 +355,9 @@ def test_an_answer_may_start_the_next_request(pair: Pair, kind: int) -> None:
 
     def ask(now: float) -> None:
         if kind == ON_OFF:
-            pair.light.enable(len(log) % 2 == 0, now, done)
+            pair.light.control.enable(len(log) % 2 == 0, now, done)
         else:
-            pair.light.configure({'brightness': 10 * len(log)}, now, done)
+            pair.light.control.configure({'brightness': 10 * len(log)}, now, done)
 
     def done(result: Result, now: float) -> None:
         log.append(result.success)
@@ -374,7 +374,7 @@ def test_an_answer_that_raises_does_not_hold_up_other_requests(pair: Pair) -> No
     def done(result: Result, now: float) -> None:
         raise RuntimeError('as the test says')
 
-    pair.light.enable(True, pair.now, done)
+    pair.light.control.enable(True, pair.now, done)
     answer = pair.ask_enable(True)
     with pytest.raises(RuntimeError):
         pair.run(5.0)

@@ -130,7 +130,7 @@ def test_a_value_that_the_status_lacks_is_not_called_confirmed(
 
 def test_each_switch_is_one_event_with_its_origin(fake: FakeLight, faked: Pair) -> None:
     events = events_of(faked)
-    faked.light.enable(True, faked.now, lambda result, now: None, detail='service')
+    faked.light.control.enable(True, faked.now, lambda result, now: None, detail='service')
     faked.run(40.0)
     fake.fields['enable'] = 0
     faked.run(3.0)
@@ -220,6 +220,6 @@ def test_a_request_is_answered_before_its_status_is_published(faked: Pair) -> No
             order.append('status')
 
     faked.controller.events.subscribe(note)
-    faked.light.enable(True, faked.now, lambda result, now: order.append('answer'))
+    faked.light.control.enable(True, faked.now, lambda result, now: order.append('answer'))
     faked.run(1.0)
     assert order[:2] == ['answer', 'status']

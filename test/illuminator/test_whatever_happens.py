@@ -18,7 +18,7 @@ from __future__ import annotations
 
 import random
 
-from illuminator_ros.illuminator.light import LightSettings
+from illuminator_ros.illuminator.light_control import LightSettings
 from illuminator_ros.illuminator.model import Mode
 from illuminator_ros.illuminator.simulated_properties import IlluminatorProperties
 from illuminator_ros.illuminator.thermal import ThermalProperties

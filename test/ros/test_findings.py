@@ -23,7 +23,7 @@ from unittest.mock import Mock
 
 from diagnostic_msgs.msg import DiagnosticStatus
 from illuminator_ros.illuminator.events import LightSnapshot
-from illuminator_ros.illuminator.light import LightSettings
+from illuminator_ros.illuminator.light_control import LightSettings
 from illuminator_ros.illuminator.ros.diagnostics import (
     FLAG_PAUSE,
     FlagLog,

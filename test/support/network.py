@@ -134,7 +134,7 @@ class Router:
         self.lines = Lines(
             [(port.name, MemoryUrl(port.name)) for port in ports], self.endpoint, faults=faults,
             selector=FakeSelector(), call=lambda function: None,
-            call_first=lambda function: None, is_turn_over=lambda: False,
+            defer=lambda function: False,
             signing=signing or Signing(), mavlink_version=version, clock=lambda: network.now,
             wall_clock=lambda: 1.7e9)
         for line, port in zip(self.lines, ports, strict=True):

@@ -68,8 +68,8 @@ class RandomUsers:
 
     def enable(self) -> None:
         if light := self.light():
-            light.enable(self.draw.random() < 0.7, self.pair.now, self.answer(),
-                         source=self.source(), is_stream=self.draw.random() < 0.5)
+            light.control.enable(self.draw.random() < 0.7, self.pair.now, self.answer(),
+                                 source=self.source(), is_stream=self.draw.random() < 0.5)
 
     def enable_all(self) -> None:
         if lights := [*self.pair.controller.lights.values()]:
@@ -78,14 +78,14 @@ class RandomUsers:
     def configure(self) -> None:
         if light := self.light():
             self.sets.append(self.answer())
-            light.configure({'brightness': float(self.draw.randrange(81)),
-                             'strobe_period': self.draw.choice((0.0, 1.0))},
-                            self.pair.now, self.sets[-1])
+            values = {'brightness': float(self.draw.randrange(81)),
+                      'strobe_period': self.draw.choice((0.0, 1.0))}
+            light.control.configure(values, self.pair.now, self.sets[-1])
 
     def dim(self) -> None:
         if light := self.light():
             for _ in range(self.draw.randint(1, 5)):
-                light.set_brightness(
+                light.control.set_brightness(
                     float(self.draw.randrange(101)), self.pair.now, source=self.source())
 
     def refresh(self) -> None:
@@ -94,11 +94,11 @@ class RandomUsers:
 
     def desire(self) -> None:
         if light := self.light():
-            light.set_desired({'strobe_duty_cycle': 30.0}, self.pair.now)
+            light.control.set_desired({'strobe_duty_cycle': 30.0}, self.pair.now)
 
     def release(self) -> None:
         if light := self.light():
-            light.release(self.source(), self.pair.now)
+            light.control.release(self.source(), self.pair.now)
 
     def restart(self) -> None:
         self.draw.choice(self.pair.devices).restart(self.pair.now)

@@ -21,7 +21,7 @@ import contextlib
 from pathlib import Path
 import socket
 
-from illuminator_ros.illuminator.light import LightSettings
+from illuminator_ros.illuminator.light_control import LightSettings
 from illuminator_ros.mavlink import component, line, link_state
 from illuminator_ros.mavlink import connector as connector_module
 from illuminator_ros.mavlink.retries import CONNECTION

@@ -168,16 +168,17 @@ class EventPublisher:
         return f' {sender}' if sender else ''
 
     def _status_received(self, event: events.StatusReceived) -> None:
-        status = event.status
+        status, values = event.status, {}
         for topic, read in STATUS_TOPICS.items():
             # An implausible value is None.
             if (value := read(status)) is not None:
-                self._interface.publish(topic.name, value)
+                values[topic.name] = value
         if event.temperature is not None:
             message = Temperature(temperature=event.temperature)
             message.header.stamp = self._clock.now().to_msg()
             message.header.frame_id = self._frame_id
-            self._interface.publish('temperature', message)
+            values['temperature'] = message
+        self._interface.publish_all(values)
         condition = (status.error_flags, status.invalid, status.strobe_range)
         if condition != self._condition:
             self._condition = condition

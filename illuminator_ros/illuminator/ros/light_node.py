@@ -131,7 +131,7 @@ class LightNode:
             for event in light.snapshot(now).events():
                 self.take(event)
             if self._overrides:
-                light.set_desired(self._overrides, now)
+                light.control.set_desired(self._overrides, now)
 
     def release(self) -> None:
         """Serve no light: it was forgotten."""
@@ -195,7 +195,7 @@ class LightNode:
     def _enable_service(self, source: str, prefix: str) -> ros_node.RequestService:
         def enable(request: SetBool.Request, now: float, answer: ros_node.Answer) -> None:
             if light := self._light_or_refusal(now, answer):
-                light.enable(
+                light.control.enable(
                     request.data, now,
                     lambda result, now: answer(result.success, result.message),
                     detail=f'{prefix}service', source=source)
@@ -204,7 +204,7 @@ class LightNode:
 
     def _release(self, source: str, now: float, answer: ros_node.Answer) -> None:
         if light := self._light_or_refusal(now, answer):
-            answer(True, f'held by {light.release(source, now) or "no source"}')
+            answer(True, f'held by {light.control.release(source, now) or "no source"}')
 
     def _command_topics(
         self, source: str, prefix: str,
@@ -236,11 +236,12 @@ class LightNode:
             light = self._light()
             # A source may repeat its request while a higher one holds the light.
             if not (result.success or result.superseded
-                    or light and light.is_held_by_other(source)):
+                    or light and light.control.is_held_by_other(source)):
                 warn(False, result.message)
 
         if light := self._light_or_refusal(now, warn):
-            light.enable(on, now, done, detail=f'{prefix}topic', source=source, is_stream=True)
+            light.control.enable(
+                on, now, done, detail=f'{prefix}topic', source=source, is_stream=True)
 
     def _refresh(self, request: Trigger.Request, now: float, answer: ros_node.Answer) -> None:
         if light := self._light_or_refusal(now, answer):
@@ -248,12 +249,12 @@ class LightNode:
 
     def _set_brightness(self, source: str, prefix: str, brightness: float, now: float) -> None:
         if light := self._light_or_refusal(now, self._warning_on(f'{prefix}cmd/brightness')):
-            light.set_brightness(brightness, now, source=source)
+            light.control.set_brightness(brightness, now, source=source)
 
     def _check_value(self, name: str, value: object) -> None:
         light = self._light()
-        self._client.settings.limits.check(
-            name, checked(name, value, light.strobe_range if light else None))
+        strobe_range = light.control.configuration.strobe_range if light else None
+        self._client.settings.limits.check(name, checked(name, value, strobe_range))
 
     def _configure(
         self, changes: Mapping[str, object], now: float, answer: Callable[[str], None],
@@ -264,7 +265,7 @@ class LightNode:
             answer('' if result.success else result.message)
 
         if light := self._light_or_refusal(now, lambda success, message: answer(message)):
-            light.configure(changes, now, done)
+            light.control.configure(changes, now, done)
 
     # Diagnostics
 

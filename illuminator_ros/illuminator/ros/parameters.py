@@ -25,7 +25,7 @@ from typing import NamedTuple
 
 from rclpy.node import Node
 
-from ..light import LightSettings
+from ..light_control import LightSettings
 from ..model import MAX_STROBE_PERIOD, MODES, SafetyLimits
 from ...mavlink.messages import Address
 from ...ros.command_sources import SOURCE_PARAMETERS, source_settings
