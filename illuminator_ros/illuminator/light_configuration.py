@@ -361,6 +361,8 @@ class LightConfiguration:
 
     def excess(self, status: Status) -> tuple[str, ...]:
         """Describe how a status exceeds the limits."""
+        if self._limits == SafetyLimits():
+            return ()
         return self._limits.excess(status.configuration(self.agreed or NOTHING))
 
     # Reports

@@ -16,6 +16,7 @@
 
 from __future__ import annotations
 
+from collections import deque
 from collections.abc import Callable
 from dataclasses import dataclass
 import math
@@ -80,7 +81,9 @@ class LightControl:
         self, target: Target, liveness: Liveness, settings: LightSettings,
         emit: Callable[[events.LightEvent], None],
     ) -> None:
-        self.switch = Switch(target, emit, settings.off_after_silence)
+        # What has happened to the switch, which callers are told first.
+        self._switched: deque[events.LightEvent] = deque()
+        self.switch = Switch(target, self._switched.append, settings.off_after_silence)
         self.configuration = LightConfiguration(
             target, emit, limits=settings.limits, restores=settings.restore_configuration)
         self.sources = LightSources(settings.sources)
@@ -112,7 +115,8 @@ class LightControl:
 
     def unreachable(self, now: float) -> str:
         """Return why requests cannot reach the light, for people; '' if they can."""
-        return self._liveness.loss(f'light {self._address}', now)
+        return '' if self._liveness.connected else self._liveness.loss(
+            f'light {self._address}', now)
 
     # Requests
 
@@ -194,7 +198,8 @@ class LightControl:
         if closed := self._commands.refusal:
             caller.done(Result(False, closed, superseded=True), now)
             return False
-        self._take_holder(sources.poll(now), now)
+        if change := sources.poll(now):
+            self._take_holder(change, now)
         self.was_commanded = True
         late, held = '' if is_off else self._commands.lateness(now), sources.refusal(source)
         if caller.is_stream and not late:
@@ -310,21 +315,22 @@ class LightControl:
         switch, configuration = self.switch, self.configuration
         parts: tuple[Switch | LightConfiguration, ...] = switch, configuration
         self.version += 1
-        while True:
+        has_outcomes = True
+        while has_outcomes:
             for part in parts:
                 while part.changes.outcomes:
                     outcome = part.changes.outcomes.popleft()
                     part.take(outcome, now)
                     self._finish(outcome, now)
-            if not self._liveness.connected:
-                return
-            # First the configuration, so that an ON finds it.
-            configuration.update(now, is_off_pending=switch.is_pending(OFF))
-            if configuration.brightness_is_switch and switch.is_off_due(now):
-                self._prepare_off(now)
-            switch.update(now)
-            if not (switch.changes.outcomes or configuration.changes.outcomes):
-                return
+            if self._liveness.connected:
+                # First the configuration, so that an ON finds it.
+                configuration.update(now, is_off_pending=switch.is_pending(OFF))
+                if configuration.brightness_is_switch and switch.is_off_due(now):
+                    self._prepare_off(now)
+                switch.update(now)
+            while self._switched:
+                self._emit(self._switched.popleft())
+            has_outcomes = bool(switch.changes.outcomes or configuration.changes.outcomes)
 
     def _finish(self, outcome: Outcome[Status], now: float) -> None:
         """Take the end of a value: a call that has succeeded counts from now on."""

@@ -30,7 +30,7 @@ from ..mavlink.command_sender import (
 )
 from ..mavlink.dialect import mavlink
 from ..mavlink.messages import ComponentInformationBasic
-from ..mavlink.retries import MESSAGE
+from ..mavlink.retries import MESSAGE, Retries
 from ..payload.confirmed_command import Done, Result, Target
 from ..payload.identity import Identity
 
@@ -46,70 +46,66 @@ class MessageQuery:
     Requests one message until it has come, or the light does not send it. Times are s.
 
     :ivar first_asked: the time of the first request, infinity before it.
-    :ivar message_until: when :meth:`poll` has something to do.
     :ivar failure: why the light did not send the message, '' if it did or an answer is awaited.
+    :ivar retries: of a message that is awaited; it is due a while after an acknowledgement. None
+        while none is awaited.
     """
 
     def __init__(self, target: Target, message_id: int) -> None:
         self.first_asked = math.inf
         self.failure = ''
+        self.retries: Retries | None = None
         self._target = target
-        self._message_id = message_id
+        self._request = request_message(target.address, message_id)
         self._waiting: list[Callable[[str, float], None]] = []
-        # The number of requests that were sent, 0 while none is under way.
-        self._questions = 0
-        self.message_until = math.inf
 
     def ask(self, now: float, done: Callable[[str, float], None] | None = None) -> None:
         """Ask; ``done`` is called with '' once the message has come, else with the failure."""
         if done is not None:
             self._waiting.append(done)
-        if not self._questions:
+        if self.retries is None:
             self.first_asked = min(self.first_asked, now)
-            self._send(now)
-
-    @property
-    def is_asking(self) -> bool:
-        """Whether an answer is awaited."""
-        return bool(self._questions)
+            self._send(Retries(MESSAGE), now)
 
     def ask_again(self, now: float) -> None:
         """Ask at once, though an answer may still be awaited."""
-        self._questions = 0
+        self.retries = None
         self.ask(now)
 
-    def _send(self, now: float) -> None:
-        self._questions += 1
-        self.message_until = math.inf
-        self._target.commands.start(
-            request_message(self._target.address, self._message_id), now, self._answered)
+    def _send(self, retries: Retries, now: float) -> None:
+        self.retries = retries
+        retries.stop()
+        self._target.commands.start(self._request, now, self._answered)
 
     def _answered(self, result: CommandResult, now: float) -> None:
-        if result.status is CommandStatus.CANCELLED:
-            # A newer request has replaced it.
+        # A newer request has replaced a cancelled one.
+        if self.retries is None or result.status is CommandStatus.CANCELLED:
             return
-        if self._questions and result.accepted:
-            self.message_until = now + MESSAGE.first
-        elif self._questions:
+        if result.accepted:
+            self.retries.note_try(now)
+        else:
             self.finish(result.describe_failure(), now)
 
     def finish(self, failure: str, now: float) -> None:
         """End the requests: the message has come, or will not come for the reason given."""
-        self.message_until = math.inf
-        self._questions = 0
-        self.failure = failure
+        self.retries, self.failure = None, failure
         waiting, self._waiting = self._waiting, []
         for done in waiting:
             done(failure, now)
 
     def poll(self, now: float) -> None:
         """Ask again for a message that does not come, or give up."""
-        if now < self.message_until:
+        if now < self.next_deadline():
             return
-        if self._questions < MESSAGE.tries:
-            self._send(now)
-        else:
+        assert self.retries is not None
+        if self.retries.is_spent:
             self.finish('acknowledged, but not sent', now)
+        else:
+            self._send(self.retries, now)
+
+    def next_deadline(self) -> float:
+        """Return when :meth:`poll` has something to do."""
+        return math.inf if self.retries is None else self.retries.due
 
 
 class LightQueries:
@@ -147,7 +143,7 @@ class LightQueries:
             self._request_interval_and_identity(now)
         self._due = now + STATUS_TIMEOUT
         # A request that was sent to the silent light would be resent only later.
-        if self._status.is_asking:
+        if self._status.retries:
             self._status.ask_again(now)
         else:
             self._target.commands.start(self._status_request, now)
@@ -182,7 +178,7 @@ class LightQueries:
     def take_status(self, now: float) -> None:
         """Note that a status has come."""
         self._due = now + self._timeout
-        if self._status.is_asking:
+        if self._status.retries:
             self._status.finish('', now)
 
     def take_identity(self, identity: Identity, now: float) -> None:
@@ -234,5 +230,5 @@ class LightQueries:
 
     def next_deadline(self, silent_since: float) -> float:
         """Return when :meth:`poll` has something to do."""
-        status, identity = self._status, self._identity
-        return min(self._status_due(silent_since), status.message_until, identity.message_until)
+        return min(self._status_due(silent_since), self._status.next_deadline(),
+                   self._identity.next_deadline())

@@ -61,6 +61,7 @@ class Sender:
         self.is_holding = False
         self.heartbeats: dict[Address, bytes] = {}
         self._writer = writer
+        self._has_streams = bool(streams)
         self._streams = ConflatingQueue(streams)
         self._lines = lines
         self._router = router
@@ -68,8 +69,11 @@ class Sender:
         self._clock = clock
         self._wall_clock = wall_clock
 
-    def send(self, messages: Iterable[tuple[Address, Message]], now: float) -> None:
+    def send(self, messages: Sequence[tuple[Address, Message]], now: float) -> None:
         """Send messages, and those of streams for which the line has room."""
+        if not self._has_streams:
+            self._send_now(messages, now)
+            return
         dropped = self._streams.dropped
         self._send_now([one for one in messages if not self._streams.hold(*one, now)], now)
         self.is_holding = bool(self._streams)

@@ -63,8 +63,6 @@ class Liveness:
         return f'no heartbeat for {format_seconds(now - self.heard_at)}'
 
     def loss(self, name: str, now: float) -> str:
-        """Return that a device of this name is lost and why, for people; '' if it is not."""
-        if self.connected:
-            return ''
+        """Return that a device of this name is lost and why, for people."""
         # Without a link no heartbeat can be heard, so the failure of the link is the reason.
         return f'{name} is lost: {self.link_failure or self.silence(now)}'

@@ -252,7 +252,7 @@ def test_missing_light_is_a_warning_with_its_likeliest_reason_and_an_error_after
 def test_silent_light_that_signs_while_signing_is_off_is_a_warning_with_the_remedy() -> None:
     reported = Reported()
     reported.receive(signed_frame(1))
-    reported.link.ask(lambda now: reported.client.lights[LIGHT].enable(
+    reported.link.ask(lambda now: reported.client.lights[LIGHT].control.enable(
         True, now, lambda result, now: None))
     for _ in range(3):
         reported.link.run(1.0)
