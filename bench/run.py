@@ -50,6 +50,8 @@ def measure(names: Sequence[str], rows: list[Row], *, quick: bool) -> list[str]:
 
     failed = []
     os.environ['ROS_AUTOMATIC_DISCOVERY_RANGE'] = 'LOCALHOST'
+    # A program that a user starts has been compiled before.
+    os.environ.pop('PYTHONDONTWRITEBYTECODE', None)
     with claimed_domain() as domain:
         os.environ['ROS_DOMAIN_ID'] = str(domain)
         for name in names:

@@ -23,6 +23,7 @@ import time
 from ..mavlink.messages import Address
 from ..mavlink.signing import Signing, SigningMode
 from ..mavlink.signing_files import KeyFileError, load_signing, TimestampStore
+from ..ros.ros_home import state_folder
 
 
 def address(text: str) -> Address:
@@ -79,6 +80,7 @@ def signing(options: argparse.Namespace, name: str) -> tuple[Signing, TimestampS
     """
     try:
         return load_signing(
-            SigningMode(options.signing_mode), options.signing_key_file, name, time.time())
+            SigningMode(options.signing_mode), options.signing_key_file, name, time.time(),
+            state_folder)
     except KeyFileError as error:
         raise KeyFileError(f'--signing-key-file: {error}') from None

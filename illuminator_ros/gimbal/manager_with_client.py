@@ -89,7 +89,7 @@ class ManagerWithClient(Payload):
     def close(self, now: float) -> None:
         """See :meth:`Payload.close`."""
         self.manager.close(now)
-        self._own.close(now, self.client.may_send_at_end)
+        self._own.close(now, self.client.may_send_at_end, self._commands.refusal)
         self.client.close(now)
 
     def receive(self, source: mav.Address, message: mav.Message, now: float) -> None:

@@ -61,7 +61,7 @@ class CommandStatus(Enum):
     OUT_OF_TIME = 'not finished in time'
     LINK_LOST = 'the link was lost'
     CANCELLED = 'cancelled'
-    CLOSED = 'the bridge is ending'
+    CLOSED = 'closed'
 
 
 @dataclass(frozen=True)
@@ -149,6 +149,7 @@ class CommandResult(NamedTuple):
     :param tries: how often it was sent.
     :param elapsed: s, from the first sending.
     :param progress: %, the last that was reported, None where unknown.
+    :param closed: why the sender was closed, for people, '' if it was not.
     """
 
     status: CommandStatus
@@ -156,6 +157,7 @@ class CommandResult(NamedTuple):
     tries: int = 0
     elapsed: float = 0.0
     progress: int | None = None
+    closed: str = ''
 
     @property
     def accepted(self) -> bool:
@@ -174,7 +176,8 @@ class CommandResult(NamedTuple):
         last = '' if self.result is None else f', last answer {messages.result_name(self.result)}'
         if self.progress is not None:
             last += f' at {self.progress} %'
-        return f'{self.status.value}{last}'
+        closed = self.status is CommandStatus.CLOSED and self.closed
+        return f'{closed or self.status.value}{last}'
 
     def describe_failure(self) -> str:
         """Return why it was not accepted, for people."""
@@ -279,6 +282,7 @@ class CommandSender:
     :ivar outgoing: messages to send, each with the address that sends it.
     :ivar unanswering: the targets whose last command got no acknowledgement, at most
         :data:`MAX_TARGETS`.
+    :ivar refusal: why no device may be changed any more, for people; '' if it may be.
     :ivar version: counts what has happened to commands, for those who keep a deadline of theirs.
     :ivar round_trips: the last round-trip time of each target, s, at most :data:`MAX_TARGETS`.
     :raises ValueError: if ``timeout`` or ``retries`` is out of its range.
@@ -292,6 +296,7 @@ class CommandSender:
     unanswering: dict[Address, None] = field(default_factory=dict)
     round_trips: dict[Address, float] = field(default_factory=dict)
     version: int = 0
+    refusal: str = ''
     _may_send: Callable[[Command | Message], bool] | None = None
     _pending: dict[CommandKind, Transmission] = field(default_factory=dict)
     # For how long the process was stopped, and until when, s.
@@ -307,7 +312,9 @@ class CommandSender:
         """Return how many commands have not ended."""
         return len(self._pending)
 
-    def close(self, now: float, may_send: Callable[[Command | Message], bool]) -> None:
+    def close(
+        self, now: float, may_send: Callable[[Command | Message], bool], reason: str,
+    ) -> None:
         """
         Send nothing any more that changes a device, since the process ends.
 
@@ -316,8 +323,9 @@ class CommandSender:
 
         :param may_send: returns whether a command or message may still be sent, in addition to
             requests for messages.
+        :param reason: why, for people.
         """
-        self._may_send = may_send
+        self._may_send, self.refusal = may_send, reason
         for pending in list(self._pending.values()):
             if self._is_refused(pending.command):
                 self._end(pending, CommandStatus.CLOSED, now)
@@ -333,11 +341,6 @@ class CommandSender:
             return ''
         return (f'the request may be {format_seconds(seconds)} old, since this process was '
                 'stopped as long; repeat it')
-
-    @property
-    def refusal(self) -> str:
-        """Return why no device may be changed any more, for people; '' if it may be."""
-        return '' if self._may_send is None else CommandStatus.CLOSED.value
 
     def _is_refused(self, sent: Command | Message) -> bool:
         if self._may_send is None:
@@ -372,7 +375,7 @@ class CommandSender:
                                self.retries if retries is None else retries,
                                command.position is not None, follow_up)
         if self._is_refused(command):
-            done(CommandResult(CommandStatus.CLOSED), now)
+            done(CommandResult(CommandStatus.CLOSED, closed=self.refusal), now)
         elif now >= deadline:
             done(CommandResult(CommandStatus.OUT_OF_TIME), now)
         else:
@@ -504,8 +507,8 @@ class CommandSender:
             self.counters.unanswered += 1
             _keep(self.unanswering, pending.command.target, None)
         pending.done(CommandResult(
-            status, pending.result, pending.tries, now - pending.first_sent, pending.progress),
-            now)
+            status, pending.result, pending.tries, now - pending.first_sent, pending.progress,
+            self.refusal), now)
 
 
 def _keep(values: dict[Address, V], target: Address, value: V) -> None:

@@ -217,10 +217,14 @@ class Component(Endpoint):
         return (f'{enum_name("MAV_TYPE", self._conflicting.type)}, '
                 f'{enum_name("MAV_AUTOPILOT", self._conflicting.autopilot)} by its HEARTBEAT')
 
-    def close(self, now: float) -> None:
-        """Change no device any more, except as the payloads do at the end of the process."""
+    def close(self, now: float, reason: str) -> None:
+        """
+        Change no device any more, except as the payloads do at the end of the process.
+
+        :param reason: why, for people.
+        """
         self.commands.close(now, lambda sent: any(
-            payload.may_send_at_end(sent) for payload in self._payloads))
+            payload.may_send_at_end(sent) for payload in self._payloads), reason)
         for payload in self._payloads:
             payload.close(now)
 

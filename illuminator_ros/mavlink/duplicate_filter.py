@@ -71,9 +71,6 @@ class DuplicateFilter:
         # By the hash of the frame, in the order of arrival; the front of a dict is slow to remove.
         self._arrivals: OrderedDict[int, _Arrival] = OrderedDict()
 
-    def __len__(self) -> int:
-        return len(self._arrivals)
-
     def is_copy(self, frame: bytes, path: Path, now: float) -> bool:
         """Return whether a frame is a copy of an accepted or sent frame, and count it if so."""
         key = hash(frame)

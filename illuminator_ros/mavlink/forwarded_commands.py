@@ -41,9 +41,6 @@ class ForwardedCommands:
     def __init__(self) -> None:
         self._sent: dict[tuple[Address, int], _Sent] = {}
 
-    def __len__(self) -> int:
-        return len(self._sent)
-
     def add(self, frame: Frame, now: float) -> None:
         """Note a frame that is forwarded, if it has a command."""
         cls = _CLASSES.get(frame.message_id)

@@ -93,12 +93,14 @@ class ForeignFrames:
 
 @dataclass(slots=True)
 class DecoderCounters:
-    """Bytes and frames that a :class:`Decoder` has read since it was made."""
+    """
+    Frames that a :class:`Decoder` has read since it was made.
 
-    frames: int = 0
+    :ivar foreign: those that are only counted.
+    """
+
     foreign: int = 0
     crc_errors: int = 0
-    skipped_bytes: int = 0
 
 
 def encode_frame(
@@ -158,7 +160,6 @@ class Decoder:
             rest, self.rest = self.rest[1:], b''
             self._signature_end = max(self._signature_end - 1, 0)
             self.taken -= len(rest)
-            self.counters.skipped_bytes += 1
             frames += self.feed(rest)
         return frames
 
@@ -179,12 +180,11 @@ class Decoder:
         if self.rest:
             data = self.rest + data
         frames: list[Frame | ForeignFrames] = []
-        count = 0
-        position = end = 0
+        position = 0
         signature_end = self._signature_end
         if not signature_end:
-            position = end = self._take_plain(data, 0, foreign, frames)
-            if end == len(data):
+            position = self._take_plain(data, 0, foreign, frames)
+            if position == len(data):
                 self.rest = b''
                 return frames
         while position < len(data):
@@ -194,10 +194,8 @@ class Decoder:
                 continue
             start = match.start()
             if start >= signature_end and data[start] == STX_V2:
-                begin, start = start, self._take_plain(data, start, foreign, frames)
-                if start > begin:
-                    self.counters.skipped_bytes += begin - end
-                    position = end = start
+                position = self._take_plain(data, start, foreign, frames)
+                if position > start:
                     continue
             found = self._read(data, start)
             if found is None:
@@ -211,19 +209,15 @@ class Decoder:
                 position = start + 1
                 continue
             frames.append(frame)
-            count += 1
-            self.counters.skipped_bytes += start - end
-            position = end = start + size
+            position = start + size
             if frame.signature is not None:
                 # The checksum does not cover the signature. If the signature was cut short, its
                 # apparent end is the beginning of the next frame.
-                within = data.find(STX_V2, end - SIGNATURE, end)
-                position = within if within >= 0 else end
-                signature_end = end
+                signature_end = position
+                within = data.find(STX_V2, signature_end - SIGNATURE, signature_end)
+                position = within if within >= 0 else signature_end
         else:
             start = len(data)
-        self.counters.frames += count
-        self.counters.skipped_bytes += start - end
         self.rest = data[start:]
         self._signature_end = max(signature_end - start, 0)
         return frames
@@ -235,7 +229,7 @@ class Decoder:
         """Append whole unsigned frames of MAVLink 2; return where something else begins."""
         last = len(data) - HEADER_V2 - CHECKSUM
         source: tuple[int, int] | None = None
-        count = foreign_count = 0
+        count = 0
         while start <= last:
             stx, length, flags, _, sequence, system, component, low, high = _HEADER_V2(data, start)
             id_ = low | high << 16
@@ -257,11 +251,9 @@ class Decoder:
                     sequences = bytearray()
                     frames.append(ForeignFrames(Address(system, component), sequences))
                 sequences.append(sequence)
-                foreign_count += 1
-            count += 1
+                count += 1
             start = end + CHECKSUM
-        self.counters.frames += count
-        self.counters.foreign += foreign_count
+        self.counters.foreign += count
         return start
 
     def _is_frame(self, data: bytes, start: int) -> bool:

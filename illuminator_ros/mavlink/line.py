@@ -222,10 +222,10 @@ class Line:
 
     def next_deadline(self) -> float:
         """Return when :meth:`poll` is due."""
-        due = min(self._connect_at, self._proven_at, self._announce_at)
-        # Most lines have none of these, and this is called for each frame.
         if self.status.events:
-            due = min(due, self.status.next_deadline())
+            return -math.inf
+        due = min(self._connect_at, self._proven_at, self._announce_at)
+        # Most lines wait for none, and this is called for each frame.
         if self.receiver.waits:
             due = min(due, self.receiver.next_deadline())
         return min(due, self._channel.next_deadline()) if self._channel else due

@@ -46,8 +46,8 @@ class Link:
     snapshots and events.
 
     :param further: more URLs, by label; frames are forwarded between all lines.
-    :param on_event: called in that thread when a line is opened, lost, or cannot be
-        opened at first; at a limited rate.
+    :param on_event: called in that thread when a line is opened, lost, or cannot be opened at
+        first.
     :param store: keeps the time stamps of signing for the next run; None keeps them nowhere.
     :param mavlink_version: 1 or 2, of the frames that are sent; both are received.
     :param clock: s, monotonic.
@@ -151,8 +151,8 @@ class Link:
             self._store_due = now + STORE_INTERVAL
             self._store_timestamp(last=False)
         for line in self.lines:
-            while event := line.status.event(now):
-                self._faults.call(self._on_event, event)
+            while line.status.events:
+                self._faults.call(self._on_event, line.status.events.pop(0))
 
     def _finish(self) -> None:
         self._store_timestamp(last=True)

@@ -17,7 +17,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from enum import Enum
 from typing import NamedTuple
 
@@ -27,10 +27,6 @@ from .statistics import TrafficSnapshot
 
 # Different reasons for not opening that are reported before the first opening.
 MAX_REASONS = 16
-# Events that are reported at once, and s until one more may be: a server that accepts and closes
-# connections would fill the log.
-MAX_EVENTS = 20
-EVENT_INTERVAL = 10.0
 
 
 class LinkState(Enum):
@@ -96,7 +92,6 @@ class LinkEvent:
     :param name: the transport, or the URL where there is none.
     :param reason: why it is not open.
     :param was_open: whether it was open before.
-    :param unreported: number of earlier openings and losses without a report.
     :param label: the name of the line while there is no transport.
     """
 
@@ -104,15 +99,13 @@ class LinkEvent:
     name: str
     reason: str = ''
     was_open: bool = False
-    unreported: int = 0
     label: str = field(default='', compare=False)
 
     def __str__(self) -> str:
-        more = f' ({self.unreported} more changes not reported)' if self.unreported else ''
         if self.is_open:
-            return f'link open: {self.name}{more}'
+            return f'link open: {self.name}'
         what = 'lost' if self.was_open else 'not open'
-        return f'link {what}: {self.name}: {self.reason}; trying again{more}'
+        return f'link {what}: {self.name}: {self.reason}; trying again'
 
 
 class LinkSnapshot(NamedTuple):
@@ -157,7 +150,7 @@ class LinkStatus:
     :ivar since: when it was opened or lost, s.
     :ivar reason: why it is not open, '' where it is.
     :ivar openings: how often it was opened.
-    :ivar events: openings and losses without a report yet.
+    :ivar events: openings and losses that must be reported.
     """
 
     def __init__(self, label: str, now: float) -> None:
@@ -166,11 +159,8 @@ class LinkStatus:
         self.reason = 'not opened yet'
         self.openings = 0
         self.label = label
-        self._reasons: set[str] = set()
-        self._unreported = 0
-        self._allowed = float(MAX_EVENTS)
-        self._allowed_at = now
         self.events: list[LinkEvent] = []
+        self._reasons: set[str] = set()
 
     def take(self, input_: LinkInput, now: float, name: str = '', reason: str = '') -> None:
         """Change the state; ``reason`` says why a transport was closed."""
@@ -179,12 +169,12 @@ class LinkStatus:
         if self.state.is_open and not was_open:
             self.since, self.reason = now, ''
             self.openings += 1
-            self._report(LinkEvent(True, name))
+            self.events.append(LinkEvent(True, name, label=self.label))
         elif self.state is LinkState.STOPPED:
             self.since, self.reason = now, 'stopped'
         elif was_open and not self.state.is_open:
             self.since, self.reason = now, reason
-            self._report(LinkEvent(False, name, reason, was_open=True))
+            self.events.append(LinkEvent(False, name, reason, True, self.label))
         elif input_ is LinkInput.CLOSED:
             self.failed(reason)
 
@@ -194,29 +184,4 @@ class LinkStatus:
         # After the first opening only losses and openings are reported.
         if reason not in self._reasons and len(self._reasons) < MAX_REASONS and not self.openings:
             self._reasons.add(reason)
-            self._report(LinkEvent(False, self.label, reason))
-
-    def _report(self, event: LinkEvent) -> None:
-        self.events.append(replace(event, label=self.label))
-        if len(self.events) > 2:
-            del self.events[0]
-            self._unreported += 1
-
-    def event(self, now: float) -> LinkEvent | None:
-        """Return the next event if it may be reported now, once."""
-        if not self.events:
-            return None
-        self._allowed = min(
-            self._allowed + (now - self._allowed_at) / EVENT_INTERVAL, MAX_EVENTS)
-        self._allowed_at = now
-        if self._allowed < 1:
-            return None
-        self._allowed -= 1
-        unreported, self._unreported = self._unreported, 0
-        return replace(self.events.pop(0), unreported=unreported)
-
-    def next_deadline(self) -> float:
-        """Return when a waiting event may be reported, infinity if there is none."""
-        if not self.events:
-            return float('inf')
-        return self._allowed_at + max(1 - self._allowed, 0) * EVENT_INTERVAL
+            self.events.append(LinkEvent(False, self.label, reason, label=self.label))

@@ -109,10 +109,6 @@ class Receiver:
         # The time of the last pause, s, and the foreign frames until then.
         self._paused = (-math.inf, 0)
 
-    def __len__(self) -> int:
-        """Return the number of peers whose bytes are kept apart."""
-        return len(self._streams)
-
     def take(self, peer: Peer, data: bytes, now: float) -> list[Frame] | None:
         """
         Return the frames to handle that bytes of a peer complete.

@@ -51,9 +51,6 @@ class RoutingTable:
         # When a component was last heard for which there was no room.
         self._full_at: float | None = None
 
-    def __len__(self) -> int:
-        return len(self._routes)
-
     def peer_count(self, now: float) -> int:
         """Return how many peers lead to any component."""
         return len({peer for _, peer in self.routes(now)})

@@ -16,6 +16,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 import contextlib
 import errno
 import hashlib
@@ -102,23 +103,13 @@ class TimestampStore:
     """
     The last time stamp used with a key, kept over restarts.
 
-    The file is in ``$ROS_HOME/illuminator_ros`` (``~/.ros/illuminator_ros``), one for each key
-    file and component.
-
-    :raises KeyFileError: if there is no home directory.
+    :param folder: has one file for each key file and component.
     """
 
-    def __init__(self, key_file: str, name: str, directory: Path | None = None) -> None:
-        if directory is None:
-            try:
-                home = Path(os.environ.get('ROS_HOME') or Path.home() / '.ros')
-            except RuntimeError:
-                raise KeyFileError('signing keeps its time stamps in the home directory, and '
-                                   'there is none: set HOME or ROS_HOME') from None
-            directory = home / 'illuminator_ros'
+    def __init__(self, key_file: str, name: str, folder: Path) -> None:
         path = os.path.realpath(os.path.expanduser(key_file))
         tag = hashlib.sha256(f'{path}\0{name}'.encode()).hexdigest()[:16]
-        self.path = directory / f'signing-{tag}'
+        self.path = folder / f'signing-{tag}'
         self._failed = False
 
     def begin(self, unix_time: float) -> int:
@@ -163,7 +154,7 @@ class TimestampStore:
 
 
 def load_signing(
-    mode: SigningMode, key_file: str, name: str, unix_time: float,
+    mode: SigningMode, key_file: str, name: str, unix_time: float, folder: Callable[[], Path],
 ) -> tuple[Signing, TimestampStore | None]:
     """
     Return the signing with the key of a file, and the store of its time stamps.
@@ -171,6 +162,7 @@ def load_signing(
     :param key_file: '' for none.
     :param name: of the component whose time stamps are stored.
     :param unix_time: now, s.
+    :param folder: returns the folder of the time stamps.
     :raises KeyFileError: if the key cannot be used, or is given and not used, which would look
         like protection.
     """
@@ -179,5 +171,5 @@ def load_signing(
             raise KeyFileError('a key file is given, but the signing mode is off')
         return Signing(), None
     key = load_key(key_file)
-    store = TimestampStore(key_file, name)
+    store = TimestampStore(key_file, name, folder())
     return Signing(mode, key, timestamp=store.begin(unix_time)), store

@@ -37,6 +37,7 @@ from .diagnostics import SIGNING_NEEDED
 from .diagnostics_publisher import DiagnosticsPublisher
 from .graph import shared_names, unheard_publishers
 from .ignored_parameters import ignored_parameters
+from .link_call import ENDING
 from .node_manager import NodeManager, without_node_name
 from .parameters import (
     declare_given,
@@ -235,7 +236,8 @@ class Bridge:
             return lambda key, severity, text: reports.put((log, key, severity, text))
 
         def start(now: float) -> None:
-            steps: list[Callable[[float], None]] = [self._component.close]
+            steps: list[Callable[[float], None]] = [
+                functools.partial(self._component.close, reason=ENDING)]
             steps += (functools.partial(one.payload.shut_down, report=reporter(one.log))
                       for one in self._served)
             for step in steps:

@@ -12,7 +12,11 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""The nodes of the devices of one kind: the payload's own, and one for each further device."""
+"""
+The nodes of the devices of one kind: the payload's own, and one for each further device.
+
+Events that devices of each kind have become log lines and topics here.
+"""
 
 from __future__ import annotations
 
@@ -23,10 +27,18 @@ from typing import Any, Generic, Protocol, TypeVar
 from rclpy.node import Node
 
 from .diagnostics_publisher import DiagnosticsSource
+from .node import NodeInterface
 from .node_manager import NodeRequest
 from .payload import Host
 from .throttled_log import NodeLog
-from ..payload.device_events import DeviceEvent, DeviceForgotten
+from ..payload.command_sources import describe
+from ..payload.device_events import (
+    DeviceConnected,
+    DeviceDisconnected,
+    DeviceEvent,
+    DeviceForgotten,
+    DeviceHeld,
+)
 
 # s without a device until the log gives the reason, once.
 ABSENCE_DELAY = 5.0
@@ -148,6 +160,26 @@ class DeviceNodes(Generic[K, N]):
             self._absence_due = math.inf
             if self.first_is_free:
                 self._host.log.warning(self.first.absence(now))
+
+
+def publish_event(
+    event: DeviceEvent[Any], kind: str, log: NodeLog, interface: NodeInterface,
+) -> None:
+    """
+    Write the log line of an event, and publish ``~/connected`` or ``~/source``; ignore others.
+
+    :param kind: a noun for the device, such as ``light``.
+    """
+    match event:
+        case DeviceConnected(note=note):
+            log.info(f'{kind} {event.key} connected{note and ", "}{note}', 'connection')
+            interface.publish('connected', True)
+        case DeviceDisconnected(reason=reason):
+            log.warning(f'{kind} {event.key} lost: {reason}', 'connection')
+            interface.publish('connected', False)
+        case DeviceHeld(change=change):
+            log.info(f'{kind} {event.key} {describe(change)}', 'holder')
+            interface.publish('source', change.after or '')
 
 
 def _shared_names(node: Node, first: Node) -> list[str]:

@@ -17,17 +17,15 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
-import contextlib
 from dataclasses import dataclass
-import queue
+import functools
 import threading
-from typing import NamedTuple
 
 from diagnostic_msgs.msg import DiagnosticArray
-from rclpy.exceptions import InvalidHandle
 from rclpy.node import Node
 
 from .diagnostics import line_reports, link_diagnostics, LinkDiagnostics, loops, Report
+from .executor_calls import ExecutorCalls
 from .qos import STREAM_QOS
 from ..mavlink.component import Component
 from ..mavlink.link import Link
@@ -47,20 +45,6 @@ class DiagnosticsSource:
 
     node: str
     take_snapshot: Callable[[float], MakeReports]
-
-
-class _Taken(NamedTuple):
-    """
-    Snapshots of the link and of the sources.
-
-    :param now: when they were taken, s.
-    :param tolerance: see :meth:`DiagnosticsPublisher.poll`.
-    """
-
-    now: float
-    tolerance: float
-    link: LinkDiagnostics
-    sources: Sequence[tuple[DiagnosticsSource, MakeReports]]
 
 
 class DiagnosticsPublisher:
@@ -84,9 +68,7 @@ class DiagnosticsPublisher:
         self._lock = threading.Lock()
         # When each source is due, and the levels that were published last.
         self._sources: dict[DiagnosticsSource, tuple[float, list[bytes]]] = {}
-        # Snapshots that the link's thread has taken, for the executor's thread.
-        self._taken: queue.SimpleQueue[_Taken] = queue.SimpleQueue()
-        self._have_taken = node.create_guard_condition(self._publish_due)
+        self._call = ExecutorCalls(node).call
 
     def add(self, source: DiagnosticsSource) -> None:
         """Publish for a node from now on; callable from any thread."""
@@ -116,34 +98,33 @@ class DiagnosticsPublisher:
             sources = tuple(self._sources)
 
         def take(now: float) -> None:
-            self._taken.put(_Taken(now, tolerance, self.snapshot(now), [
-                (source, source.take_snapshot(now)) for source in sources]))
-            # At the end of the process the nodes may leave before the link's thread has ended.
-            with contextlib.suppress(InvalidHandle):
-                self._have_taken.trigger()
+            self._call(functools.partial(
+                self._publish_due, self.snapshot(now),
+                [(source, source.take_snapshot(now)) for source in sources], tolerance))
 
         self._link.call(take)
 
     # In the executor's thread
 
-    def _publish_due(self) -> None:
-        while not self._taken.empty():
-            taken = self._taken.get()
-            for source, make_reports in taken.sources:
-                reports = [*make_reports(taken.link)]
-                # The first node alone reports the further lines.
-                if source is taken.sources[0][0]:
-                    reports += line_reports(taken.link)
-                levels = [report.level for report in reports]
-                due, published = self._sources.get(source, (0.0, levels))
-                if taken.now >= due - taken.tolerance:
-                    due = taken.now + self._period
-                elif levels == published:
-                    continue
-                with self._lock:
-                    if source in self._sources:
-                        self._sources[source] = due, levels
-                self._publish(source, reports)
+    def _publish_due(
+        self, link: LinkDiagnostics, sources: Sequence[tuple[DiagnosticsSource, MakeReports]],
+        tolerance: float,
+    ) -> None:
+        for source, make_reports in sources:
+            reports = [*make_reports(link)]
+            # The first node alone reports the further lines.
+            if source is sources[0][0]:
+                reports += line_reports(link)
+            levels = [report.level for report in reports]
+            due, published = self._sources.get(source, (0.0, levels))
+            if link.taken_at >= due - tolerance:
+                due = link.taken_at + self._period
+            elif levels == published:
+                continue
+            with self._lock:
+                if source in self._sources:
+                    self._sources[source] = due, levels
+            self._publish(source, reports)
 
     def _publish(self, source: DiagnosticsSource, reports: Sequence[Report]) -> None:
         array = DiagnosticArray()

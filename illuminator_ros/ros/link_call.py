@@ -22,11 +22,12 @@ import threading
 from typing import TypeVar
 
 from .throttled_log import NodeLog
-from ..mavlink.command_sender import CommandStatus
 from ..mavlink.link import Link
 
 T = TypeVar('T')
 
+# Why a request is not executed at the end of the process.
+ENDING = 'the bridge is ending'
 # Requests of one kind that may wait for their answers.
 MAX_PENDING = 64
 
@@ -62,7 +63,7 @@ class LinkCalls:
         :param kind: an OFF is of another kind than an ON, so that no number of these refuses it.
         """
         if not self._link.is_running():
-            answer(refusal(CommandStatus.CLOSED.value))
+            answer(refusal(ENDING))
             return
         with self._lock:
             is_busy = self._waiting[kind] >= self._limit

@@ -17,7 +17,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping
-import contextlib
 import inspect
 import math
 import threading
@@ -25,11 +24,12 @@ import time
 from typing import Any, NamedTuple, TypeVar
 
 from rcl_interfaces import msg
-from rclpy.exceptions import InvalidHandle
 from rclpy.node import Node
 from rclpy.parameter import Parameter
 
+from .executor_calls import ExecutorCalls
 from .rclpy_private import parameter_overrides
+from .ros_home import state_folder
 from .throttled_log import NodeLog
 from ..mavlink.messages import Address
 from ..mavlink.signing import Signing, SigningMode
@@ -196,7 +196,8 @@ class LinkParameters(NamedTuple):
         """
         try:
             return load_signing(
-                self.signing_mode, self.signing_key_file, f'bridge {self.address}', time.time())
+                self.signing_mode, self.signing_key_file, f'bridge {self.address}', time.time(),
+                state_folder)
         except KeyFileError as error:
             raise ParameterError(f'signing_key_file: {error}') from None
 
@@ -352,18 +353,18 @@ class DeviceParameters:
     before it takes the requests that were sent after them: rclpy's parameters are for one thread.
 
     :ivar specs: by name.
+    :ivar call: has a function called in the executor's thread.
     """
 
     def __init__(self, node: Node, specs: Iterable[ParameterSpec], log: NodeLog) -> None:
         self.specs = {spec.name: spec for spec in specs}
+        self.call = ExecutorCalls(node).call
         self._node = node
         self._log = log
         # The newest values that are not shown yet, and the upper ends of ranges.
         self._values: dict[str, object] = {}
         self._highs: dict[str, float] = {}
-        self._calls: list[Callable[[], None]] = []
         self._lock = threading.Lock()
-        self._called = node.create_guard_condition(self._run)
         for spec in self.specs.values():
             node.declare_parameter(
                 spec.name, spec.type, spec.descriptor(read_only=False), ignore_override=True)
@@ -389,22 +390,7 @@ class DeviceParameters:
             self._highs[name] = high
         self.call(self._change)
 
-    def call(self, function: Callable[[], None]) -> None:
-        """Have a function called in the executor's thread, once if it waits already."""
-        with self._lock:
-            if function not in self._calls:
-                self._calls.append(function)
-        # The node of a forgotten device may be gone.
-        with contextlib.suppress(InvalidHandle):
-            self._called.trigger()
-
     # In the executor's thread
-
-    def _run(self) -> None:
-        with self._lock:
-            calls, self._calls = self._calls, []
-        for function in calls:
-            function()
 
     def _change(self) -> None:
         with self._lock:

@@ -111,7 +111,7 @@ def test_a_client_only_stops_and_releases_the_gimbal_whatever_is_under_way_and_c
         answers += use(rig, draw)
         rig.run(draw.choice((0.0, 0.02, 0.1)))
     before = len(rig.sent) + len(rig.component.outgoing)
-    rig.component.close(rig.now)
+    rig.component.close(rig.now, ENDING)
     assert all(answer.results for answer in answers)
     releases: list[Result] = []
     must_release = rig.gimbal.has_any_control
@@ -174,7 +174,7 @@ def test_a_manager_stops_its_device_and_follows_no_player_any_more(
         follow(rig, draw)
         rig.run(draw.choice((0.0, 0.02, 0.1)))
     before, known = len(rig.sent), len(rig.events)
-    rig.component.close(rig.now)
+    rig.component.close(rig.now, ENDING)
     ended_at = rig.now + LIMIT
     results = [rig.result(PILOT, pitch_yaw_command(20.0, 0.0, 5.0, 5.0)),
                rig.result(PILOT, region(47.001, 8.0, 500.0))]
@@ -208,7 +208,7 @@ def test_ros_as_a_player_of_its_own_manager_turns_the_gimbal_no_more() -> None:
     rig.run(0.1)
     assert any(rates(of(GimbalDeviceSetAttitude, rig.messages(GimbalDeviceSetAttitude))[-1]))
 
-    rig.component.close(rig.now)
+    rig.component.close(rig.now, ENDING)
     gimbal.release_control(rig.now, answers[1])
     refusals = gimbal.set_rates((0.0, 0.0, 0.2), rig.now)
     gimbal.take_control(rig.now, answers[2])

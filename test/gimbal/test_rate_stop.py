@@ -80,7 +80,7 @@ class Turning(ManagerRig):
 
 
 def end(rig: Turning) -> None:
-    rig.component.close(rig.now)
+    rig.component.close(rig.now, 'the process ends')
 
 
 def become_inactive(rig: Turning) -> None:

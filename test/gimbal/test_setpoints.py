@@ -411,7 +411,7 @@ def test_at_the_end_of_the_process_only_a_zero_and_the_release_are_sent() -> Non
     rig.run(0.02)
     begun = len(rig.sent)
 
-    rig.component.close(rig.now)
+    rig.component.close(rig.now, 'the process ends')
     rig.gimbal.release_control(rig.now, rig.done)
     rig.run(1.0)
 

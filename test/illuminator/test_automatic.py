@@ -166,7 +166,7 @@ def _release(pair: Pair) -> None:
 
 
 def _end(pair: Pair) -> None:
-    pair.controller.close(pair.now)
+    pair.controller.close(pair.now, 'the process ends')
     pair.controller.client.switch_off_finally(pair.now, lambda light, result, now: None)
 
 

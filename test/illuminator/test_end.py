@@ -75,7 +75,7 @@ class Ending:
         self.before = len(self.pair.near.sent)
         self.ended_at = self.pair.now
         self.pair.controller.events.subscribe(self.events.append)
-        self.pair.controller.close(self.pair.now)
+        self.pair.controller.close(self.pair.now, ENDING)
         if off:
             self.pair.controller.client.switch_off_finally(self.pair.now, self._report)
         self.reported_at_once = set(self.reports)

@@ -238,7 +238,7 @@ def test_closed_sender_ends_all_commands_and_sends_no_others_than_those_of_the_e
         return isinstance(sent, Command) and sent.params[0] == 0.0
 
     assert rig.sender.refusal == ''
-    rig.sender.close(rig.now, may_send)
+    rig.sender.close(rig.now, may_send, 'the bridge is ending')
     rig.sender.send(heartbeat(mavlink.MAV_TYPE_GCS))
     refused = rig.start(407, param1=1.0)
     assert [run.outcome.status for run in (on, refused)] == [CommandStatus.CLOSED] * 2

@@ -56,10 +56,10 @@ def test_copies_are_counted_by_the_lines_of_the_original_and_of_the_copy() -> No
     assert filter_.copies == {(0, 1): (2, 2.0)}
 
 
-def test_memory_is_bounded_against_any_number_of_frames_and_ends_after_5_s() -> None:
+def test_of_too_many_frames_the_newest_are_remembered() -> None:
     filter_ = DuplicateFilter()
-    for number in range(2 * MAX_FRAMES):
-        filter_.add(number.to_bytes(4, 'little'), FIRST, 0.0)
-    assert len(filter_) == MAX_FRAMES
-    filter_.add(b'later', FIRST, MEMORY)
-    assert len(filter_) == 1
+    frames = [number.to_bytes(4, 'little') for number in range(MAX_FRAMES + 1)]
+    for frame in frames:
+        filter_.add(frame, FIRST, 0.0)
+    assert [filter_.is_copy(frame, SECOND, 0.0) for frame in (*frames[:2], frames[-1])] == [
+        False, True, True]

@@ -35,54 +35,22 @@ import pytest
     ('ops', link_state.LinkState.STOPPED, ['open'])])
 def test_state_and_events_follow_from_the_inputs(
         inputs: str, state: link_state.LinkState, events: list[str]) -> None:
-    status, reported = link_state.LinkStatus('label', 0.0), []
+    status = link_state.LinkStatus('label', 0.0)
     for now, initial in enumerate(inputs):
         (input_,) = (one for one in link_state.LinkInput if one.value[0] == initial)
         status.take(input_, float(now), 'name', 'reason')
-        while event := status.event(float(now)):
-            reported.append(str(event).split(':')[0].removeprefix('link '))
+    reported = [str(event).split(':')[0].removeprefix('link ') for event in status.events]
     assert (status.state, reported) == (state, events)
     assert state.is_open == (status.reason == '')
     assert status.openings == events.count('open')
 
 
 def test_reasons_for_not_opening_are_reported_once_each_up_to_a_bound() -> None:
-    status, reported = link_state.LinkStatus('label', 0.0), []
+    status = link_state.LinkStatus('label', 0.0)
     for number in range(2 * link_state.MAX_REASONS):
         for _ in range(2):
             status.failed(f'reason {number}')
-            while event := status.event(0.0):
-                reported.append(str(event))
-    assert reported == [f'link not open: label: reason {number}; trying again'
-                        for number in range(link_state.MAX_REASONS)]
+    assert [*map(str, status.events)] == [
+        f'link not open: label: reason {number}; trying again'
+        for number in range(link_state.MAX_REASONS)]
     assert status.reason == f'reason {2 * link_state.MAX_REASONS - 1}'
-
-
-def flap(status: link_state.LinkStatus, now: float, times: int) -> list[int]:
-    """Open and lose a link at one moment; return the unreported changes of each report."""
-    found = []
-    for _ in range(times):
-        for input_ in (link_state.LinkInput.OPENED, link_state.LinkInput.PROVED,
-                       link_state.LinkInput.CLOSED):
-            status.take(input_, now, 'name', 'reason')
-            while event := status.event(now):
-                found.append(event.unreported)
-    return found
-
-
-def test_reports_beyond_the_limit_are_refilled_with_time_and_count_the_rest() -> None:
-    status = link_state.LinkStatus('label', 0.0)
-    assert flap(status, 0.0, 50) == [0] * link_state.MAX_EVENTS
-    assert status.next_deadline() == link_state.EVENT_INTERVAL
-    assert status.event(link_state.EVENT_INTERVAL - 0.1) is None
-    # The newest two changes are kept, and all others are counted.
-    event = status.event(link_state.EVENT_INTERVAL)
-    assert event is not None
-    assert str(event) == (
-        f'link open: name ({100 - link_state.MAX_EVENTS - 2} more changes not reported)')
-    assert status.event(link_state.EVENT_INTERVAL) is None
-    last = status.event(2 * link_state.EVENT_INTERVAL)
-    assert (last and (last.is_open, last.unreported)) == (False, 0)
-    assert status.next_deadline() == float('inf')
-    # The limit does not grow beyond its initial value.
-    assert flap(status, 1000 * link_state.EVENT_INTERVAL, 50) == [0] * link_state.MAX_EVENTS

@@ -81,7 +81,7 @@ def test_components_beyond_the_bound_take_no_way_from_those_remembered(
 ) -> None:
     for number in range(2 * MAX_ROUTES):
         table.heard(Address(2 + number // 256, number % 256), 'a', 0.0)
-    assert len(table) == MAX_ROUTES
+    assert len(table.sources()) == MAX_ROUTES
     assert table.towards(LIGHT, PEERS, 0.0) == ['b']
     assert table.towards(Address(9, 9), PEERS, 0.0) == PEERS
 
@@ -94,7 +94,7 @@ def test_full_table_makes_room_for_silent_components_once_a_second(table: Routin
     for now in (EXPIRY - 0.1, EXPIRY + 0.1, EXPIRY + EXPIRY_INTERVAL):
         table.heard(new, 'c', now)
         remembered.append(table.towards(new, PEERS, now) == ['c'])
-    assert (remembered, len(table)) == ([False, False, True], 1)
+    assert (remembered, len(table.sources())) == ([False, False, True], 1)
 
 
 def test_peers_count_while_they_are_heard_and_none_do_after_the_link_is_closed(

@@ -32,6 +32,7 @@ from illuminator_ros.mavlink.signing_files import (
     MAX_KEY_FILE,
     TimestampStore,
 )
+from illuminator_ros.ros.ros_home import state_folder
 import pytest
 from support.frames import frame_of, only
 from support.signers import checker, LAST_STAMP, NOW, SECOND, signed, STAMP
@@ -138,11 +139,13 @@ def test_clock_that_was_ahead_for_a_moment_locks_no_light_out(store: TimestampSt
 
 
 SIGN_UNTIL_KILLED = """
+from pathlib import Path
 import sys
 from illuminator_ros.mavlink.signing import SigningMode
 from illuminator_ros.mavlink.signing_files import load_signing
 now = float(sys.argv[2])
-signing, store = load_signing(SigningMode.SIGN, sys.argv[1], 'bridge', now)
+signing, store = load_signing(SigningMode.SIGN, sys.argv[1], 'bridge', now,
+                              lambda: Path(sys.argv[3]))
 store.store(signing.timestamp, now)
 while True:
     signing.sign(b'', now)
@@ -151,12 +154,12 @@ while True:
 
 
 def test_kill_9_again_and_again_repeats_no_time_stamp_and_locks_no_light_out(
-        tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setenv('ROS_HOME', str(tmp_path))
+        tmp_path: Path) -> None:
     key, newest = key_file(tmp_path, PASSPHRASE), 0
     for _ in range(3):
-        with subprocess.Popen([sys.executable, '-c', SIGN_UNTIL_KILLED, key, str(NOW)],
-                              stdout=subprocess.PIPE) as program:
+        with subprocess.Popen(
+                [sys.executable, '-c', SIGN_UNTIL_KILLED, key, str(NOW), str(tmp_path)],
+                stdout=subprocess.PIPE) as program:
             assert program.stdout is not None
             data = program.stdout.read(80_000)
             program.kill()
@@ -164,7 +167,7 @@ def test_kill_9_again_and_again_repeats_no_time_stamp_and_locks_no_light_out(
         used = [int.from_bytes(data[at:at + 8], 'big') for at in range(0, len(data) - 7, 8)]
         assert newest < used[0] < used[-1]
         newest = used[-1]
-    ours, light = (load_signing(SigningMode.REQUIRE, key, name, NOW)[0]
+    ours, light = (load_signing(SigningMode.REQUIRE, key, name, NOW, lambda: tmp_path)[0]
                    for name in ('bridge', 'light'))
     for sender, receiver in ((ours, light), (light, ours)):
         frame = only(sender.sign(frame_of(signed=True), NOW))
@@ -211,11 +214,11 @@ def test_each_key_file_and_component_has_one_state_file_in_the_ros_home(
     monkeypatch.chdir(tmp_path)
     (tmp_path / 'link').symlink_to(tmp_path / 'key')
     names = ('key', './key', '~/key', str(tmp_path / 'key'), 'link')
-    (one,) = {TimestampStore(name, 'bridge 1/193').path for name in names}
+    (one,) = {TimestampStore(name, 'bridge 1/193', state_folder()).path for name in names}
     assert one.parent == tmp_path / '.ros' / 'illuminator_ros'
     monkeypatch.setenv('ROS_HOME', str(tmp_path / 'ros'))
-    assert TimestampStore('key', 'x').path.parent == tmp_path / 'ros' / 'illuminator_ros'
-    assert len({TimestampStore(key, name).path for key in ('key', 'other')
+    assert state_folder() == tmp_path / 'ros' / 'illuminator_ros'
+    assert len({TimestampStore(key, name, tmp_path).path for key in ('key', 'other')
                 for name in ('bridge 1/193', 'bridge 1/195')}) == 4
 
 
@@ -226,4 +229,4 @@ def test_missing_home_directory_is_named(monkeypatch: pytest.MonkeyPatch) -> Non
     monkeypatch.delenv('ROS_HOME', raising=False)
     monkeypatch.setattr(Path, 'home', no_home)
     with pytest.raises(KeyFileError, match='set HOME or ROS_HOME'):
-        TimestampStore('key', 'x')
+        state_folder()

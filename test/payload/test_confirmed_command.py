@@ -221,7 +221,7 @@ def test_a_command_that_insists_is_sent_until_a_status_shows_the_change(
 @pytest.mark.parametrize('insists', [False, True])
 @pytest.mark.parametrize(('status', 'text'), [
     (CommandStatus.LINK_LOST, 'the link was lost (1 try, 100 ms)'),
-    (CommandStatus.CLOSED, 'the bridge is ending')])
+    (CommandStatus.CLOSED, 'closed')])
 def test_a_lost_link_and_the_end_of_the_process_end_every_command(
     insists: bool, status: CommandStatus, text: str,
 ) -> None:

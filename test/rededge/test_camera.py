@@ -372,7 +372,7 @@ def test_from_the_beginning_of_the_end_requests_are_answered_and_nothing_is_sent
     rig.ping()
     rig.capture()
     sent = len(rig.sent)
-    rig.component.close(rig.now)
+    rig.component.close(rig.now, ENDING)
     rig.client.ping(rig.now, rig.take_result)
     rig.capture()
     rig.client.feeder.orientation.take_attitude(

@@ -20,6 +20,7 @@ import socket
 
 from illuminator_ros.mavlink.signing import ticks
 from illuminator_ros.mavlink.signing_files import TimestampStore
+from illuminator_ros.ros.ros_home import state_folder
 import pytest
 from support.ports import free_port
 from support.ros import Parameters, Ros, running_bridge, running_simulator
@@ -61,7 +62,7 @@ def test_bridge_signs_on_from_the_time_stamp_that_the_run_before_has_stored(
     own_ros: Ros, key_file: KeyFile,
 ) -> None:
     key, later = key_file(SECRET), ticks(4e9)
-    TimestampStore(key, 'bridge 1/193').store(later, 0.0, last=True)
+    TimestampStore(key, 'bridge 1/193', state_folder()).store(later, 0.0, last=True)
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as light:
         light.bind(('127.0.0.1', 0))
         light.settimeout(PATIENCE)

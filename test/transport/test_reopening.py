@@ -22,7 +22,7 @@ from pathlib import Path
 import socket
 
 from illuminator_ros.illuminator.light_control import LightSettings
-from illuminator_ros.mavlink import component, line, link_state
+from illuminator_ros.mavlink import component, line
 from illuminator_ros.mavlink import connector as connector_module
 from illuminator_ros.mavlink.retries import CONNECTION
 from illuminator_ros.mavlink.transport.udp import MAX_PEERS, PEER_EXPIRY
@@ -201,13 +201,12 @@ def cycle(link: live_link.LiveLink, come: Callable[[], None], go: Callable[[], N
 
 
 @pytest.fixture
-def _many_events(monkeypatch: pytest.MonkeyPatch, pauses: Log[float]) -> None:
-    monkeypatch.setattr(link_state, 'MAX_EVENTS', 10 * CYCLES)
+def _proven_at_once(monkeypatch: pytest.MonkeyPatch, pauses: Log[float]) -> None:
     monkeypatch.setattr(line, 'PROOF_TIME', 0.0)
 
 
 def test_200_restarts_of_a_tcp_server_leak_nothing(
-        run: live_link.Run, server: Server, _many_events: None) -> None:
+        run: live_link.Run, server: Server, _proven_at_once: None) -> None:
     server.listen()
     cycle(run(live_link.LiveLink(server.url)), server.come, server.go)
 

@@ -40,7 +40,7 @@ from ...payload.mount_attitude import YawFrame
 from ...ros import node as ros_node
 from ...ros.command_sources import prefixes, release_services, SOURCE
 from ...ros.conversions import quaternion_message
-from ...ros.device_events import publish_event
+from ...ros.device_nodes import publish_event
 from ...ros.diagnostics_publisher import DiagnosticsSource, MakeReports
 from ...ros.node import Interface
 from ...ros.parameter_services import ParameterServices

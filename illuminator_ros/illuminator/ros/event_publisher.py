@@ -31,7 +31,7 @@ from ...mavlink.dialect import mavlink
 from ...mavlink.messages import Address
 from ...payload.command_sources import DEFAULT
 from ...payload.device_events import DeviceConnected, DeviceDisconnected, DeviceHeld
-from ...ros.device_events import publish_event
+from ...ros.device_nodes import publish_event
 from ...ros.diagnostics import ERROR, WARN
 from ...ros.node import Interface, NodeInterface
 from ...ros.parameters import DeviceParameters

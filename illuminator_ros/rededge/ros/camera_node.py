@@ -52,8 +52,7 @@ from ...mavlink.command_sender import CommandSender
 from ...mavlink.dialect import mavlink
 from ...payload.rotation import Vector
 from ...ros.conversions import GEOID_SEPARATION, quaternion_message
-from ...ros.device_events import publish_event
-from ...ros.device_nodes import ABSENCE_DELAY
+from ...ros.device_nodes import ABSENCE_DELAY, publish_event
 from ...ros.diagnostics_publisher import DiagnosticsSource, MakeReports
 from ...ros.node import Answer, Interface, NodeInterface, RequestService
 from ...ros.parameter_services import ParameterServices
