@@ -5,6 +5,8 @@ PYTHON_IN_VENV := .venv$(addprefix -,$(filter-out jazzy,$(ROS)))/bin/python
 TESTS ?= test
 
 SECONDS ?= 60
+# Each of the many processes of the tests would compile each module again.
+export PYTHONDONTWRITEBYTECODE =
 # Arguments of bench/run.py, such as '--repeat 3 enable'.
 BENCH ?=
 
@@ -66,3 +68,4 @@ doc-tables: environment
 
 clean:
 	rm -rf .venv .venv-kilted build install log .pytest_cache .mypy_cache .ruff_cache .hypothesis
+	find [a-z]* -name __pycache__ -prune -exec rm -rf {} +
