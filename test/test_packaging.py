@@ -82,11 +82,15 @@ def versions(folder: Path) -> list[str]:
         output(folder, '-c', f'import {PACKAGE}; print({PACKAGE}.__version__)')]
 
 
+def copy_to(folder: Path) -> Path:
+    """Return a copy of the released files."""
+    return shutil.copytree(ROOT, folder / PACKAGE, ignore=shutil.ignore_patterns(
+        '.*', '__pycache__', '*.egg-info', 'build', 'install', 'log', 'test'))
+
+
 @pytest.fixture
 def copy(tmp_path: Path) -> Path:
-    """Return a copy of the released files."""
-    return shutil.copytree(ROOT, tmp_path / PACKAGE, ignore=shutil.ignore_patterns(
-        '.*', '__pycache__', '*.egg-info', 'build', 'install', 'log', 'test'))
+    return copy_to(tmp_path)
 
 
 def test_version_is_the_same_everywhere() -> None:
@@ -167,23 +171,12 @@ def test_package_declares_the_imports_of_its_tests() -> None:
     assert needed - declared - PEERS - GENERATORS == set()
 
 
-def test_pip_installs_executables_with_names_that_hide_no_other_program(
-    copy: Path, tmp_path: Path,
-) -> None:
-    pytest.importorskip('wheel', reason='wheel is not installed')
-    output(copy, '-m', 'pip', 'install', '--no-index', '--no-deps', '--no-build-isolation',
-           '--ignore-installed', '--prefix', str(tmp_path / 'prefix'), '.')
-
-    assert {path.name for path in (tmp_path / 'prefix' / 'bin').iterdir()} == {
-        f'illuminator-{name}' for name in (
-            'bridge', 'conformance', 'discover', 'gimbal', 'gimbal_manager', 'monitor',
-            'rededge', 'simulator')}
-
-
-@pytest.fixture
-def clean(copy: Path, tmp_path: Path) -> Path:
+@pytest.fixture(scope='module')
+def clean(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Return the folder of the executables of a venv with the wheel and pymavlink, without ROS."""
     pytest.importorskip('wheel', reason='wheel is not installed')
+    tmp_path = tmp_path_factory.mktemp('clean')
+    copy = copy_to(tmp_path)
     output(copy, '-m', 'pip', 'wheel', '--no-index', '--no-deps', '--no-build-isolation',
            '--wheel-dir', str(tmp_path), '.')
     [wheel] = tmp_path.glob('*.whl')
@@ -196,6 +189,14 @@ def clean(copy: Path, tmp_path: Path) -> Path:
     output(tmp_path, '-m', 'pip', '--python', str(venv / 'bin' / 'python'), 'install',
            '--no-index', '--no-deps', str(wheel))
     return venv / 'bin'
+
+
+def test_pip_installs_executables_with_names_that_hide_no_other_program(clean: Path) -> None:
+    assert {path.name for path in clean.iterdir()
+            if not re.match('python|pip|[aA]ctivate', path.name)} == {
+        f'illuminator-{name}' for name in (
+            'bridge', 'conformance', 'discover', 'gimbal', 'gimbal_manager', 'monitor',
+            'rededge', 'simulator')}
 
 
 def test_tools_of_the_wheel_that_need_no_ros_work_in_a_clean_venv(clean: Path) -> None:
