@@ -26,5 +26,6 @@ settings.load_profile('steady')
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Begin with the folders of the longest tests: at the end, one would run alone."""
-    items.sort(key=lambda item: item.path.parent.name not in ('lint', 'system'))
+    """Begin with the folders of the longest files: at the end, one would run alone."""
+    items.sort(key=lambda item: item.path.parent.name not in (
+        'lint', 'system', 'monitor', 'ros', 'gimbal', 'cli'))
