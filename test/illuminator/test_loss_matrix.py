@@ -19,8 +19,8 @@ from __future__ import annotations
 import itertools
 
 import pytest
-from support.faulty_wire import Faults
 from support.lossy_line import CONFIRMED, Run
+from support.wire import Faults
 
 KINDS = ('drop', 'duplicate', 'reorder', 'delay', 'corrupt')
 # Name -> faults of the line towards the lights, and faults on the way back.

@@ -26,8 +26,8 @@ from illuminator_ros.mavlink.messages import Address
 from illuminator_ros.payload.command_sources import DEFAULT
 import pytest
 from support.back_to_back import Pair
-from support.faulty_wire import Faults
 from support.random_users import RandomUsers
+from support.wire import Faults
 
 SECONDS = 90.0
 # s after the repair of the line within which all requests must be answered and all states known:
