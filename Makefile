@@ -5,6 +5,8 @@ PYTHON_IN_VENV := .venv$(addprefix -,$(filter-out jazzy,$(ROS)))/bin/python
 TESTS ?= test
 
 SECONDS ?= 60
+# Each of the many processes of the tests would compile each module again.
+export PYTHONDONTWRITEBYTECODE =
 # Arguments of bench/run.py, such as '--repeat 3 enable'.
 BENCH ?=
 
@@ -33,7 +35,7 @@ demo:
 
 # The types of rclpy differ: mypy checks with those of Jazzy.
 test: $(if $(filter-out jazzy,$(ROS)),environment,check)
-	@$(PYTHON_IN_VENV) -m pytest -n 4 --dist loadfile --no-loadscope-reorder $(TESTS)
+	@$(PYTHON_IN_VENV) -m pytest -n 6 --dist loadfile --no-loadscope-reorder $(TESTS)
 
 unit: environment
 	@$(PYTHON_IN_VENV) -m pytest -p support.no_ros test/mavlink test/transport test/payload \
@@ -66,3 +68,4 @@ doc-tables: environment
 
 clean:
 	rm -rf .venv .venv-kilted build install log .pytest_cache .mypy_cache .ruff_cache .hypothesis
+	find [a-z]* -name __pycache__ -prune -exec rm -rf {} +

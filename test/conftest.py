@@ -23,8 +23,12 @@ import pytest
 settings.register_profile(
     'steady', deadline=None, derandomize=True, suppress_health_check=[HealthCheck.too_slow])
 settings.load_profile('steady')
+# Files that take longer than 10 s.
+LONG = {f'test_{name}.py' for name in (
+    'app', 'conformance', 'findings', 'gimbal_node', 'manager_node', 'mavsdk', 'rededge', 'tf')}
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Begin with the folders of the longest tests: at the end, one would run alone."""
-    items.sort(key=lambda item: item.path.parent.name not in ('lint', 'system'))
+    """Begin with long files: at the end, one would run alone; then mix those of all folders."""
+    items.sort(key=lambda item: (item.path.parent.name not in ('lint', 'system'),
+                                 item.path.name not in LONG, item.path.name))

@@ -17,7 +17,8 @@
 from __future__ import annotations
 
 import ast
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
+import functools
 import graphlib
 from pathlib import Path
 import re
@@ -74,12 +75,18 @@ def allowed(importer: tuple[str, ...]) -> set[tuple[str, ...]]:
     return own | {importer, ('ros',)} if importer[1:] else own
 
 
+@functools.cache
+def nodes(module: str) -> Sequence[ast.AST]:
+    return [*ast.walk(ast.parse(MODULES[module].read_text()))]
+
+
+@functools.cache
 def imports(module: str) -> set[str]:
     """Return the full names of the modules that a module imports, TYPE_CHECKING included."""
     path = MODULES[module]
     package = module if path.name == '__init__.py' else module.rpartition('.')[0]
     names = set()
-    for node in ast.walk(ast.parse(path.read_text())):
+    for node in nodes(module):
         if isinstance(node, ast.Import):
             names |= {alias.name for alias in node.names}
         elif isinstance(node, ast.ImportFrom):
@@ -102,7 +109,7 @@ def roots(names: set[str]) -> set[str]:
 
 def identifiers(module: str) -> Iterator[str]:
     """Return the names that a module defines or uses."""
-    for node in ast.walk(ast.parse(MODULES[module].read_text())):
+    for node in nodes(module):
         for field in ('id', 'attr', 'name', 'arg'):
             if isinstance(name := getattr(node, field, None), str):
                 yield name
@@ -220,7 +227,7 @@ def test_classes_have_at_most_15_fields() -> None:
             if isinstance(init, ast.FunctionDef) and init.name == '__init__'
             for node in ast.walk(init)
             if isinstance(node, ast.Attribute) and isinstance(node.ctx, ast.Store)}
-        for module, path in MODULES.items() for cls in ast.walk(ast.parse(path.read_text()))
+        for module in MODULES for cls in nodes(module)
         if isinstance(cls, ast.ClassDef)}
 
     assert {name: len(names) for name, names in fields.items() if len(names) > 15} == {}

@@ -30,12 +30,12 @@ from illuminator_ros.illuminator.messages import IlluminatorStatus
 from illuminator_ros.mavlink.dialect import mavlink
 from illuminator_ros.mavlink.messages import Address, heartbeat
 from support.client import Client
-from support.faulty_wire import Faults
 from support.frames import Codec, frame_of
 from support.lossy_line import COMMANDS, CONFIRMED, Run
 from support.ports import free_port
 from support.ptys import PtyDevice
 from support.simulated_link import SimulatedLink
+from support.wire import Faults
 
 from ..devices import serving
 from ..rig import Bench, bridge, interleaved, PATIENCE, udp, wait_until

@@ -213,8 +213,8 @@ class Bridge:
             if self._ended.is_set():
                 return
             self._ended.set()
-        # It stops, so that the link's thread does not wait for it.
-        self._executor.wake()
+        # It stops, so that the link's thread does not wait for it. It does so with work only.
+        self._executor.create_task(lambda: None)
         if self.link.is_running():
             self._shut_down_devices()
         self.link.stop(STOP_LIMIT)

@@ -38,7 +38,7 @@ from support.minimal_devices import (
     MinimalGimbal,
     MinimalLight,
 )
-from support.virtual_link import START
+from support.wire import START
 
 LIGHT, GIMBAL, CAMERA = illuminator.CHECKS, device.CHECKS, rededge.CHECKS
 Q: TypeAlias = tuple[float, float, float, float]

@@ -40,18 +40,21 @@ def texts(path: Path) -> set[str]:
             and isinstance(node.value, str) and id(node) not in docstrings}
 
 
-TEXTS = [WORD.findall(text.lower()) for path in (ROOT / 'illuminator_ros').rglob('*.py')
-         for text in texts(path)]
-# A message consists of whole texts and, where a page shortens it, of runs of three words.
-RUNS = {tuple(words) for words in TEXTS} | {
-    tuple(words[at:at + 3]) for words in TEXTS for at in range(len(words) - 2)}
+@pytest.fixture(scope='module')
+def runs() -> set[tuple[str, ...]]:
+    """Return all whole texts and, for pages that shorten one, its runs of three words."""
+    found = [WORD.findall(text.lower()) for path in (ROOT / 'illuminator_ros').rglob('*.py')
+             for text in texts(path)]
+    return {tuple(words) for words in found} | {
+        tuple(words[at:at + 3]) for words in found for at in range(len(words) - 2)}
 
 
 @pytest.mark.parametrize('message', MESSAGES)
-def test_a_message_consists_of_texts_of_the_package(message: str) -> None:
+def test_a_message_consists_of_texts_of_the_package(
+        message: str, runs: set[tuple[str, ...]]) -> None:
     words = WORD.findall(message.lower())
     known = {at for first in range(len(words)) for end in range(first + 1, len(words) + 1)
-             if tuple(words[first:end]) in RUNS for at in range(first, end)}
+             if tuple(words[first:end]) in runs for at in range(first, end)}
 
     assert [word for at, word in enumerate(words)
             if at not in known and len(word) > 2 and '_' not in word and word not in OTHERS] == []

@@ -16,18 +16,12 @@
 
 from collections.abc import Sequence
 import re
-from typing import Any
 
 from illuminator_ros.cli.bridge import Executable, usage
-from illuminator_ros.cli.monitor import ros_graph as graph
-from illuminator_ros.cli.monitor.run import DEFAULT_WEB, parser
 from illuminator_ros.cli.payloads import PAYLOADS
 from illuminator_ros.gimbal.ros.gimbals import GIMBAL_PARAMETERS
 from illuminator_ros.gimbal.ros.manager_node import MANAGER_PARAMETERS
-from illuminator_ros.illuminator.messages import IlluminatorStatus
 from illuminator_ros.illuminator.ros.parameters import DEVICE_PARAMETERS, LIGHT_PARAMETERS
-from illuminator_ros.mavlink.dialect import entry_names, mavlink
-from illuminator_ros.mavlink.messages import CommandAck, ComponentInformationBasic
 from illuminator_ros.rededge.ros import camera_node as camera
 from illuminator_ros.ros import monitor_view
 from illuminator_ros.ros.parameters import LINK_PARAMETERS as SHARED_PARAMETERS
@@ -39,8 +33,8 @@ from tools.doc_tables import values_of
 
 README = (ROOT / 'README.md').read_text()
 YAML = (ROOT / 'config' / 'bridge.yaml').read_text()
-REFERENCE, PROTOCOL, MONITOR = (
-    (ROOT / 'doc' / f'{page}.md').read_text() for page in ('reference', 'protocol', 'monitor'))
+REFERENCE, MONITOR = (
+    (ROOT / 'doc' / f'{page}.md').read_text() for page in ('reference', 'monitor'))
 LINK_PARAMETERS = (*SHARED_PARAMETERS, *LIGHT_PARAMETERS)
 CAMERA_PARAMETERS = (*camera.PARAMETERS, *camera.MOUNT_PARAMETERS)
 URL, CAMERA_URL = (
@@ -91,28 +85,7 @@ def test_the_readme_has_each_executable_which_is_also_a_module() -> None:
     assert {row[0].strip('`') for row in table(README, 'executable')} == modules == executables
 
 
-@pytest.mark.parametrize('message', [CommandAck, IlluminatorStatus, ComponentInformationBasic],
-                         ids=lambda message: message.msgname)
-def test_the_protocol_page_has_each_field_of_a_message(message: Any) -> None:
-    fields: dict[str, set[str]] = {}
-    name = ''
-    for cells in table(PROTOCOL, 'message'):
-        name = cells[0] or name
-        fields.setdefault(name, set()).update(re.findall('`([^`]+)`', cells[1]))
-
-    assert fields[message.msgname] == {*message.fieldnames}
-
-
-def test_the_protocol_page_has_each_command() -> None:
-    assert {cells[0] for cells in table(PROTOCOL, 'command')} == {
-        f'{entry_names("MAV_CMD")[command]} ({command})' for command in (
-            mavlink.MAV_CMD_ILLUMINATOR_ON_OFF, mavlink.MAV_CMD_DO_ILLUMINATOR_CONFIGURE,
-            mavlink.MAV_CMD_SET_MESSAGE_INTERVAL, mavlink.MAV_CMD_REQUEST_MESSAGE)}
-
-
-def test_the_monitor_page_has_the_states_topics_and_limits_of_the_code() -> None:
-    app = pytest.importorskip('illuminator_ros.cli.monitor.app')
-    web = pytest.importorskip('illuminator_ros.cli.monitor.web')
+def test_the_monitor_page_has_the_states_and_topics_of_the_code() -> None:
     views = [one.load('view') for one in PAYLOADS.values() if one.view]
 
     assert [[kind, topics] for kind, topics, _ in table(MONITOR, 'kind')] == [
@@ -121,7 +94,3 @@ def test_the_monitor_page_has_the_states_topics_and_limits_of_the_code() -> None
             ] == [*dict.fromkeys(word for view in sorted(views, key=lambda view: len(view.states),
                                                          reverse=True) for word in view.states),
                   *monitor_view.STATES]
-    for text in (f'for {monitor_view.SILENCE:g} s', f'within {graph.ANSWER_LIMIT:g} s',
-                 f'`--wait` {parser().get_default("wait"):g} s', f'{web.MAX_TABS} at most',
-                 f'after {app.QUESTION_LIFETIME:g} s', f'http://{DEFAULT_WEB}/'):
-        assert text in MONITOR

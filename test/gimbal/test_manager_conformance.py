@@ -27,7 +27,7 @@ import pytest
 from support.checks_run import ChecksRun
 from support.gimbal_manager import OURS
 from support.gimbal_vehicle import managed_vehicle
-from support.virtual_link import START
+from support.wire import START
 
 SERVO: dict[str, Any] = {
     'device_id': 1, 'ranges': (Range(0.0, 0.0), Range(-1.5, 0.5), Range(-2.5, 2.5))}

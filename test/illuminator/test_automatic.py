@@ -30,8 +30,8 @@ from illuminator_ros.payload.command_sources import SourceSettings
 import pytest
 from support.back_to_back import Pair
 from support.fake_light import FakeLight
-from support.faulty_wire import Faults
 from support.shared_address import SharedAddress
+from support.wire import Faults
 
 ON_OFF, CONFIGURE = mavlink.MAV_CMD_ILLUMINATOR_ON_OFF, mavlink.MAV_CMD_DO_ILLUMINATOR_CONFIGURE
 SILENCE = 5.0

@@ -30,8 +30,8 @@ from illuminator_ros.payload.device_events import DeviceHeld
 import pytest
 from support.back_to_back import Pair
 from support.fake_light import FakeLight
-from support.faulty_wire import Faults
 from support.records import Answer
+from support.wire import Faults
 
 ON_OFF, CONFIGURE = mavlink.MAV_CMD_ILLUMINATOR_ON_OFF, mavlink.MAV_CMD_DO_ILLUMINATOR_CONFIGURE
 NAMES = ('safety', 'operator', 'default', 'autonomy')

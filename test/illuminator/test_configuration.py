@@ -26,9 +26,9 @@ from illuminator_ros.mavlink.dialect import mavlink
 from illuminator_ros.mavlink.messages import CommandAck, result_name
 from illuminator_ros.payload.confirmed_command import Result
 import pytest
-from support.back_to_back import Pair, START
+from support.back_to_back import Pair
 from support.fake_light import FakeLight
-from support.faulty_wire import Faults
+from support.wire import Faults, START
 
 CONFIGURE, ON_OFF = mavlink.MAV_CMD_DO_ILLUMINATOR_CONFIGURE, mavlink.MAV_CMD_ILLUMINATOR_ON_OFF
 ACCEPTED, DENIED = mavlink.MAV_RESULT_ACCEPTED, mavlink.MAV_RESULT_DENIED

@@ -42,8 +42,8 @@ from illuminator_ros.payload.device_events import DeviceHeld
 import pytest
 from support.back_to_back import BRIDGE, Pair
 from support.fake_light import FakeLight
-from support.faulty_wire import Faults
 from support.random_users import RandomUsers
+from support.wire import Faults
 
 ON_OFF, CONFIGURE = mavlink.MAV_CMD_ILLUMINATOR_ON_OFF, mavlink.MAV_CMD_DO_ILLUMINATOR_CONFIGURE
 ENDING = 'the bridge is ending'

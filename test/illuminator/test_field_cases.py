@@ -26,8 +26,8 @@ from illuminator_ros.mavlink.dialect import mavlink, replaced
 import pytest
 from support.back_to_back import Pair
 from support.fake_light import FakeLight
-from support.faulty_wire import Faults, FaultyWire
 from support.shared_address import SharedAddress
+from support.wire import Faults, FaultyWire
 
 ON_OFF, CONFIGURE = mavlink.MAV_CMD_ILLUMINATOR_ON_OFF, mavlink.MAV_CMD_DO_ILLUMINATOR_CONFIGURE
 

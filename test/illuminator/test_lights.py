@@ -28,8 +28,9 @@ from illuminator_ros.mavlink.dialect import decode, encode, mavlink
 from illuminator_ros.mavlink.retries import MESSAGE
 from illuminator_ros.payload.identity import Identity, text
 import pytest
-from support.back_to_back import Pair, START
+from support.back_to_back import Pair
 from support.fake_light import FakeLight
+from support.wire import START
 
 CONFIGURE, REQUEST = mavlink.MAV_CMD_DO_ILLUMINATOR_CONFIGURE, mavlink.MAV_CMD_REQUEST_MESSAGE
 

@@ -25,7 +25,7 @@ from illuminator_ros.mavlink.dialect import mavlink
 import pytest
 from support.back_to_back import Pair
 from support.fake_light import FakeLight
-from support.faulty_wire import Faults
+from support.wire import Faults
 
 CONFIGURE = mavlink.MAV_CMD_DO_ILLUMINATOR_CONFIGURE
 LIMITS = SafetyLimits(max_brightness=60.0, min_strobe_period=0.34)

@@ -38,8 +38,8 @@ from illuminator_ros.payload.identity import Identity
 import pytest
 from support.back_to_back import BRIDGE, Pair
 from support.fake_light import FakeLight
-from support.faulty_wire import Faults
 from support.records import Answer
+from support.wire import Faults
 
 ON_OFF, CONFIGURE = mavlink.MAV_CMD_ILLUMINATOR_ON_OFF, mavlink.MAV_CMD_DO_ILLUMINATOR_CONFIGURE
 REQUEST = mavlink.MAV_CMD_REQUEST_MESSAGE

@@ -25,7 +25,7 @@ from illuminator_ros.simulation.simulated import SimulatedComponents
 from payloads.winch import CHECKS, SIMULATED, SimulatedWinch, WINCH
 import pytest
 from support.checks_run import ChecksRun
-from support.virtual_link import START
+from support.wire import START
 
 DECK = Address(1, 169)
 

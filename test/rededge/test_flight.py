@@ -39,7 +39,7 @@ from illuminator_ros.rededge.input_states import (
 from illuminator_ros.rededge.simulated import COLUMNS, RedEdgeProperties, SimulatedRedEdge
 from illuminator_ros.simulation.simulated import SimulatedComponents
 import pytest
-from support.virtual_link import START, VirtualLink
+from support.wire import Line, START
 
 sys.path.insert(0, str(Path(__file__).parents[2] / 'demo'))
 from flight_model import (  # noqa: E402, I100
@@ -58,21 +58,6 @@ from flight_model import (  # noqa: E402, I100
 UTC = 1.7e9
 
 
-class PullableLink(VirtualLink):
-    """A link that loses everything while it is pulled."""
-
-    pulled = False
-
-    def turn(self) -> None:
-        """See :class:`VirtualLink`."""
-        if not self.pulled:
-            super().turn()
-            return
-        for end in self.ends:
-            end.poll(self.now)
-            end.outgoing.clear()
-
-
 class Rig:
     """The client of a camera, and the camera, during a flight at its real speed."""
 
@@ -84,7 +69,7 @@ class Rig:
             interval=IMAGE_INTERVAL, own_gps=GeoPoint(0.0, 0.0, 0.0)))
         cameras = SimulatedComponents([self.camera], START)
         self.camera.set_clock(UTC, START)
-        self.link = PullableLink(Component(commands, [self.client]), cameras, version=1)
+        self.link = Line(Component(commands, [self.client]), cameras, version=1)
         self.rows: list[dict[str, str]] = []
         self.camera.records.subscribe(
             lambda row: self.rows.append(dict(zip(COLUMNS, row, strict=True))))
@@ -118,13 +103,8 @@ class Rig:
         """Fly, and compare the images with the truth."""
         for time, kind in self.events():
             self.link.run(START + time - self.link.now)
-            if (time in self.flight.pull) is not self.link.pulled:
-                self.link.pulled = not self.link.pulled
-                for end in self.link.ends:
-                    if self.link.pulled:
-                        end.link_closed(self.link.now, 'pulled')
-                    else:
-                        end.link_opened(self.link.now)
+            if (time in self.flight.pull) is self.link.near.wire.is_open:
+                (self.link.close if self.link.near.wire.is_open else self.link.open)()
             (self.attitude if kind else self.fix)(time)
             self.link.turn()
         self.link.run(START + self.flight.seconds - self.link.now)

@@ -52,7 +52,8 @@ def running_node(
     ros: Ros, camera: FakeCamera, start: Callable[..., Program] = python, **parameters: Any,
 ) -> Iterator[Program]:
     """Run the node; see :func:`ended` for its end."""
-    given = [text for name, value in parameters.items() for text in ('-p', f'{name}:={value}')]
+    given = [text for name, value in {'diagnostics_period': 0.1, **parameters}.items()
+             for text in ('-p', f'{name}:={value}')]
     with ended(start(MODULE, f'serial://{camera.device}:57600', '--ros-args', *given,
                      env={'ROS_DOMAIN_ID': str(ros.domain)})) as node:
         node.wait_for('/100 connected')

@@ -34,7 +34,7 @@ from support.light import Address, ServedLight
 from support.processes import ended, python, ROOT
 from support.recording import Recorder
 from support.ros import Parameters, Ros, running_bridge, STATE, STREAM
-from support.tf2_messages import tf2_path
+from support.tf2_messages import tf2_path, transforms
 from visualization_msgs.msg import Marker
 
 DOWN_LEFT = Quaternion.from_euler(0.0, math.radians(45), math.radians(30))
@@ -59,7 +59,7 @@ def rotation(q: Any) -> Quaternion:
 def frame(recorder: Recorder, child: str) -> Any:
     """Return the newest transform of a frame."""
     def of(message: Any) -> list[Any]:
-        return [one for one in message.transforms if one.child_frame_id == child]
+        return [one for one in transforms(message) if one.child_frame_id == child]
 
     return of(recorder.wait(of))[-1]
 
@@ -83,7 +83,7 @@ def test_frames_of_gimbal_and_beam_agree_with_attitude_and_marker_in_either_yaw_
         pose, beam = frame(moving, 'gimbal'), frame(moving, 'illuminator_beam')
 
     parents = {one.child_frame_id: one.header.frame_id
-               for message in moving.messages for one in message.transforms}
+               for message in moving.messages for one in transforms(message)}
     assert parents == {'gimbal': 'base_link_stabilized', 'illuminator_beam': 'base_link'}
     seen = to_vehicle * rotation(attitude.quaternion)
     assert rotation(pose.transform.rotation).angle_to(seen) == pytest.approx(0, abs=1e-3)
@@ -115,11 +115,11 @@ def test_fixed_beam_is_one_latched_message_with_the_frames_of_all_lights(
           ServedLight(port), ServedLight(port, Address(1, 244))):
         bridge.wait_for('light 1/244 is served by')
         static = own_ros.subscribe(tf2, '/tf_static', STATE)
-        message = static.wait(lambda one: len(one.transforms) == 2)
+        message = static.wait(lambda one: len(transforms(one)) == 2)
         [info] = own_ros.node.get_publishers_info_by_topic('/tf_static')
 
     assert {(one.header.frame_id, one.child_frame_id, rotation(one.transform.rotation))
-            for one in message.transforms} == {
+            for one in transforms(message)} == {
         ('mast', 'illuminator_beam', Quaternion()),
         ('mast', 'illuminator_1_244_beam', Quaternion())}
     assert (info.qos_profile.durability, info.qos_profile.reliability) == (

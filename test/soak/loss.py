@@ -44,8 +44,8 @@ from typing import Any
 TEST = Path(__file__).resolve().parents[1]
 sys.path[:0] = [str(TEST.parent), str(TEST)]
 
-from support.faulty_wire import Faults  # noqa: E402
 from support.lossy_line import FAULTLESS, OUTCOMES, Run  # noqa: E402
+from support.wire import Faults  # noqa: E402
 
 KINDS = ('drop', 'duplicate', 'delay', 'corrupt')
 BEHAVIOURS: tuple[dict[str, Any], ...] = (

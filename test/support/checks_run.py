@@ -36,7 +36,7 @@ from illuminator_ros.mavlink.component import Endpoint
 from illuminator_ros.mavlink.dialect import mavlink
 from illuminator_ros.mavlink.messages import Address, CommandLong
 from illuminator_ros.simulation.simulated import Properties, SimulatedComponents
-from support.virtual_link import START, VirtualLink
+from support.wire import Line, START
 
 OURS = Address(255, 190)
 KINDS = tuple(PAYLOADS)
@@ -67,9 +67,10 @@ class ChecksRun:
         defaults = {one.name: one.default for one in checks.options}
         self.session: Session = checks.session(Conditions(
             OURS, target, {**defaults, **options},
-            lambda: self.link.decoders[0].counters.crc_errors, lambda: UTC + self.link.now))
+            lambda: self.link.near.decoder.counters.crc_errors, lambda: UTC + self.link.now))
         self.session.consent = consent
-        self.link = VirtualLink(self.session, devices, version or checks.mavlink_version or 2)
+        self.link = Line(self.session, devices,
+                         version=version or checks.mavlink_version or 2)
         self.runner = CheckRunner(
             checks, self.session, [one for one in requirements or checks.requirements
                                    if not only or one.name in only])

@@ -59,8 +59,9 @@ def embedded_bridge(domain: int, port: int, **parameters: object) -> Iterator[Br
     finally:
         process.end()
         thread.join(PATIENCE)
+        has_ended = not thread.is_alive()
         rclpy.try_shutdown(context=context)
-        assert not thread.is_alive()
+        assert has_ended
 
 
 def refusal(context: Context, **parameters: object) -> str:

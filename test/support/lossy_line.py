@@ -34,8 +34,8 @@ from illuminator_ros.mavlink.dialect import mavlink
 from illuminator_ros.mavlink.messages import Address, CommandAck
 from illuminator_ros.simulation.simulated import Effect, SimulatedComponent
 from support.back_to_back import Pair
-from support.faulty_wire import Faults
 from support.records import Answer
+from support.wire import Faults
 
 ON_OFF, CONFIGURE = mavlink.MAV_CMD_ILLUMINATOR_ON_OFF, mavlink.MAV_CMD_DO_ILLUMINATOR_CONFIGURE
 COMMANDS = 400

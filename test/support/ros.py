@@ -106,9 +106,14 @@ class Ros(SpunNode):
         """
         client = self.node.create_client(srv.GetParameters, f'{node}/get_parameters')
         eventually(client.service_is_ready)
-        # The first requests may get lost: they may precede the discovery of the client.
-        while not Call(client.call_async(srv.GetParameters.Request())).answers_within(0.5):
-            pass
+        calls: list[Call] = []
+
+        def is_answered() -> bool:
+            # The first requests may get lost: they may precede the discovery of the client.
+            calls.append(Call(client.call_async(srv.GetParameters.Request())))
+            return calls[-1].answers_within(0.05) or any(call.answered for call in calls)
+
+        eventually(is_answered)
         self.node.destroy_client(client)
 
     def _client(self, type_: Any, service: str, node: str) -> Any:

@@ -48,7 +48,10 @@ def main(module: str) -> None:
     # An orderly end may take longer on a busy machine.
     import_module('illuminator_ros.cli.termination').LIMIT = PATIENCE  # type: ignore[attr-defined]
     if hasattr(place, 'OFF_LIMIT'):
-        place.OFF_LIMIT = PATIENCE / 2
+        place.OFF_LIMIT = PATIENCE / 5
+    # By the clock of this machine.
+    if hasattr(place, 'GRAPH_INTERVAL'):
+        place.GRAPH_INTERVAL = 0.5
     run_module(module, run_name='__main__')
 
 

@@ -40,7 +40,7 @@ BRIDGE = 'illuminator_ros.bridge'
 def test_shutdown_covers_lights_that_have_no_node_yet_and_names_each(
     own_ros: ros.Ros, port: int,
 ) -> None:
-    count = 30
+    count = 8
     lights = [text for number in range(1, count + 1) for text in ('--light', f'1/{number}')]
     with (ros.running_bridge(own_ros.domain, port, off_on_shutdown=True) as bridge,
           ros.running_simulator(f'udpout://127.0.0.1:{port}', *lights)):

@@ -55,9 +55,7 @@ def test_keys_switch_and_dim_the_light(own_ros: Ros, port: int) -> None:
         assert (light.fake.fields['enable'], light.fake.fields['brightness']) == (1, 90.0)
 
 
-@pytest.mark.parametrize('way', [
-    'q', '\x03', 'SIGTERM', 'SIGQUIT', 'SIGHUP', 'SIGUSR1', 'SIGALRM', 'SIGABRT', 'SIGSEGV',
-    'SIGRTMAX'])
+@pytest.mark.parametrize('way', ['q', '\x03', 'SIGTERM', 'SIGHUP', 'SIGSEGV', 'SIGRTMAX'])
 def test_end_restores_the_terminal(own_ros: Ros, way: str) -> None:
     with monitor(own_ros) as screen:
         screen.wait_for('no devices in this ROS graph yet')

@@ -29,11 +29,12 @@ from illuminator_ros.cli import termination
 from illuminator_ros.mavlink.link import Link
 from illuminator_ros.ros import bridge
 import pytest
+from support.embedded import embedded_bridge
 from support.light import CONFIGURE, ON_OFF, ServedLight
 from support.ports import free_port
 from support.processes import ended, environment, Program, start_interpreter
 from support.ros import bridge_arguments, Parameters, Ros, start_bridge, start_slow_bridge
-from support.waiting import eventually
+from support.waiting import eventually, PATIENCE
 
 SIGNALS = [signal.SIGINT, signal.SIGTERM, signal.SIGHUP]
 # Programs at a time; with more, each would mostly wait for the others.
@@ -176,6 +177,17 @@ def test_requests_that_wait_are_refused_when_the_bridge_ends(ros: Ros, port: int
 
         assert (switched.result().success, switched.result().message) == (False, ENDING)
         assert [one.reason for one in changed.result().results] == [ENDING]
+
+
+def test_idle_bridge_ends_without_waiting_for_a_timer(
+    ros: Ros, port: int, monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    for timer in ('TICK', 'GRAPH_INTERVAL'):
+        monkeypatch.setattr(bridge, timer, 2 * PATIENCE)
+    with embedded_bridge(ros.domain, port, diagnostics_period=2 * PATIENCE):
+        ros.meet('/illuminator')
+        # Nothing announces that the executor has begun to wait.
+        threading.Event().wait(0.1)
 
 
 def test_last_line_is_written_on_a_busy_machine() -> None:
