@@ -31,7 +31,7 @@ from .messages import (
     rates_of,
     REMOVE_SENDER,
 )
-from ..mavlink.command_sender import Command, CommandSender
+from ..mavlink.command_sender import Command, CommandSender, request_message
 from ..mavlink.component import Payload
 from ..mavlink.dialect import mavlink
 from ..mavlink.messages import Address, Heartbeat, Message
@@ -99,7 +99,7 @@ class GimbalClient(Payload):
     def link_closed(self, now: float, reason: str) -> None:
         """See :meth:`Payload.link_closed`."""
         for gimbal in self.gimbals.values():
-            gimbal.components_lost(gimbal.addresses, now, reason)
+            gimbal.components_lost(gimbal.reports.addresses, now, reason)
 
     def components_lost(self, lost: Collection[Address], now: float, reason: str) -> None:
         """See :meth:`Payload.components_lost`."""
@@ -114,22 +114,26 @@ class GimbalClient(Payload):
         elif isinstance(message, Heartbeat):
             self._hear(source, message, now)
             for gimbal in self.gimbals.values():
-                gimbal.heard(source, now, message.autopilot)
+                if gimbal.reports.heard(source, now, message.autopilot):
+                    gimbal.update(now)
         elif isinstance(message, GimbalManagerStatus):
             if gimbal := self._managed(source, message.gimbal_device_id, now):
                 gimbal.take_status(source, message, now)
-                if gimbal.lacks_information_of(source):
+                if gimbal.reports.lacks_information_of(source):
                     self._reopen(source, now)
         elif isinstance(message, GimbalManagerInformation):
             if gimbal := self._managed(source, message.gimbal_device_id, now):
-                gimbal.take_information(source, message, now)
+                if manager := gimbal.reports.announce(source, now):
+                    manager.information = message
+                    gimbal.update(now)
                 component = self._components.get(source)
                 if component is not None and not any(
-                        one.lacks_information_of(source) for one in self.gimbals.values()):
+                        one.reports.lacks_information_of(source)
+                        for one in self.gimbals.values()):
                     component.query.stop()
         elif (isinstance(message, GimbalDeviceInformation)
                 and (gimbal := self._sender(source, message.gimbal_device_id, now))):
-            gimbal.take_device_information(message)
+            gimbal.reports.device.take_information(message)
 
     # Gimbals
 
@@ -160,7 +164,7 @@ class GimbalClient(Payload):
             found = own[0] if len(own) == 1 else None
             if len(own) > 1:
                 for one in own:
-                    one.heard_without_id(now)
+                    one.reports.device.without_id.hear(now)
         return found
 
     # Discovery
@@ -209,9 +213,7 @@ class GimbalClient(Payload):
         component.query.note_try(now)
         self._next_query = now + REQUEST_SPACING
         if now < component.heard_at + FORGET_AFTER:
-            message_id = float(GimbalManagerInformation.id)
-            self._commands.start(
-                Command(address, mavlink.MAV_CMD_REQUEST_MESSAGE, (message_id,)), now)
+            self._commands.start(request_message(address, GimbalManagerInformation.id), now)
 
     def _query_due(self) -> float:
         return max(self._next_query, min(

@@ -98,6 +98,11 @@ class Flag(NamedTuple):
     needed: int
     is_set: bool = True
 
+    @property
+    def is_pose(self) -> bool:
+        """Whether it alone sets the attitude."""
+        return self.flag != mavlink.GIMBAL_DEVICE_FLAGS_YAW_LOCK
+
     def change(self, device_id: int) -> PlainChange[GimbalDeviceAttitudeStatus]:
         """
         Return the change by a flag of a pose.

@@ -101,20 +101,20 @@ class SetpointStream:
     :param make: returns the message of a setpoint.
     :param send: sends a message.
     :param timeout: from the last rate until a rate of zero is sent.
-    :param requested_frame: returns the yaw frame of a request that is under way, and since when.
+    :param pose_since: returns since when a request for a pose is under way, -inf if none is.
     :ivar sent: the number of messages.
     """
 
     def __init__(
         self, make: Callable[[YawFrame, Wxyz, Vector], GimbalManagerSetAttitude],
         send: Callable[[GimbalManagerSetAttitude], None], timeout: float,
-        requested_frame: Callable[[], tuple[YawFrame | None, float]],
+        pose_since: Callable[[], float],
     ) -> None:
         self.sent = 0
         self._make = make
         self._send_message = send
         self._timeout = timeout
-        self._requested_frame = requested_frame
+        self._pose_since = pose_since
         self._last: _Setpoint | None = None
         # The setpoint that the last request of each kind has suspended, and its place.
         self._suspended: dict[SuspendedBy, tuple[_Setpoint | None, _Setpoint]] = {}
@@ -156,10 +156,11 @@ class SetpointStream:
 
     def _yaw_frame(self, now: float) -> YawFrame:
         """Return the yaw frame that rates keep, which implies the yaw lock."""
-        requested, since = self._requested_frame()
+        since = self._pose_since()
         if since <= self._attitude_at > now - LOCK_DELAY:
             return self._attitude_frame
-        return requested or self._reported_frame
+        # The flags of a pose clear the lock.
+        return YawFrame.VEHICLE if since > -math.inf else self._reported_frame
 
     def suspend(self, now: float, kind: SuspendedBy, *, is_place: bool = False) -> None:
         """
