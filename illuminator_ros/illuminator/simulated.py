@@ -97,7 +97,6 @@ class SimulatedIlluminator(SimulatedDevice):
         super().__init__(properties)
         self.thermal = ThermalModel(properties.thermal, properties.ambient)
         self.thermal.set_sensor_failed(self.behaviour.thermistor_failed)
-        self.restart(0.0)
 
     def behave(self, behaviour: Behaviour, now: float) -> None:
         """See :meth:`SimulatedDevice.behave`."""

@@ -143,6 +143,7 @@ class SimulatedDevice(ABC):
         self.properties = properties
         self.behaviour = self.normal = properties.behaviour
         self.records: Listeners[Sequence[str]] = Listeners()
+        self.restart(0.0)
 
     def behave(self, behaviour: Behaviour, now: float) -> None:
         """Behave differently from now on."""
