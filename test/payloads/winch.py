@@ -200,13 +200,9 @@ class WinchSession(Session):
         return await self.command(
             mavlink.MAV_CMD_DO_WINCH, 1, mavlink.WINCH_RELATIVE_LENGTH_CONTROL, length)
 
-    async def save(self) -> bool:
+    async def save(self) -> str | None:
         self.before = await self.length()
-        return self.before is not None
-
-    @property
-    def saved(self) -> str:
-        return f'{self.before} m'
+        return None if self.before is None else f'{self.before} m'
 
     async def restore(self) -> list[str]:
         await self.release((self.before or 0.0) - (await self.length() or 0.0))
