@@ -31,12 +31,10 @@ from . import messages as gimbal
 from .axes import (
     HAS_AXIS,
     HAS_LOCK,
-    known_ranges,
     LEVEL,
     Range,
     Ranges,
     RATE_LIMIT,
-    read_capabilities,
     UNLIMITED,
 )
 from .messages import rates_of
@@ -81,11 +79,6 @@ class GimbalModel:
     ranges: Ranges = UNLIMITED
 
     @classmethod
-    def from_information(cls, message: gimbal.GimbalDeviceInformation) -> GimbalModel:
-        """Read the message of a device, see :func:`known_ranges`."""
-        return cls(read_capabilities(message), known_ranges(message))
-
-    @classmethod
     def from_ranges(cls, ranges: Ranges) -> GimbalModel:
         """Return a gimbal that is stabilised and points to any attitude within the ranges."""
         capabilities = mavlink.GIMBAL_DEVICE_CAP_FLAGS_HAS_NEUTRAL
@@ -97,8 +90,8 @@ class GimbalModel:
 
     def lacks(self, flags: int) -> int:
         """Return the flags that the gimbal cannot follow."""
-        return sum(flag for flag, needed in _NEEDED.items()
-                   if flags & flag and self.capabilities and not self.capabilities & needed)
+        return sum([flag for flag, needed in _NEEDED.items()
+                    if flags & flag and self.capabilities and not self.capabilities & needed])
 
     def accepts_earth_frame(self, reported: int | None) -> bool:
         """
@@ -177,7 +170,7 @@ class Setpoint(NamedTuple):
     @property
     def device_flags(self) -> int:
         """Return the flags for the device."""
-        return self.operation | self.frame.flag
+        return self.flags & _PASSED_BITS | self.frame.flag
 
     @classmethod
     def _checked(cls, flags: int, angles: Vector, rates: Vector) -> Setpoint:
@@ -189,10 +182,12 @@ class Setpoint(NamedTuple):
         """
         # The definitions of the angles have no larger values. So a larger one is an error, and to
         # subtract turns from it would turn the gimbal to a pose that no player has requested.
-        if any(abs(angle) > math.pi + _TOLERANCE for angle in angles):
-            raise ValueError('an angle is beyond 180 degrees')
-        if any(abs(rate) > RATE_LIMIT for rate in rates):
-            raise ValueError(f'a rate is beyond {RATE_LIMIT:.4f} rad/s')
+        for values, limit, error in (
+                (angles, math.pi + _TOLERANCE, 'an angle is beyond 180 degrees'),
+                (rates, RATE_LIMIT, f'a rate is beyond {RATE_LIMIT:.4f} rad/s')):
+            for value in values:
+                if abs(value) > limit:
+                    raise ValueError(error)
         return cls(flags, yaw_frame(flags), angles, rates)
 
     @classmethod
@@ -264,8 +259,10 @@ def read_setpoint(message: AnySetpoint, ranges: Ranges) -> Setpoint:
 
 
 def _are_within(angles: Sequence[float], ranges: Sequence[Range]) -> bool:
-    return all(range_.low <= angle <= range_.high
-               for angle, range_ in zip(angles, ranges, strict=True))
+    for angle, range_ in zip(angles, ranges, strict=True):
+        if not range_.low <= angle <= range_.high:
+            return False
+    return True
 
 
 def _nearest_reading(angles: Vector, ranges: Ranges) -> Vector:
@@ -337,7 +334,7 @@ def turned(
 
     The other parameters are those of :func:`clip`.
     """
-    if offsets == STILL == setpoint.turning or not setpoint.has_all_angles:
+    if not setpoint.has_all_angles:
         return setpoint
     elapsed = now - setpoint.since
     roll, pitch, yaw = (

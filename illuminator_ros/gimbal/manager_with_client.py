@@ -29,14 +29,12 @@ import math
 from .client import GimbalClient
 from .gimbal import GimbalSettings
 from .manager import GimbalManager, ManagerSettings
-from .manager_setpoint import AnySetpoint
 from ..mavlink import messages as mav
 from ..mavlink.command_receiver import CommandReceiver
 from ..mavlink.command_sender import Command, CommandSender, CommandStatus
 from ..mavlink.component import HEARTBEAT_INTERVAL, Payload
 from ..mavlink.dialect import mavlink
 from ..mavlink.messages import AnyCommand
-from ..payload.messages import GimbalDeviceAttitudeStatus
 
 _FOR_CLIENT = frozenset(GimbalClient.messages)
 
@@ -100,9 +98,6 @@ class ManagerWithClient(Payload):
             self.manager.receive(source, message, now)
             if source == self.manager.tracker.device and type(message) in _FOR_CLIENT:
                 self.client.receive(source, message, now)
-        # A setpoint causes no message for the client.
-        if not isinstance(message, AnySetpoint):
-            self._exchange(now)
 
     def receive_conflicting(self, message: mav.Message, now: float) -> None:
         """See :meth:`Payload.receive_conflicting`."""
@@ -112,14 +107,7 @@ class ManagerWithClient(Payload):
         self, source: mav.Address, command: AnyCommand, now: float,
     ) -> int | None:
         """See :meth:`Payload.execute`."""
-        result = self.manager.execute(source, command, now)
-        self._exchange(now)
-        return result
-
-    def take_attitude(self, status: GimbalDeviceAttitudeStatus, now: float) -> None:
-        """See :meth:`GimbalManager.take_attitude`."""
-        self.manager.take_attitude(status, now)
-        self._exchange(now)
+        return self.manager.execute(source, command, now)
 
     def poll(self, now: float) -> None:
         """See :meth:`Payload.poll`."""
@@ -135,7 +123,7 @@ class ManagerWithClient(Payload):
 
     def next_deadline(self) -> float:
         """See :meth:`Payload.next_deadline`."""
-        if self._own.outgoing:
+        if self._reports or self._own.outgoing:
             return -math.inf
         return min(self._heartbeat_due, self.manager.next_deadline(), self.client.next_deadline(),
                    self._own.next_deadline())

@@ -42,10 +42,9 @@ from .rate_stop import RateStop
 from .vehicle_state import VehicleState
 from ..mavlink.command_sender import CommandSender
 from ..mavlink.dialect import mavlink, short_names
-from ..mavlink.messages import time_boot_ms
-from ..payload.messages import GeoPoint, GimbalDeviceAttitudeStatus
+from ..payload.messages import GeoPoint
 from ..payload.mount_attitude import AXES, STILL, UNSET_QUATERNION, YawFrame
-from ..payload.rotation import Quaternion, Vector
+from ..payload.rotation import Vector
 
 # s between repetitions of a constant setpoint, at most 1 s by the specification; and between
 # setpoints that follow a place, the vehicle or a rate.
@@ -174,31 +173,29 @@ class SetpointMixer:
             self._end_rate(now, was_sent=True)
         self.current, self.due = None, math.inf
 
-    def point(self, place: GeoPoint, now: float, *, is_relative: bool) -> None:
+    def point(self, roi: tuple[GeoPoint, bool] | None, now: float) -> None:
         """
-        Follow a place.
+        Follow a place, None for none any more.
 
-        :param is_relative: whether its altitude is relative to the home position.
+        :param roi: the place, and whether its altitude is relative to the home position.
         :raises Refused: if position or heading of the vehicle are unknown.
         """
+        self._roi = None if roi is None else self._known_place(*roi, now)
+        self.poll(now)
+
+    def _known_place(self, place: GeoPoint, is_relative: bool, now: float) -> GeoPoint:
         above = self._vehicle.home_altitude if is_relative else 0.0
-        if above is None or self._vehicle.position(now) is None or (
+        if above is None or self._vehicle.position.get(now) is None or (
                 self._device.heading(now) is None
                 and not self._device.accepts_earth_frame(now)):
             raise Refused('the position or the heading of the vehicle is unknown',
                           mavlink.MAV_RESULT_TEMPORARILY_REJECTED)
-        self._roi = place._replace(altitude=place.altitude + above)
-        self.poll(now)
-
-    def end_place(self, now: float) -> None:
-        """Follow no place any more."""
-        self._roi = None
-        self._send(now)
+        return place._replace(altitude=place.altitude + above)
 
     def poll(self, now: float) -> None:
         """Send the setpoint, which follows the region of interest if there is one."""
         if self._roi is not None:
-            position = self._vehicle.position(now)
+            position = self._vehicle.position.get(now)
             self._note_lost('position', is_lost=position is None)
             if position and (angles := direction(position, self._roi)) is not None:
                 lock = mavlink.GIMBAL_DEVICE_FLAGS_YAW_LOCK
@@ -208,14 +205,6 @@ class SetpointMixer:
         self._send(now)
 
     # The path to the device
-
-    def as_status(self, now: float) -> GimbalDeviceAttitudeStatus:
-        """Return the setpoint as the attitude of a device that reports none."""
-        sent, heading = self.sent, self._vehicle.heading(now)
-        return GimbalDeviceAttitudeStatus(
-            0, 0, time_boot_ms(now), mavlink.GIMBAL_DEVICE_FLAGS_YAW_IN_VEHICLE_FRAME,
-            sent and sent.attitude or Quaternion(), math.nan, math.nan, math.nan, 0,
-            math.nan if heading is None else heading, math.nan)
 
     def _start(self, request: Setpoint, now: float) -> Vector:
         """Return the angles that a request changes; :raises Refused: if they are unknown."""
@@ -236,7 +225,7 @@ class SetpointMixer:
             angles, known = self.current.angles, self.current.frame
         elif reported := self._device.pointing(now):
             angles, known = reported
-        elif self.sent is not None or self._device.has_reported:
+        elif self.sent is not None or self._device.newest is not None:
             raise Refused('the attitude of the gimbal is unknown')
         if known is frame:
             return angles
@@ -253,7 +242,8 @@ class SetpointMixer:
 
     def _turn(self, now: float, offsets: Vector = STILL) -> None:
         """Turn the setpoint by the rates that the device does not follow, and by offsets."""
-        if (before := self.current) is not None:
+        before = self.current
+        if before is not None and not offsets == STILL == before.turning:
             self.current = turned(
                 before._replace(since=max(before.since, now - STEP_LIMIT)), now,
                 self._device.model.ranges, self._ahead(before, now), offsets, self.clipped)

@@ -113,7 +113,7 @@ def test_a_zero_is_repeated_until_an_attitude_shows_that_the_device_stands(
 
     assert not rig.turns
     assert rig.results == [True]
-    assert not rig.manager.is_stopping
+    assert not rig.manager.setpoints.rate_stop.is_running
     # One more for each attitude that is compared.
     assert lost_zeros < len(rig.zeros) <= lost_zeros + 5
     assert all(math.isnan(value) for one in rig.zeros for value in one.q)
@@ -126,7 +126,7 @@ def test_a_device_that_goes_on_turning_is_reported_once_the_time_is_over(
 
     interrupt(rig)
     rig.pass_time(LIMIT - 0.1)
-    assert rig.manager.is_stopping
+    assert rig.manager.setpoints.rate_stop.is_running
     assert rig.results == []
     rig.pass_time(0.2)
 

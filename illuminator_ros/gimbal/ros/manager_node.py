@@ -34,10 +34,10 @@ from ..manager_control import ControlSettings, Role, RoleHolderChanged
 from ..manager_state import ManagerState, StateChanged
 from ..manager_with_client import ManagerWithClient
 from ...mavlink.command_sender import CommandSender
-from ...mavlink.messages import Address, time_boot_ms
+from ...mavlink.messages import Address
 from ...payload.arbitration import Cause, Policy
-from ...payload.messages import GeoPoint, GimbalDeviceAttitudeStatus
-from ...payload.mount_attitude import AXES, from_mavlink, to_mavlink, YawFrame
+from ...payload.messages import GeoPoint
+from ...payload.mount_attitude import AXES, from_mavlink
 from ...payload.rotation import enu_ned, ned_frd, Quaternion, Vector
 from ...ros.conversions import quaternion_message, read_orientation, read_quaternion, read_vector
 from ...ros.diagnostics import ERROR, Finding, LinkDiagnostics, Report, Value, WARN
@@ -144,7 +144,6 @@ class ManagerNode(ServedPayload):
     """
 
     def __init__(self, both: ManagerWithClient, host: Host) -> None:
-        self._both = both
         self._manager = manager = both.manager
         self._host = host
         self._log = host.log
@@ -166,34 +165,25 @@ class ManagerNode(ServedPayload):
         topics: list[AnyCommandTopic] = [
             CommandTopic(IMU, self._take_imu, _read_imu),
             CommandTopic(ODOMETRY, self._take_odometry, _read_odometry),
-            CommandTopic(FIX, self._take_place,
+            CommandTopic(FIX, self._manager.vehicle.position.set,
                          lambda message: _read_fix(message, separation))]
         if not self._manager.tracker.has_mavlink:
             topics.append(CommandTopic(
-                DEVICE_ATTITUDE, self._take_attitude, self._frames.read_attitude))
+                DEVICE_ATTITUDE, self._manager.take_attitude, self._frames.read_attitude))
         return topics
 
     # The vehicle and the device
 
     def _take_imu(self, value: tuple[Quaternion, float], now: float) -> None:
-        self._manager.vehicle.set_attitude(*value, now)
+        self._manager.vehicle.attitude.set(value, now)
         self._manager.vehicle_changed(now)
 
-    def _take_odometry(self, value: tuple[Quaternion, float, Vector], now: float) -> None:
-        attitude, yaw_rate, velocity = value
+    def _take_odometry(
+        self, value: tuple[tuple[Quaternion, float], Vector], now: float,
+    ) -> None:
+        attitude, velocity = value
         self._manager.vehicle.set_velocity(velocity, now)
-        self._take_imu((attitude, yaw_rate), now)
-
-    def _take_place(self, place: GeoPoint, now: float) -> None:
-        self._manager.vehicle.set_position(place, now)
-
-    def _take_attitude(self, value: tuple[Quaternion, YawFrame], now: float) -> None:
-        rotation, frame = value
-        heading = self._manager.vehicle.heading(now)
-        self._both.take_attitude(GimbalDeviceAttitudeStatus(
-            0, 0, time_boot_ms(now), int(frame.flag), to_mavlink(rotation, frame),
-            math.nan, math.nan, math.nan, 0, math.nan if heading is None else heading, math.nan),
-            now)
+        self._take_imu(attitude, now)
 
     # Events
 
@@ -263,7 +253,7 @@ class ManagerNode(ServedPayload):
 
     def shut_down(self, now: float, report: ShutdownReport) -> None:
         """See :meth:`ServedPayload.shut_down`: wait until a gimbal that turned stands."""
-        if self._manager.is_stopping:
+        if self._manager.setpoints.rate_stop.is_running:
             self._report = report
             report('device', None, self._may_turn())
         self._gimbals.shut_down(now, report)
@@ -329,12 +319,12 @@ def _read_imu(message: Imu) -> tuple[Quaternion, float]:
         message.angular_velocity.z, VEHICLE_RATE_LIMIT)
 
 
-def _read_odometry(message: Odometry) -> tuple[Quaternion, float, Vector]:
+def _read_odometry(message: Odometry) -> tuple[tuple[Quaternion, float], Vector]:
     """Return attitude, yaw rate and velocity, NED and FRD; the twist is in the child frame."""
     attitude = read_quaternion(message.pose.pose.orientation).normalized()
     twist = message.twist.twist
     x, y, z = (_within(value, VEHICLE_SPEED_LIMIT) for value in read_vector(twist.linear))
-    return (ned_frd(attitude), -_within(twist.angular.z, VEHICLE_RATE_LIMIT),
+    return ((ned_frd(attitude), -_within(twist.angular.z, VEHICLE_RATE_LIMIT)),
             enu_ned(attitude.rotate((x, y, z))))
 
 
