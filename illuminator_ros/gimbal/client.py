@@ -176,29 +176,26 @@ class GimbalClient(Payload):
 
     def _component(self, address: Address, now: float) -> _Component | None:
         """Return a component that may be a manager, None if there are too many."""
-        component = self._components.get(address)
-        if component is None and (
-                len(self._components) < MAX_COMPONENTS or self._forget_component(now)):
-            component = self._components[address] = _Component(now)
-        return component
+        components = self._components
+        if address not in components:
+            if len(components) >= MAX_COMPONENTS:
+                silent = min(components, key=lambda one: components[one].heard_at)
+                if now < components[silent].heard_at + FORGET_AFTER:
+                    return None
+                del components[silent]
+            components[address] = _Component(now)
+        return components[address]
 
     def _hear(self, source: Address, heartbeat: Heartbeat, now: float) -> None:
-        if component := self._components.get(source):
-            if now >= component.heard_at + RETURN_AFTER:
+        is_known = source in self._components
+        if component := self._component(source, now):
+            is_likely = (heartbeat.autopilot != mavlink.MAV_AUTOPILOT_INVALID
+                         or heartbeat.type == mavlink.MAV_TYPE_GIMBAL)
+            if not is_known:
+                component.query.due = now if is_likely else now + UNLIKELY_DELAY
+            elif now >= component.heard_at + RETURN_AFTER:
                 component.query = Retries(GIMBAL_MESSAGE)
             component.heard_at = now
-        elif component := self._component(source, now):
-            likely = (heartbeat.autopilot != mavlink.MAV_AUTOPILOT_INVALID
-                      or heartbeat.type == mavlink.MAV_TYPE_GIMBAL)
-            component.query = Retries(
-                GIMBAL_MESSAGE, now if likely else now + UNLIKELY_DELAY)
-
-    def _forget_component(self, now: float) -> bool:
-        address, component = min(self._components.items(), key=lambda item: item[1].heard_at)
-        if now < component.heard_at + FORGET_AFTER:
-            return False
-        del self._components[address]
-        return True
 
     def _reopen(self, manager: Address, now: float) -> None:
         """Request the information of a manager that has sent a status but no information."""
@@ -217,7 +214,7 @@ class GimbalClient(Payload):
 
     def _query_due(self) -> float:
         return max(self._next_query, min(
-            (one.query.due for one in self._components.values()), default=math.inf))
+            [one.query.due for one in self._components.values()], default=math.inf))
 
     # The end
 

@@ -136,8 +136,7 @@ class Gimbal:
         self._yaw_lock.reported(status, now)
         setpoints.reported(status, device.attitude, now, may_send=(
             self.reports.in_control and not (requests.pose.desired or requests.place.desired)))
-        if requests.is_releasing and setpoints.stands:
-            setpoints.forget()
+        if requests.is_releasing and setpoints.forget_zero():
             requests.release_due = -math.inf
         self._emit(events.AttitudeReceived(
             self.key, device.attitude, device.flags, device.errors))
@@ -162,10 +161,8 @@ class Gimbal:
             setpoints.control_unknown(now, is_heard=manager.liveness.is_heard(now), can_send=(
                 not reports.link_problem and manager.control is not None
                 and manager.control.primary == self._commands.address))
-        elif not reports.in_control:
-            setpoints.control_lost()
-        elif is_first:
-            setpoints.control_found()
+        elif is_first or not reports.in_control:
+            setpoints.control_changed(is_lost=not reports.in_control)
 
     # Control
 

@@ -205,43 +205,30 @@ class SetpointStream:
         assert self._last is not None
         self._last.due.insert(0, now + ATTITUDE_SPACING)
 
-    @property
-    def stands(self) -> bool:
-        """Whether an attitude has shown since the last zero that the gimbal stands."""
-        return self._last is not None and self._last.stands
-
-    def forget(self) -> None:
-        """Note that the gimbal follows no setpoint any more: the last zero has arrived."""
-        self._last = None
+    def forget_zero(self) -> bool:
+        """Forget the last zero if an attitude has shown since that the gimbal stands."""
+        has_arrived = self._last is not None and self._last.stands
+        if has_arrived:
+            self._last = None
+        return has_arrived
 
     def end(self, now: float) -> None:
         """Repeat no attitude, and end a rate or a place with a zero once it can be sent."""
         if self._last is not None and self._last.kind is not Kind.ZERO:
             self._last.due = [now] if self._last.moves else []
 
-    def control_lost(self) -> None:
+    def control_changed(self, *, is_lost: bool) -> None:
         """
-        Send nothing any more: another component has control.
+        Send nothing while another component has control; owe a zero to a gimbal that may turn.
 
-        If a rate lasts until this component has control again, it ends with a zero.
+        It is sent once this component has control, if the device then turns. Where this component
+        finds itself in control, a process before this one, with its address, had it: it was
+        killed, or it would have released control.
         """
-        if self._last and self._last.may_have_rate:
-            self._owe_zero()
-        else:
-            self._last = None
-
-    def control_found(self) -> None:
-        """
-        End a rate that lasts: a process before this one, with its address, had control.
-
-        It was killed, or it would have released control.
-        """
-        if self._last is None:
-            self._owe_zero()
-
-    def _owe_zero(self) -> None:
-        """Send a zero once this component has control, if the device then turns."""
-        self._last = _Setpoint(Kind.ZERO, due=[-math.inf] * len(REPEATS))
+        if not is_lost and self._last is not None:
+            return
+        owes = not is_lost or self._last is not None and self._last.may_have_rate
+        self._last = _Setpoint(Kind.ZERO, due=[-math.inf] * len(REPEATS)) if owes else None
 
     def control_unknown(self, now: float, *, can_send: bool, is_heard: bool) -> None:
         """
