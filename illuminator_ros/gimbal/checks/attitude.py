@@ -36,7 +36,7 @@ from .session import (
     STEP,
     TOLERANCE,
 )
-from ..axes import AT_LIMIT
+from ..axes import CONDITIONS
 from ...checks.component_requirements import check_command_int, none_of, uptime
 from ...checks.outcomes import Failed, Skipped
 from ...checks.requirement import AnyRequirement, Requirement, requirement
@@ -59,9 +59,6 @@ FAR_FROM_LIMIT = 45.0
 # The most turns of yaw in one direction that a range may permit: a cable limits a gimbal without
 # slip rings.
 MAX_TURNS = 10
-# Flags that are set in normal operation.
-NO_FAILURES = (sum(AT_LIMIT) | mavlink.GIMBAL_DEVICE_ERROR_FLAGS_CALIBRATION_RUNNING
-               | mavlink.GIMBAL_DEVICE_ERROR_FLAGS_NO_MANAGER)
 FRAMES = (mavlink.GIMBAL_DEVICE_FLAGS_YAW_IN_EARTH_FRAME
           | mavlink.GIMBAL_DEVICE_FLAGS_YAW_IN_VEHICLE_FRAME)
 # The flags from which the frame of the yaw follows.
@@ -285,7 +282,7 @@ STATUSES = (
              'GIMBAL_DEVICE_ERROR_FLAGS')
 async def failures_at_rest(gimbal: GimbalSession) -> None:
     """Read the flags, except those of normal operation."""
-    seen = {one.failure_flags & ~NO_FAILURES for _, one in gimbal.idle(AttitudeStatus)}
+    seen = {one.failure_flags & ~CONDITIONS for _, one in gimbal.idle(AttitudeStatus)}
     if names := [name for flag, name in short_names('GIMBAL_DEVICE_ERROR_FLAGS').items()
                  if any(one & flag for one in seen)]:
         raise Failed(', '.join(names))

@@ -16,7 +16,6 @@
 
 from __future__ import annotations
 
-import functools
 import logging
 import math
 
@@ -40,7 +39,7 @@ from ...payload.messages import GeoPoint
 from ...payload.mount_attitude import AXES, from_mavlink
 from ...payload.rotation import enu_ned, ned_frd, Quaternion, Vector
 from ...ros.conversions import quaternion_message, read_orientation, read_quaternion, read_vector
-from ...ros.diagnostics import ERROR, Finding, LinkDiagnostics, Report, Value, WARN
+from ...ros.diagnostics import ERROR, Finding, Report, Value, WARN
 from ...ros.diagnostics_publisher import DiagnosticsSource, MakeReports
 from ...ros.node import AnyCommandTopic, CommandTopic, Interface, NodeInterface
 from ...ros.parameters import by_name, ParameterError, ParameterSpec, Values
@@ -188,44 +187,37 @@ class ManagerNode(ServedPayload):
     # Events
 
     def _take(self, event: manager_events.ManagerEvent) -> None:
-        if isinstance(event, manager_events.SetpointSent):
-            self._publish(event)
-        elif isinstance(event, StateChanged):
-            self._state_changed(event)
-        elif isinstance(event, RoleHolderChanged):
-            self._log.info(_control_text(event, self._manager.settings.control.lease), 'control')
-        elif isinstance(event, manager_events.RequestRefused):
-            self._log.warning(f'a request of {event.player} is refused: {event.reason}',
-                              'refused')
-        elif isinstance(event, manager_events.AnglesClipped):
-            for one in event.clipped:
-                self._log.warning(
-                    f'the setpoint is clipped: {one.axis} {one.requested:.3f} rad in MAVLink is '
-                    f'beyond the limit {one.limit:.3f} rad', f'clipped {one.axis}')
-        elif isinstance(event, manager_events.AddressShared):
-            self._log.error(f'{event.player} has control, and two different senders use that '
-                            'address: require signing, or give one another address', 'shared')
-        elif isinstance(event, manager_events.ReferenceLost):
-            self._log.warning(f'the {event.unknown} of the vehicle is unknown: the gimbal does '
-                              'not follow its setpoint', f'lost {event.unknown}')
-        elif isinstance(event, manager_events.RateStopped):
-            self._rate_stopped(event)
-
-    def _publish(self, event: manager_events.SetpointSent) -> None:
-        setpoint = event.setpoint
-        # A setpoint without an attitude is the neutral position: level and ahead.
-        attitude = from_mavlink(setpoint.attitude or Quaternion(), setpoint.frame)
-        header = Header(stamp=self._clock.now().to_msg(),
-                        frame_id=self._frames.name(setpoint.frame))
-        self._interface.publish(DEVICE_SETPOINT.name, quaternion_message(header, attitude))
-
-    def _rate_stopped(self, event: manager_events.RateStopped) -> None:
-        if not event.stands:
-            self._log.warning(self._may_turn(), 'stop')
-        elif self._report is not None:
-            self._report('device', logging.INFO, f'{self._device()} stands')
-        else:
-            self._log.info(f'{self._device()} stands', 'stop')
+        log = self._log
+        match event:
+            case manager_events.SetpointSent(setpoint):
+                # A setpoint without an attitude is the neutral position: level and ahead.
+                attitude = from_mavlink(setpoint.attitude or Quaternion(), setpoint.frame)
+                header = Header(stamp=self._clock.now().to_msg(),
+                                frame_id=self._frames.name(setpoint.frame))
+                self._interface.publish(DEVICE_SETPOINT.name, quaternion_message(header, attitude))
+            case StateChanged():
+                self._state_changed(event)
+            case RoleHolderChanged():
+                log.info(_control_text(event, self._manager.settings.control.lease), 'control')
+            case manager_events.RequestRefused(player, reason):
+                log.warning(f'a request of {player} is refused: {reason}', 'refused')
+            case manager_events.AnglesClipped(clipped):
+                for axis, requested, limit in clipped:
+                    log.warning(f'the setpoint is clipped: {axis} {requested:.3f} rad in MAVLink '
+                                f'is beyond the limit {limit:.3f} rad', f'clipped {axis}')
+            case manager_events.AddressShared(player):
+                log.error(f'{player} has control, and two different senders use that address: '
+                          'require signing, or give one another address', 'shared')
+            case manager_events.ReferenceLost(unknown):
+                log.warning(f'the {unknown} of the vehicle is unknown: the gimbal does not follow '
+                            'its setpoint', f'lost {unknown}')
+            case manager_events.RateStopped(stands):
+                if not stands:
+                    log.warning(self._may_turn(), 'stop')
+                elif self._report is not None:
+                    self._report('device', logging.INFO, f'{self._device()} stands')
+                else:
+                    log.info(f'{self._device()} stands', 'stop')
 
     def _device(self) -> str:
         tracker = self._manager.tracker
@@ -263,8 +255,9 @@ class ManagerNode(ServedPayload):
     def _take_snapshot(self, now: float) -> MakeReports:
         holder = self._manager.control.holder(Role.PRIMARY)
         peers = self._host.link.lines.peer_count_of(holder, now) if holder else 0
-        return functools.partial(_reports, findings=findings(self._manager, peers), values=_values(
-            self._manager, now))
+        found, values = findings(self._manager, peers), _values(self._manager, now)
+        return lambda link: [Report('manager', f'manager {values["gimbal_device_id"]}', found,
+                                    'active', lambda: values)]
 
 
 def findings(manager: GimbalManager, peers: int) -> list[Finding]:
@@ -282,13 +275,6 @@ def findings(manager: GimbalManager, peers: int) -> list[Finding]:
         found.append((WARN, f'{manager.control.holder(Role.PRIMARY)} has control and is heard '
                             f'over {peers} peers: another sender may use its address'))
     return found
-
-
-def _reports(
-    link: LinkDiagnostics, *, findings: list[Finding], values: dict[str, Value],
-) -> list[Report]:
-    return [Report('manager', f'manager {values["gimbal_device_id"]}', findings, 'active',
-                   lambda: values)]
 
 
 def _values(manager: GimbalManager, now: float) -> dict[str, Value]:
