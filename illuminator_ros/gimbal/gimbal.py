@@ -25,9 +25,8 @@ from . import messages as gimbal
 from .axes import known_ranges
 from .commands import Flag, setpoint_flags
 from .gimbal_reports import GimbalReports
-from .gimbal_requests import GimbalRequests
+from .gimbal_requests import GimbalRequests, YawLock
 from .setpoint_stream import SetpointStream, SuspendedBy
-from .yaw_lock import YawLock
 from ..mavlink.command_sender import CommandSender
 from ..mavlink.dialect import mavlink
 from ..mavlink.messages import Address

@@ -25,15 +25,15 @@ from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass, field
 import math
 import random
+from typing import TypeAlias
 
 from . import messages as gimbal
 from .axes import AT_LIMIT, range_fields, Ranges, UNLIMITED
 from .managed_device import ManagedDevice
 from .manager_control import ControlArbiter, ControlSettings, Role, RoleHolderChanged
-from .manager_events import AddressShared, ManagerEvent, RequestRefused
 from .manager_setpoint import AnySetpoint, read_roi, read_setpoint, Refused, Setpoint
 from .manager_state import ManagerState, StateChanged, StateTracker
-from .setpoint_mixer import SetpointMixer
+from .setpoint_mixer import SetpointEvent, SetpointMixer
 from .vehicle_state import VehicleState
 from ..mavlink import messages as mav
 from ..mavlink.command_sender import Command, CommandSender
@@ -67,6 +67,25 @@ class ManagerSettings:
     device_id: int = 0
     nudge_limit: float = math.radians(10)
     ranges: Ranges = UNLIMITED
+
+
+@dataclass(frozen=True)
+class RequestRefused:
+    """A setpoint or a command of a player was refused."""
+
+    player: Address
+    reason: str
+
+
+@dataclass(frozen=True)
+class AddressShared:
+    """Two senders with different heartbeats use the address of one player."""
+
+    player: Address
+
+
+ManagerEvent: TypeAlias = (
+    StateChanged | RoleHolderChanged | RequestRefused | AddressShared | SetpointEvent)
 
 
 class GimbalManager(Payload):

@@ -17,10 +17,11 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import dataclass
 import functools
 import math
+from typing import TypeAlias
 
-from . import manager_events as events
 from .axes import LEVEL
 from .managed_device import ManagedDevice
 from .manager_setpoint import (
@@ -56,6 +57,45 @@ STEP_LIMIT = 0.1
 HEADING_UNKNOWN = 'the heading of the vehicle is unknown'
 
 
+@dataclass(frozen=True)
+class AnglesClipped:
+    """Angles beyond the ranges of the device are clipped; once for an axis and a setpoint."""
+
+    clipped: tuple[Clipped, ...]
+
+
+@dataclass(frozen=True)
+class SetpointSent:
+    """A device without MAVLink must take a setpoint, which is mixed and clipped."""
+
+    setpoint: Setpoint
+
+
+@dataclass(frozen=True)
+class ReferenceLost:
+    """
+    The gimbal no longer follows its region of interest, or a yaw relative to north.
+
+    :param unknown: the unknown value of the vehicle: ``position`` or ``heading``.
+    """
+
+    unknown: str
+
+
+@dataclass(frozen=True)
+class RateStopped:
+    """
+    A rate has ended, since the manager gives no more setpoints.
+
+    :param stands: whether an attitude has shown in time that the device stands.
+    """
+
+    stands: bool
+
+
+SetpointEvent: TypeAlias = AnglesClipped | SetpointSent | ReferenceLost | RateStopped
+
+
 class SetpointMixer:
     """
     Gives the device of an active manager its setpoints. No I/O; times are s.
@@ -70,7 +110,7 @@ class SetpointMixer:
 
     def __init__(
         self, device: ManagedDevice, vehicle: VehicleState, tracker: StateTracker,
-        commands: CommandSender, emit: Callable[[events.ManagerEvent], None],
+        commands: CommandSender, emit: Callable[[SetpointEvent], None],
     ) -> None:
         self.current: Setpoint | None = None
         self.sent: Setpoint | None = None
@@ -122,7 +162,7 @@ class SetpointMixer:
     def _rate_stopped(self, stands: bool) -> None:
         if stands:
             self.current = None
-        self._emit(events.RateStopped(stands))
+        self._emit(RateStopped(stands))
 
     # Players
 
@@ -277,7 +317,7 @@ class SetpointMixer:
         """Give the device a setpoint."""
         self.sent = sent
         if not self._tracker.has_mavlink:
-            self._emit(events.SetpointSent(sent))
+            self._emit(SetpointSent(sent))
         elif self._tracker.device is not None:
             self._commands.send(GimbalDeviceSetAttitude(
                 *self._tracker.device, sent.device_flags, sent.attitude or UNSET_QUATERNION,
@@ -294,10 +334,10 @@ class SetpointMixer:
                           if request == requests[axis]}
         if new := tuple(one for one in self.clipped if one.axis not in self._reported):
             self._reported |= {one.axis: requests[one.axis] for one in new}
-            self._emit(events.AnglesClipped(new))
+            self._emit(AnglesClipped(new))
 
     def _note_lost(self, name: str, *, is_lost: bool) -> None:
         """Report once that a value of the vehicle, which the setpoint needs, is unknown."""
         if is_lost and name not in self._lost:
-            self._emit(events.ReferenceLost(name))
+            self._emit(ReferenceLost(name))
         self._lost = self._lost | {name} if is_lost else self._lost - {name}

@@ -23,15 +23,14 @@ import random
 from typing import Any
 
 from illuminator_ros.gimbal.gimbal import GimbalSettings
-from illuminator_ros.gimbal.manager import GimbalManager, ManagerSettings
-from illuminator_ros.gimbal.manager_events import RequestRefused, SetpointSent
+from illuminator_ros.gimbal.manager import GimbalManager, ManagerSettings, RequestRefused
 from illuminator_ros.gimbal.manager_with_client import ManagerWithClient
 from illuminator_ros.gimbal.messages import (
     GimbalDeviceSetAttitude,
     GimbalManagerSetAttitude,
     REMOVE_SENDER,
 )
-from illuminator_ros.gimbal.setpoint_mixer import HOLD_INTERVAL
+from illuminator_ros.gimbal.setpoint_mixer import HOLD_INTERVAL, SetpointSent
 from illuminator_ros.mavlink import messages as mav
 from illuminator_ros.mavlink.command_sender import CommandSender
 from illuminator_ros.mavlink.component import Component

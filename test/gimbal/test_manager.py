@@ -25,18 +25,12 @@ from hypothesis import assume, example, given
 from hypothesis import strategies as st
 from illuminator_ros.gimbal import managed_device, setpoint_mixer
 from illuminator_ros.gimbal.axes import Range
+from illuminator_ros.gimbal.manager import AddressShared, RequestRefused
 from illuminator_ros.gimbal.manager_control import (
     ControlSettings,
     IDENTITY_TIME,
     Role,
     RoleHolderChanged,
-)
-from illuminator_ros.gimbal.manager_events import (
-    AddressShared,
-    AnglesClipped,
-    ReferenceLost,
-    RequestRefused,
-    SetpointSent,
 )
 from illuminator_ros.gimbal.manager_state import ManagerState
 from illuminator_ros.gimbal.messages import (
@@ -50,6 +44,7 @@ from illuminator_ros.gimbal.messages import (
     GimbalManagerStatus,
     rates_of,
 )
+from illuminator_ros.gimbal.setpoint_mixer import AnglesClipped, ReferenceLost, SetpointSent
 from illuminator_ros.gimbal.vehicle_state import ESTIMATES_ATTITUDE
 from illuminator_ros.mavlink import messages as mav
 from illuminator_ros.mavlink.dialect import (

@@ -26,12 +26,18 @@ from std_msgs.msg import Header
 
 from .conversions import Frames, read_place
 from .gimbals import GIMBAL_PARAMETERS, Gimbals, settings
-from .. import manager_events
 from ..axes import other_signs, Range
-from ..manager import GimbalManager, ManagerSettings
+from ..manager import (
+    AddressShared,
+    GimbalManager,
+    ManagerEvent,
+    ManagerSettings,
+    RequestRefused,
+)
 from ..manager_control import ControlSettings, Role, RoleHolderChanged
 from ..manager_state import ManagerState, StateChanged
 from ..manager_with_client import ManagerWithClient
+from ..setpoint_mixer import AnglesClipped, RateStopped, ReferenceLost, SetpointSent
 from ...mavlink.command_sender import CommandSender
 from ...mavlink.messages import Address
 from ...payload.arbitration import Cause, Policy
@@ -186,10 +192,10 @@ class ManagerNode(ServedPayload):
 
     # Events
 
-    def _take(self, event: manager_events.ManagerEvent) -> None:
+    def _take(self, event: ManagerEvent) -> None:
         log = self._log
         match event:
-            case manager_events.SetpointSent(setpoint):
+            case SetpointSent(setpoint):
                 # A setpoint without an attitude is the neutral position: level and ahead.
                 attitude = from_mavlink(setpoint.attitude or Quaternion(), setpoint.frame)
                 header = Header(stamp=self._clock.now().to_msg(),
@@ -199,19 +205,19 @@ class ManagerNode(ServedPayload):
                 self._state_changed(event)
             case RoleHolderChanged():
                 log.info(_control_text(event, self._manager.settings.control.lease), 'control')
-            case manager_events.RequestRefused(player, reason):
+            case RequestRefused(player, reason):
                 log.warning(f'a request of {player} is refused: {reason}', 'refused')
-            case manager_events.AnglesClipped(clipped):
+            case AnglesClipped(clipped):
                 for axis, requested, limit in clipped:
                     log.warning(f'the setpoint is clipped: {axis} {requested:.3f} rad in MAVLink '
                                 f'is beyond the limit {limit:.3f} rad', f'clipped {axis}')
-            case manager_events.AddressShared(player):
+            case AddressShared(player):
                 log.error(f'{player} has control, and two different senders use that address: '
                           'require signing, or give one another address', 'shared')
-            case manager_events.ReferenceLost(unknown):
+            case ReferenceLost(unknown):
                 log.warning(f'the {unknown} of the vehicle is unknown: the gimbal does not follow '
                             'its setpoint', f'lost {unknown}')
-            case manager_events.RateStopped(stands):
+            case RateStopped(stands):
                 if not stands:
                     log.warning(self._may_turn(), 'stop')
                 elif self._report is not None:
