@@ -18,15 +18,23 @@ from __future__ import annotations
 
 import math
 
-from .axes import known_ranges, Ranges, read_capabilities, TURNING
-from .manager_setpoint import GimbalModel, POSES, Setpoint
+from .axes import HAS_AXIS, HAS_LOCK, known_ranges, Ranges, read_capabilities, TURNING, UNLIMITED
+from .manager_setpoint import POSES, Setpoint
 from .manager_state import ManagerState, StateTracker
 from .messages import GimbalDeviceInformation, rates_of
 from .vehicle_state import VehicleState
 from ..mavlink.command_sender import CommandResult, CommandSender, request_message
+from ..mavlink.dialect import mavlink
 from ..mavlink.retries import DEVICE_INFORMATION, Retries
 from ..payload.messages import GimbalDeviceAttitudeStatus
-from ..payload.mount_attitude import heading_of, rotation_of, STILL, yaw_frame, YawFrame
+from ..payload.mount_attitude import (
+    heading_of,
+    names_frame,
+    rotation_of,
+    STILL,
+    yaw_frame,
+    YawFrame,
+)
 from ..payload.rotation import Vector
 
 # Requests for GIMBAL_DEVICE_INFORMATION without the message after which the manager announces the
@@ -38,13 +46,30 @@ INFORMATION_TIMEOUT = 2.0
 ATTITUDE_AGE = 1.0
 
 
+# The capability that a flag needs.
+_NEEDED = {mavlink.GIMBAL_DEVICE_FLAGS_RETRACT: mavlink.GIMBAL_DEVICE_CAP_FLAGS_HAS_RETRACT,
+           mavlink.GIMBAL_DEVICE_FLAGS_NEUTRAL: mavlink.GIMBAL_DEVICE_CAP_FLAGS_HAS_NEUTRAL,
+           mavlink.GIMBAL_DEVICE_FLAGS_YAW_LOCK: mavlink.GIMBAL_DEVICE_CAP_FLAGS_HAS_YAW_LOCK}
+
+
+def _capabilities(ranges: Ranges) -> int:
+    """Return those of a gimbal that is stabilised and points to any attitude within the ranges."""
+    capabilities = mavlink.GIMBAL_DEVICE_CAP_FLAGS_HAS_NEUTRAL
+    if not ranges[2].is_fixed:
+        capabilities |= mavlink.GIMBAL_DEVICE_CAP_FLAGS_HAS_YAW_FOLLOW
+    for range_, *flags in zip(ranges, HAS_AXIS, HAS_LOCK, strict=True):
+        capabilities |= 0 if range_.is_fixed else sum(flags)
+    return capabilities
+
+
 class ManagedDevice:
     """
     The facts that a manager knows of its device. Times are s.
 
     :param tracker: knows its address.
     :param ranges: of the axes of a device without MAVLink.
-    :ivar model: its abilities.
+    :ivar capabilities: 0 where unknown.
+    :ivar ranges: of roll, pitch, and yaw relative to the vehicle.
     :ivar newest: status, None before the first.
     :ivar information: None until it has come.
     :ivar request: of the information.
@@ -54,7 +79,8 @@ class ManagedDevice:
         self, tracker: StateTracker, commands: CommandSender, vehicle: VehicleState,
         ranges: Ranges,
     ) -> None:
-        self.model = GimbalModel() if tracker.has_mavlink else GimbalModel.from_ranges(ranges)
+        self.capabilities, self.ranges = (
+            (0, UNLIMITED) if tracker.has_mavlink else (_capabilities(ranges), ranges))
         self.information: GimbalDeviceInformation | None = None
         self.request = Retries(DEVICE_INFORMATION, math.inf)
         self._tracker = tracker
@@ -80,12 +106,12 @@ class ManagedDevice:
         """Forget its abilities: the next device may be another one."""
         self.request = Retries(DEVICE_INFORMATION, math.inf)
         if self._tracker.has_mavlink:
-            self.information, self.model = None, GimbalModel()
+            self.information, self.capabilities, self.ranges = None, 0, UNLIMITED
 
     def take_information(self, message: GimbalDeviceInformation) -> None:
         """Take GIMBAL_DEVICE_INFORMATION."""
         self.information = message
-        self.model = GimbalModel(read_capabilities(message), known_ranges(message))
+        self.capabilities, self.ranges = read_capabilities(message), known_ranges(message)
         self.request.stop()
 
     def poll(self, now: float) -> None:
@@ -110,10 +136,18 @@ class ManagedDevice:
         """Return the newest status, None if it is out of date."""
         return self.newest if now < self._newest_at + ATTITUDE_AGE else None
 
+    def lacks(self, flags: int) -> int:
+        """Return the flags that it cannot follow."""
+        return sum([flag for flag, needed in _NEEDED.items()
+                    if flags & flag and self.capabilities and not self.capabilities & needed])
+
     def accepts_earth_frame(self, now: float) -> bool:
         """Return whether it accepts a yaw relative to north."""
         status = self.status(now)
-        return self.model.accepts_earth_frame(status.flags if status else None)
+        if status is not None and names_frame(status.flags):
+            return bool(status.flags & mavlink.GIMBAL_DEVICE_FLAGS_ACCEPTS_YAW_IN_EARTH_FRAME)
+        return not self.capabilities or bool(
+            self.capabilities & mavlink.GIMBAL_DEVICE_CAP_FLAGS_SUPPORTS_YAW_IN_EARTH_FRAME)
 
     def heading(self, now: float) -> float | None:
         """Return the vehicle's heading as the device reports it, else as the vehicle does."""

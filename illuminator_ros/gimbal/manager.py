@@ -285,7 +285,7 @@ class GimbalManager(Payload):
                 or message.gimbal_device_id not in (0, self.tracker.device_id)):
             return
         try:
-            self._follow(source, read_setpoint(message, self._device.model.ranges), now)
+            self._follow(source, read_setpoint(message, self._device.ranges), now)
         except ValueError as error:
             self.events.emit(RequestRefused(source, str(error)))
 
@@ -421,20 +421,19 @@ class GimbalManager(Payload):
             # Clients request the message once, and would never know the device's capabilities.
             return None
         # The manager itself computes the attitude towards a place.
-        model = self._device.model
         capabilities = (
-            model.capabilities | mavlink.GIMBAL_MANAGER_CAP_FLAGS_CAN_POINT_LOCATION_GLOBAL)
+            self._device.capabilities | mavlink.GIMBAL_MANAGER_CAP_FLAGS_CAN_POINT_LOCATION_GLOBAL)
         return gimbal.GimbalManagerInformation(
             mav.time_boot_ms(now), capabilities, self.tracker.device_id,
-            **range_fields(model.ranges))
+            **range_fields(self._device.ranges))
 
     def _device_information(self, now: float) -> gimbal.GimbalDeviceInformation | None:
         """Return GIMBAL_DEVICE_INFORMATION, which clients may request from the manager."""
-        device_id, model = self.tracker.device_id, self._device.model
+        device_id, device = self.tracker.device_id, self._device
         if self.tracker.has_mavlink:
-            return self._device.information and replaced(
-                self._device.information, gimbal_device_id=device_id)
+            return device.information and replaced(
+                device.information, gimbal_device_id=device_id)
         return gimbal.GimbalDeviceInformation(
             mav.time_boot_ms(now), b'illuminator_ros', b'gimbal behind ROS', b'', 0, 0, 0,
-            model.capabilities & 0xFFFF, 0, **range_fields(model.ranges),
+            device.capabilities & 0xFFFF, 0, **range_fields(device.ranges),
             gimbal_device_id=device_id, cap_flags2=0)

@@ -23,26 +23,17 @@ is relative to north or to the vehicle's heading: see :class:`~..payload.mount_a
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 import math
 from typing import NamedTuple
 
 from . import messages as gimbal
-from .axes import (
-    HAS_AXIS,
-    HAS_LOCK,
-    LEVEL,
-    Range,
-    Ranges,
-    RATE_LIMIT,
-    UNLIMITED,
-)
+from .axes import LEVEL, Range, Ranges, RATE_LIMIT, UNLIMITED
 from .messages import rates_of
 from ..mavlink.command_sender import DEGREE_SCALE
 from ..mavlink.dialect import MAV_RESULT_COMMAND_UNSUPPORTED_MAV_FRAME, mavlink
 from ..mavlink.messages import AnyCommand, CommandInt, params_of
 from ..payload.messages import GeoPoint
-from ..payload.mount_attitude import AXES, names_frame, STILL, UNSET_VECTOR, yaw_frame, YawFrame
+from ..payload.mount_attitude import AXES, STILL, UNSET_VECTOR, yaw_frame, YawFrame
 from ..payload.rotation import Quaternion, Vector
 
 # Flags that alone set the attitude.
@@ -58,51 +49,8 @@ _TOLERANCE = 1e-5
 _HYSTERESIS = math.radians(10)
 # rad/s at full deflection of GIMBAL_MANAGER_SET_MANUAL_CONTROL, which leaves it open.
 MANUAL_RATE = 0.5
-# The capability that a flag needs.
-_NEEDED = {mavlink.GIMBAL_DEVICE_FLAGS_RETRACT: mavlink.GIMBAL_DEVICE_CAP_FLAGS_HAS_RETRACT,
-           mavlink.GIMBAL_DEVICE_FLAGS_NEUTRAL: mavlink.GIMBAL_DEVICE_CAP_FLAGS_HAS_NEUTRAL,
-           mavlink.GIMBAL_DEVICE_FLAGS_YAW_LOCK: mavlink.GIMBAL_DEVICE_CAP_FLAGS_HAS_YAW_LOCK}
 # Equatorial radius, m, and squared eccentricity of WGS 84.
 _RADIUS, _ECCENTRICITY_2 = 6378137.0, 6.69437999014e-3
-
-
-@dataclass(frozen=True)
-class GimbalModel:
-    """
-    The abilities of a gimbal; all unknown at first.
-
-    :param capabilities: 0 where unknown.
-    :param ranges: of roll, pitch, and yaw relative to the vehicle.
-    """
-
-    capabilities: int = 0
-    ranges: Ranges = UNLIMITED
-
-    @classmethod
-    def from_ranges(cls, ranges: Ranges) -> GimbalModel:
-        """Return a gimbal that is stabilised and points to any attitude within the ranges."""
-        capabilities = mavlink.GIMBAL_DEVICE_CAP_FLAGS_HAS_NEUTRAL
-        if not ranges[2].is_fixed:
-            capabilities |= mavlink.GIMBAL_DEVICE_CAP_FLAGS_HAS_YAW_FOLLOW
-        for range_, *flags in zip(ranges, HAS_AXIS, HAS_LOCK, strict=True):
-            capabilities |= 0 if range_.is_fixed else sum(flags)
-        return cls(capabilities, ranges)
-
-    def lacks(self, flags: int) -> int:
-        """Return the flags that the gimbal cannot follow."""
-        return sum([flag for flag, needed in _NEEDED.items()
-                    if flags & flag and self.capabilities and not self.capabilities & needed])
-
-    def accepts_earth_frame(self, reported: int | None) -> bool:
-        """
-        Return whether the gimbal accepts a yaw relative to north.
-
-        :param reported: the flags that the device reports now, None if it reports none.
-        """
-        if reported is not None and names_frame(reported):
-            return bool(reported & mavlink.GIMBAL_DEVICE_FLAGS_ACCEPTS_YAW_IN_EARTH_FRAME)
-        return not self.capabilities or bool(
-            self.capabilities & mavlink.GIMBAL_DEVICE_CAP_FLAGS_SUPPORTS_YAW_IN_EARTH_FRAME)
 
 
 class Refused(ValueError):

@@ -168,7 +168,7 @@ class SetpointMixer:
 
     def set(self, request: Setpoint, now: float) -> None:  # noqa: A003
         """Follow a request of the player in primary control; :raises Refused: if it cannot."""
-        if lacking := self._device.model.lacks(request.flags):
+        if lacking := self._device.lacks(request.flags):
             names = (name for flag, name in short_names('GIMBAL_DEVICE_FLAGS').items()
                      if flag & lacking)
             raise Refused(f'the gimbal does not have {", ".join(names)}')
@@ -240,7 +240,7 @@ class SetpointMixer:
             if position and (angles := direction(position, self._roi)) is not None:
                 lock = mavlink.GIMBAL_DEVICE_FLAGS_YAW_LOCK
                 self.current = Setpoint(
-                    LEVEL | (lock & ~self._device.model.lacks(lock)), YawFrame.EARTH,
+                    LEVEL | (lock & ~self._device.lacks(lock)), YawFrame.EARTH,
                     (0.0, *angles), since=now)
         self._send(now)
 
@@ -286,7 +286,7 @@ class SetpointMixer:
         if before is not None and not offsets == STILL == before.turning:
             self.current = turned(
                 before._replace(since=max(before.since, now - STEP_LIMIT)), now,
-                self._device.model.ranges, self._ahead(before, now), offsets, self.clipped)
+                self._device.ranges, self._ahead(before, now), offsets, self.clipped)
 
     def _send(self, now: float) -> None:
         """Give the device the setpoint, with everything mixed and clipped."""
@@ -302,7 +302,7 @@ class SetpointMixer:
             FOLLOW_INTERVAL if setpoint.turning != STILL or converts or self._roi is not None
             else HOLD_INTERVAL)
         angles, self.clipped = clip(
-            setpoint, self._device.model.ranges, ahead, self._offsets, self.clipped)
+            setpoint, self._device.ranges, ahead, self._offsets, self.clipped)
         if self.clipped or self._reported:
             self._report_clipped(setpoint)
         sent = setpoint if angles is setpoint.angles else setpoint._replace(angles=angles)
