@@ -424,40 +424,44 @@ OWN: tuple[Requirement[ManagerSession], ...] = (
     *attitude.information(INFORMATION), same_device, attitude_stream,
     attitude.command_int(INFORMATION),
     take, release, unchanged, release_others, secondary, configure_values, one_player,
-    reaches('set-attitude', 'turns to an attitude (GIMBAL_MANAGER_SET_ATTITUDE)', GIMBAL,
-            'Controlling Gimbal Angle and/or Angular Rate using MAVLink', ManagerSession.point),
+    moves('set-attitude', 'turns to an attitude (GIMBAL_MANAGER_SET_ATTITUDE)', GIMBAL,
+          'Controlling Gimbal Angle and/or Angular Rate using MAVLink')(
+        reaches(ManagerSession.point)),
     *attitude.MOTION,
-    reaches('angles-with-rates', 'turns to angles at rates (GIMBAL_MANAGER_SET_ATTITUDE)',
-            MESSAGES, PITCHYAW_COMMAND,
-            lambda manager, pose: manager.point(pose, rates=(3 * RATE, 3 * RATE, 3 * RATE))),
-    reaches('set-pitchyaw', 'turns to angles (GIMBAL_MANAGER_SET_PITCHYAW)', MESSAGES,
-            'GIMBAL_MANAGER_SET_PITCHYAW', ManagerSession.set_pitchyaw),
-    reaches('pitchyaw', f'turns to angles ({PITCHYAW_COMMAND})', MESSAGES, PITCHYAW_COMMAND,
-            lambda manager, pose: manager.pitchyaw(pose.pitch, pose.yaw)),
+    moves('angles-with-rates', 'turns to angles at rates (GIMBAL_MANAGER_SET_ATTITUDE)',
+          MESSAGES, PITCHYAW_COMMAND)(
+        reaches(lambda manager, pose: manager.point(pose, rates=(3 * RATE,) * 3))),
+    moves('set-pitchyaw', 'turns to angles (GIMBAL_MANAGER_SET_PITCHYAW)', MESSAGES,
+          'GIMBAL_MANAGER_SET_PITCHYAW')(reaches(ManagerSession.set_pitchyaw)),
+    moves('pitchyaw', f'turns to angles ({PITCHYAW_COMMAND})', MESSAGES, PITCHYAW_COMMAND)(
+        reaches(lambda manager, pose: manager.pitchyaw(pose.pitch, pose.yaw))),
     # A manager that reads this low rate as rad/s is detected and does no harm.
-    turns('pitchyaw-rate', f'turns at rates in deg/s ({PITCHYAW_COMMAND})', MESSAGES,
-          PITCHYAW_COMMAND,
-          lambda manager, speed: manager.pitchyaw(pitch_rate=speed, yaw_rate=0.0), 2.0),
-    reaches('one-axis', f'changes one angle and keeps the other ({PITCHYAW_COMMAND})', MESSAGES,
-            PITCHYAW_COMMAND, lambda manager, pose: manager.pitchyaw(pose.pitch), yaw=0.0),
+    moves('pitchyaw-rate', f'turns at rates in deg/s ({PITCHYAW_COMMAND})', MESSAGES,
+          PITCHYAW_COMMAND)(turns(
+              lambda manager, speed: manager.pitchyaw(pitch_rate=speed, yaw_rate=0.0), 2.0)),
+    moves('one-axis', f'changes one angle and keeps the other ({PITCHYAW_COMMAND})', MESSAGES,
+          PITCHYAW_COMMAND)(reaches(lambda manager, pose: manager.pitchyaw(pose.pitch), 0.0)),
     # A fifth of the full rate.
-    turns('manual', 'turns by manual control (GIMBAL_MANAGER_SET_MANUAL_CONTROL)', GIMBAL,
-          'Manual Gimbal Control using MAVLink', lambda manager, speed: manager.send_angles(
-              gimbal.GimbalManagerSetManualControl, pitch_rate=speed / 10, yaw_rate=0.0), 2.0,
-          fastest=math.inf),
+    moves('manual', 'turns by manual control (GIMBAL_MANAGER_SET_MANUAL_CONTROL)', GIMBAL,
+          'Manual Gimbal Control using MAVLink')(turns(
+              lambda manager, speed: manager.send_angles(
+                  gimbal.GimbalManagerSetManualControl, pitch_rate=speed / 10, yaw_rate=0.0),
+              2.0, fastest=math.inf)),
     earth_frame, flags_shown, roi,
-    ignores('no-control-command', f'rejects {PITCHYAW_COMMAND} of a component without control '
-            '(GM-19)', GIMBAL, STARTING, 'a command of the second player',
-            lambda manager, pose: manager.pitchyaw(
-                pose.pitch, pose.yaw, source=manager.other)),
-    ignores('no-control-messages', 'ignores setpoint messages of a component without control '
-            '(GM-19)', GIMBAL, STARTING, 'setpoints of the second player', _send_messages),
-    ignores('no-control-roi', 'rejects a region of interest of a component without control '
-            '(GM-11)', GIMBAL, STARTING, 'a command of the second player', _clear_roi),
-    ignores('other-device', 'ignores setpoints and commands for other gimbal devices (GM-28)',
-            GIMBAL, ADDRESSING, 'setpoints for another gimbal device', _point_other_device),
-    reaches('all-devices', 'treats gimbal device 0 as all of its gimbals (GM-28)', GIMBAL,
-            ADDRESSING, lambda manager, pose: manager.point(pose, device_id=0)),
+    moves('no-control-command', f'rejects {PITCHYAW_COMMAND} of a component without control '
+          '(GM-19)', GIMBAL, STARTING)(
+        ignores('a command of the second player', lambda manager, pose: manager.pitchyaw(
+            pose.pitch, pose.yaw, source=manager.other))),
+    moves('no-control-messages', 'ignores setpoint messages of a component without control '
+          '(GM-19)', GIMBAL, STARTING)(
+        ignores('setpoints of the second player', _send_messages)),
+    moves('no-control-roi', 'rejects a region of interest of a component without control '
+          '(GM-11)', GIMBAL, STARTING)(ignores('a command of the second player', _clear_roi)),
+    moves('other-device', 'ignores setpoints and commands for other gimbal devices (GM-28)',
+          GIMBAL, ADDRESSING)(
+        ignores('setpoints for another gimbal device', _point_other_device)),
+    moves('all-devices', 'treats gimbal device 0 as all of its gimbals (GM-28)', GIMBAL,
+          ADDRESSING)(reaches(lambda manager, pose: manager.point(pose, device_id=0))),
     other_target, *attitude.STATUSES,
 )
 REQUIREMENTS = component.with_common(OWN, MANAGER_STATUS, INFORMATION)
