@@ -23,11 +23,11 @@ the device for :data:`MANAGER_TIMEOUT`.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from functools import partial
 import math
-from typing import Any, ClassVar
+from typing import Any
 
 from . import messages as gimbal
 from .axes import range_fields
@@ -165,8 +165,6 @@ class SimulatedMount(simulated.SimulatedDevice):
     :ivar motion: of its axes.
     """
 
-    sends: ClassVar[Sequence[type[Message]]] = (
-        GimbalDeviceAttitudeStatus, gimbal.GimbalDeviceInformation)
     commands = COMMANDS
     properties: MountProperties
     behaviour: GimbalBehaviour
@@ -185,17 +183,12 @@ class SimulatedMount(simulated.SimulatedDevice):
         self.motion.advance(now)
         self.motion.fail(self.behaviour.frozen_axis, limited=self.behaviour.limits_range)
 
-    def streams(self) -> Mapping[int, float]:
-        """See :meth:`SimulatedDevice.streams`."""
-        return {GimbalDeviceAttitudeStatus.id: self.properties.status_interval}
-
-    def message(self, message_id: int, now: float) -> Message | None:
-        """See :meth:`SimulatedDevice.message`."""
-        if message_id == GimbalDeviceAttitudeStatus.id and self.behaviour.reports:
-            return self.status(now)
-        if message_id == gimbal.GimbalDeviceInformation.id and self.behaviour.identifies:
-            return self._information(now)
-        return None
+    def reports(self) -> Mapping[type[Message], simulated.Report]:
+        """See :meth:`SimulatedDevice.reports`."""
+        return {
+            GimbalDeviceAttitudeStatus: simulated.Report(
+                self.status, self.properties.status_interval),
+            gimbal.GimbalDeviceInformation: simulated.Report(self._information)}
 
     def uptime_ms(self, now: float) -> int:
         """Return the time since the start, ms, wrapping as the field does."""
@@ -213,13 +206,15 @@ class SimulatedMount(simulated.SimulatedDevice):
         """Return the flags of the setpoint as they are reported."""
         return self._first_flags if self.behaviour.frozen_flags else self.motion.flags
 
-    def status(self, now: float, failures: int = 0) -> GimbalDeviceAttitudeStatus:
+    def status(self, now: float, failures: int = 0) -> GimbalDeviceAttitudeStatus | None:
         """
-        Return the status of this moment.
+        Return the status of this moment, None if it sends none.
 
         :param failures: GIMBAL_DEVICE_ERROR_FLAGS besides the flags of the axes.
         """
         behaviour, motion = self.behaviour, self.motion
+        if not behaviour.reports:
+            return None
         motion.advance(now)
         known = motion.heading_known(now)
         frame = motion.frame if known and behaviour.reports_earth else YawFrame.VEHICLE
@@ -256,8 +251,10 @@ class SimulatedMount(simulated.SimulatedDevice):
         return fields if self.behaviour.static_information else {
             **fields, 'pitch_max': fields['pitch_max'] + 0.01 * self._informed}
 
-    def _information(self, now: float) -> gimbal.GimbalDeviceInformation:
+    def _information(self, now: float) -> gimbal.GimbalDeviceInformation | None:
         properties, capabilities = self.properties, self.properties.capabilities
+        if not self.behaviour.identifies:
+            return None
         vendor, model, custom = (
             name.encode()[:31] for name in (
                 properties.vendor, properties.model, properties.custom_name))
@@ -303,7 +300,7 @@ class SimulatedGimbal(SimulatedMount):
         self.manager = self.properties.manager
         self._announced_at = now
 
-    def status(self, now: float, failures: int = 0) -> GimbalDeviceAttitudeStatus:
+    def status(self, now: float, failures: int = 0) -> GimbalDeviceAttitudeStatus | None:
         """See :class:`SimulatedMount`."""
         self._expire(now)
         if not self.manager:

@@ -169,7 +169,6 @@ class SimulatedManager(SimulatedMount):
     messages = (
         gimbal.GimbalManagerSetAttitude, gimbal.GimbalManagerSetPitchyaw,
         gimbal.GimbalManagerSetManualControl, Attitude, GlobalPositionInt)
-    sends = (gimbal.GimbalManagerInformation, gimbal.GimbalManagerStatus, *SimulatedMount.sends)
     changes = frozenset(DEVICE_ID_PARAM)
     faults = FAULTS
     properties: ManagerProperties
@@ -188,24 +187,26 @@ class SimulatedManager(SimulatedMount):
         self.motion.take_heading(
             0.0, 0.0, math.radians(self.properties.heading), 0.0, now, math.inf)
 
-    def streams(self) -> Mapping[int, float]:
-        """See :meth:`SimulatedDevice.streams`."""
-        return {gimbal.GimbalManagerStatus.id: STATUS_INTERVAL, **super().streams()}
+    def reports(self) -> Mapping[type[Message], simulated.Report]:
+        """See :meth:`SimulatedDevice.reports`."""
+        return {gimbal.GimbalManagerStatus: simulated.Report(
+                    self._manager_status, STATUS_INTERVAL),
+                gimbal.GimbalManagerInformation: simulated.Report(self._manager_information),
+                **super().reports()}
 
-    def message(self, message_id: int, now: float) -> Message | None:
-        """See :meth:`SimulatedDevice.message`."""
-        behaviour, device_id = self.behaviour, self.properties.device_id
-        if message_id == gimbal.GimbalManagerStatus.id and behaviour.reports:
-            flags = self.flags if behaviour.shows_flags else LEVEL
-            control = (NO_COMPONENT, NO_COMPONENT) if behaviour.frozen_control else (
-                self.primary, self.secondary)
-            return gimbal.GimbalManagerStatus(
-                self.uptime_ms(now), int(flags), device_id, *control[0], *control[1])
-        if message_id == gimbal.GimbalManagerInformation.id and behaviour.identifies:
-            return gimbal.GimbalManagerInformation(
-                self.uptime_ms(now), int(self.properties.capabilities), device_id,
-                **self.limits())
-        return super().message(message_id, now)
+    def _manager_status(self, now: float) -> gimbal.GimbalManagerStatus | None:
+        flags = self.flags if self.behaviour.shows_flags else LEVEL
+        primary, secondary = (
+            (NO_COMPONENT, NO_COMPONENT) if self.behaviour.frozen_control
+            else (self.primary, self.secondary))
+        return gimbal.GimbalManagerStatus(
+            self.uptime_ms(now), int(flags), self.properties.device_id, *primary, *secondary,
+        ) if self.behaviour.reports else None
+
+    def _manager_information(self, now: float) -> gimbal.GimbalManagerInformation | None:
+        return gimbal.GimbalManagerInformation(
+            self.uptime_ms(now), int(self.properties.capabilities), self.properties.device_id,
+            **self.limits()) if self.behaviour.identifies else None
 
     # Setpoints
 
