@@ -29,6 +29,7 @@ from typing import TypeAlias
 
 from . import messages as gimbal
 from .axes import AT_LIMIT, range_fields, Ranges, UNLIMITED
+from .commands import Control
 from .managed_device import ManagedDevice
 from .manager_control import ControlArbiter, ControlSettings, Role, RoleHolderChanged
 from .manager_setpoint import AnySetpoint, read_roi, read_setpoint, Refused, Setpoint
@@ -301,27 +302,34 @@ class GimbalManager(Payload):
         if command.command not in gimbal.DEVICE_ID_PARAM:
             return None
         device_id = params[gimbal.DEVICE_ID_PARAM[command.command]]
-        if device_id not in (0, self.tracker.device_id):
-            self.events.emit(RequestRefused(
-                source, f'gimbal device id {device_id:g} is neither {self.tracker.device_id} nor '
-                '0 for all'))
-            return mavlink.MAV_RESULT_DENIED
-        is_configure = command.command == mavlink.MAV_CMD_DO_GIMBAL_MANAGER_CONFIGURE
-        # Control may be released at the end.
-        if is_configure and not (self.is_active or self._commands.refusal):
-            return self._inactive_result
         try:
-            if is_configure:
+            if device_id not in (0, self.tracker.device_id):
+                raise Refused(f'gimbal device id {device_id:g} is neither '
+                              f'{self.tracker.device_id} nor 0 for all')
+            if command.command != mavlink.MAV_CMD_DO_GIMBAL_MANAGER_CONFIGURE:
+                self._move(source, command, now)
+            # Control may be released at the end.
+            elif self.is_active or self._commands.refusal:
                 self._control_changed(self.control.configure(source, params, now), now)
             else:
-                self._check_active()
-                is_angle = command.command == mavlink.MAV_CMD_DO_GIMBAL_MANAGER_PITCHYAW
-                (self._pitch_yaw if is_angle else self._set_roi)(source, command, now)
+                return self._inactive_result
         except (ValueError, OverflowError) as error:
             # The result of a command has no reason.
             self.events.emit(RequestRefused(source, str(error)))
             return error.result if isinstance(error, Refused) else mavlink.MAV_RESULT_DENIED
         return mavlink.MAV_RESULT_ACCEPTED
+
+    def _move(self, source: Address, command: AnyCommand, now: float) -> None:
+        """Follow angles, rates or a place."""
+        self._check_active()
+        if command.command == mavlink.MAV_CMD_DO_GIMBAL_MANAGER_PITCHYAW:
+            *angles_and_rates, flags, _, _ = params_of(command)
+            self._follow(source, Setpoint.from_pitch_yaw(
+                0 if math.isnan(flags) else int(flags), *map(math.radians, angles_and_rates)), now)
+        else:
+            self._check_control(source)
+            is_none = command.command == mavlink.MAV_CMD_DO_SET_ROI_NONE
+            self.setpoints.point(None if is_none else read_roi(command), now)
 
     @property
     def is_active(self) -> bool:
@@ -330,10 +338,9 @@ class GimbalManager(Payload):
 
     def _check_active(self) -> None:
         """Raise :class:`Refused` if the manager gives no setpoints now."""
-        if reason := self._commands.refusal or (
-                '' if self.is_active else
-                f'the manager is not active: {self.tracker.state.value}'):
-            raise Refused(reason, self._inactive_result)
+        if self._commands.refusal or not self.is_active:
+            raise Refused(self._commands.refusal or 'the manager is not active: '
+                          f'{self.tracker.state.value}', self._inactive_result)
 
     @property
     def _inactive_result(self) -> int:
@@ -357,11 +364,6 @@ class GimbalManager(Payload):
             self._changed_at = now
             self._report(self.status(now))
 
-    def _pitch_yaw(self, source: Address, command: AnyCommand, now: float) -> None:
-        *angles_and_rates, flags, _, _ = params_of(command)
-        self._follow(source, Setpoint.from_pitch_yaw(
-            0 if math.isnan(flags) else int(flags), *map(math.radians, angles_and_rates)), now)
-
     def _follow(self, player: Address, request: Setpoint, now: float) -> None:
         """Follow the request of a player, unless it is refused."""
         self._check_active()
@@ -378,11 +380,6 @@ class GimbalManager(Payload):
             raise Refused(
                 f'{holder} has control' if holder else 'the player must take control first')
 
-    def _set_roi(self, source: Address, command: AnyCommand, now: float) -> None:
-        self._check_control(source)
-        is_none = command.command == mavlink.MAV_CMD_DO_SET_ROI_NONE
-        self.setpoints.point(None if is_none else read_roi(command), now)
-
     # Reports
 
     def _report(self, message: mav.Message) -> None:
@@ -396,10 +393,9 @@ class GimbalManager(Payload):
         flags = 0 if setpoint is None else setpoint.device_flags
         if device is not None:
             flags |= device.flags & mavlink.GIMBAL_DEVICE_FLAGS_ACCEPTS_YAW_IN_EARTH_FRAME
-        primary, secondary = (self.control.holder(role) or gimbal.NO_COMPONENT for role in Role)
+        control = Control(self.control.primary.holder, self.control.secondary.holder)
         return gimbal.GimbalManagerStatus(
-            mav.time_boot_ms(now), flags, self.tracker.device_id, *primary,
-            *secondary)
+            mav.time_boot_ms(now), flags, self.tracker.device_id, *control.params())
 
     def _send_requested(self, message_id: float, now: float) -> int | None:
         make: dict[int, Callable[[float], mav.Message | None]] = {
