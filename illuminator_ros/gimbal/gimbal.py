@@ -133,7 +133,7 @@ class Gimbal:
         requests.pose.reported(status, now)
         self._settle(now)
         self._yaw_lock.reported(status, now)
-        setpoints.reported(status, device.attitude, now, may_send=(
+        setpoints.reported(status, now, may_send=(
             self.reports.in_control and not (requests.pose.desired or requests.place.desired)))
         if requests.is_releasing and setpoints.forget_zero():
             requests.release_due = -math.inf

@@ -27,7 +27,6 @@ from ..mavlink.dialect import mavlink
 from ..payload.confirmed_command import Result
 from ..payload.messages import GimbalDeviceAttitudeStatus
 from ..payload.mount_attitude import (
-    MountAttitude,
     STILL,
     to_mavlink,
     UNSET_QUATERNION,
@@ -247,13 +246,11 @@ class SetpointStream:
             last.due.clear()
 
     def reported(
-        self, status: GimbalDeviceAttitudeStatus, attitude: MountAttitude | None, now: float, *,
-        may_send: bool,
+        self, status: GimbalDeviceAttitudeStatus, now: float, *, may_send: bool,
     ) -> None:
         """
         Take a status of the device, and send a zero again if the device still turns.
 
-        :param attitude: in the status, None if it has none.
         :param may_send: whether this component has control, and no request is under way, which may
             turn the gimbal.
         """
@@ -262,7 +259,7 @@ class SetpointStream:
         zero = self._last
         if not may_send or zero is None or zero.kind is not Kind.ZERO or not zero.due:
             return
-        turns = self._detector.turns(status, attitude, now)
+        turns = self._detector.turns(status, now)
         if now < zero.due[0]:
             return
         if turns is not None:
