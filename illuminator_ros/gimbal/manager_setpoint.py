@@ -72,7 +72,7 @@ class Setpoint(NamedTuple):
     :param flags: GIMBAL_DEVICE_FLAGS.
     :param frame: of its yaw.
     :param angles: roll, pitch, yaw, rad. In a request NaN leaves an axis as it is; after
-        :func:`resolve` all are NaN for a pose, or where only the rates count.
+        :meth:`resolved` all are NaN for a pose, or where only the rates count.
     :param rates: of the axes, rad/s; NaN where none is given.
     :param turning: the rates at which the manager turns the angles, rad/s.
     :param since: when the angles apply, s.
@@ -120,6 +120,44 @@ class Setpoint(NamedTuple):
         """Return the flags for the device."""
         return self.flags & _PASSED_BITS | self.frame.flag
 
+    def resolved(self, current: Vector, now: float, *, turns: bool) -> Setpoint:
+        """
+        Return the setpoint that this request makes.
+
+        :param current: the angles, in the frame of the request, of axes without an angle; not used
+            for a pose or, unless ``turns``, for rates only.
+        :param turns: whether the manager must turn the gimbal where only rates are given.
+        """
+        if self.is_pose:
+            return self._replace(angles=UNSET_VECTOR, rates=UNSET_VECTOR, since=now)
+        if self.has_all_angles:
+            return self._replace(since=now)
+        known = [rate if math.isfinite(rate) else 0.0 for rate in self.rates]
+        if self.has_rates_only and not turns:
+            return self._replace(rates=_vector(known), since=now)
+        angles, rates, turning = zip(*(
+            (angle, rate, 0.0) if math.isfinite(angle) else (old, math.nan, known_rate)
+            for angle, rate, old, known_rate in zip(
+                self.angles, self.rates, current, known, strict=True)), strict=True)
+        return self._replace(
+            angles=_vector(angles), rates=_vector(rates), turning=_vector(turning), since=now)
+
+    def stopped(self) -> Setpoint:
+        """Return the setpoint that ends the motion of this one."""
+        return self._replace(
+            turning=STILL, rates=STILL if self.has_rates_only else UNSET_VECTOR)
+
+    def offsets(self, limit: float) -> Vector:
+        """Return what a player in secondary control adds by it, rad, each within the limit."""
+        return _vector([Range(-limit, limit).clip(angle) if math.isfinite(angle) else 0.0
+                        for angle in self.angles])
+
+    def in_vehicle_frame(self, heading: float) -> Setpoint:
+        """Return it with its yaw relative to the vehicle instead of north."""
+        return self._replace(
+            frame=YawFrame.VEHICLE, flags=self.flags & ~mavlink.GIMBAL_DEVICE_FLAGS_YAW_LOCK,
+            angles=turned_by(self.angles, -heading))
+
     @classmethod
     def _checked(cls, flags: int, angles: Vector, rates: Vector) -> Setpoint:
         """
@@ -165,27 +203,6 @@ class Setpoint(NamedTuple):
         roll = math.nan if math.isnan(pitch) and math.isnan(yaw) else 0.0
         return cls._checked(flags, (roll, pitch, yaw), (math.nan, pitch_rate, yaw_rate))
 
-    @classmethod
-    def from_manual_control(
-        cls, message: gimbal.GimbalManagerSetManualControl, ranges: Ranges,
-    ) -> Setpoint:
-        """
-        Read GIMBAL_MANAGER_SET_MANUAL_CONTROL: shares of the ranges, and of :data:`MANUAL_RATE`.
-
-        :raises ValueError: if a value is beyond -1..1; also see :meth:`_checked`.
-        """
-        values = message.pitch, message.yaw, message.pitch_rate, message.yaw_rate
-        if any(abs(value) > 1 for value in values):
-            raise ValueError('a deflection is beyond -1 and 1')
-
-        def share(value: float, range_: Range) -> float:
-            return value * (min(range_.high, math.pi) if value > 0
-                            else -max(range_.low, -math.pi))
-
-        return cls.from_pitch_yaw(
-            message.flags, share(message.pitch, ranges[1]), share(message.yaw, ranges[2]),
-            message.pitch_rate * MANUAL_RATE, message.yaw_rate * MANUAL_RATE)
-
 
 # A message that sets the attitude of a gimbal.
 AnySetpoint = (gimbal.GimbalManagerSetAttitude | gimbal.GimbalManagerSetPitchyaw
@@ -200,10 +217,16 @@ def read_setpoint(message: AnySetpoint, ranges: Ranges) -> Setpoint:
     """
     if isinstance(message, gimbal.GimbalManagerSetAttitude):
         return Setpoint.from_attitude(message, ranges)
+    values = message.pitch, message.yaw, message.pitch_rate, message.yaw_rate
     if isinstance(message, gimbal.GimbalManagerSetManualControl):
-        return Setpoint.from_manual_control(message, ranges)
-    return Setpoint.from_pitch_yaw(
-        message.flags, message.pitch, message.yaw, message.pitch_rate, message.yaw_rate)
+        # Shares of the ranges, and of a rate.
+        if any(abs(value) > 1 for value in values):
+            raise ValueError('a deflection is beyond -1 and 1')
+        pitch, yaw = (value * (min(range_.high, math.pi) if value > 0
+                               else -max(range_.low, -math.pi))
+                      for value, range_ in zip(values[:2], ranges[1:], strict=True))
+        values = pitch, yaw, values[2] * MANUAL_RATE, values[3] * MANUAL_RATE
+    return Setpoint.from_pitch_yaw(message.flags, *values)
 
 
 def _are_within(angles: Sequence[float], ranges: Sequence[Range]) -> bool:
@@ -228,41 +251,6 @@ def _nearest_reading(angles: Vector, ranges: Ranges) -> Vector:
                    math.remainder(yaw + math.pi, math.tau))
     return min(angles, half_turned, key=lambda one: sum(
         abs(range_.clip(angle) - angle) for angle, range_ in zip(one[:2], ranges, strict=False)))
-
-
-def resolve(request: Setpoint, current: Vector, now: float, *, turns: bool) -> Setpoint:
-    """
-    Return the setpoint that a request makes.
-
-    :param current: the angles, in the frame of the request, of axes without an angle; not used for
-        a pose or, unless ``turns``, for rates only.
-    :param turns: whether the manager must turn the gimbal where only rates are given.
-    """
-    if request.is_pose:
-        return request._replace(angles=UNSET_VECTOR, rates=UNSET_VECTOR, since=now)
-    if request.has_all_angles:
-        return request._replace(since=now)
-    known = [rate if math.isfinite(rate) else 0.0 for rate in request.rates]
-    if request.has_rates_only and not turns:
-        return request._replace(rates=_vector(known), since=now)
-    angles, rates, turning = zip(*(
-        (angle, rate, 0.0) if math.isfinite(angle) else (old, math.nan, known_rate)
-        for angle, rate, old, known_rate in zip(
-            request.angles, request.rates, current, known, strict=True)), strict=True)
-    return request._replace(
-        angles=_vector(angles), rates=_vector(rates), turning=_vector(turning), since=now)
-
-
-def stopped(setpoint: Setpoint) -> Setpoint:
-    """Return the setpoint that ends the motion of another one."""
-    rates = STILL if setpoint.has_rates_only else UNSET_VECTOR
-    return setpoint._replace(turning=STILL, rates=rates)
-
-
-def nudge(request: Setpoint, limit: float) -> Vector:
-    """Return the offsets that a player in secondary control adds, rad, each within the limit."""
-    return _vector([Range(-limit, limit).clip(angle) if math.isfinite(angle) else 0.0
-                    for angle in request.angles])
 
 
 class Clipped(NamedTuple):
@@ -362,13 +350,6 @@ def _nearest(
 
     angle = math.remainder(angle, math.tau)
     return min((angle, angle + math.tau, angle - math.tau), key=distance)
-
-
-def in_vehicle_frame(setpoint: Setpoint, heading: float) -> Setpoint:
-    """Return a setpoint with its yaw relative to the vehicle instead of north."""
-    return setpoint._replace(
-        frame=YawFrame.VEHICLE, flags=setpoint.flags & ~mavlink.GIMBAL_DEVICE_FLAGS_YAW_LOCK,
-        angles=turned_by(setpoint.angles, -heading))
 
 
 def turned_by(angles: Vector, yaw: float) -> Vector:

@@ -24,19 +24,7 @@ from typing import TypeAlias
 
 from .axes import LEVEL
 from .managed_device import ManagedDevice
-from .manager_setpoint import (
-    clip,
-    Clipped,
-    direction,
-    in_vehicle_frame,
-    nudge,
-    Refused,
-    resolve,
-    Setpoint,
-    stopped,
-    turned,
-    turned_by,
-)
+from .manager_setpoint import clip, Clipped, direction, Refused, Setpoint, turned, turned_by
 from .manager_state import ManagerState, StateTracker
 from .messages import GimbalDeviceSetAttitude
 from .rate_stop import RateStop
@@ -145,7 +133,7 @@ class SetpointMixer:
         """
         self.due = math.inf
         if forget:
-            self.current = (stopped(self.current) if self.current and self.current.has_rates_only
+            self.current = (self.current.stopped() if self.current and self.current.has_rates_only
                             else None)
             self._roi, self._offsets = None, STILL
             self.clipped, self._reported = (), {}
@@ -156,7 +144,7 @@ class SetpointMixer:
         zero = self.current
         if zero is not None and zero.has_rates_only:
             zero = (zero if zero.frame is YawFrame.VEHICLE or self._device.accepts_earth_frame(now)
-                    else in_vehicle_frame(zero, 0.0))
+                    else zero.in_vehicle_frame(0.0))
             self.rate_stop.begin(functools.partial(self._give, zero), now, was_sent=was_sent)
 
     def _rate_stopped(self, stands: bool) -> None:
@@ -172,8 +160,8 @@ class SetpointMixer:
             names = (name for flag, name in short_names('GIMBAL_DEVICE_FLAGS').items()
                      if flag & lacking)
             raise Refused(f'the gimbal does not have {", ".join(names)}')
-        self.current = resolve(
-            request, self._start(request, now), now, turns=not self._tracker.has_mavlink)
+        self.current = request.resolved(
+            self._start(request, now), now, turns=not self._tracker.has_mavlink)
         self._roi = None
         self._send(now)
 
@@ -186,7 +174,7 @@ class SetpointMixer:
         """
         if request.is_pose or not request.has_angles:
             raise Refused('secondary control adds angles only')
-        self._offsets = nudge(request, limit)
+        self._offsets = request.offsets(limit)
         self._send(now)
 
     def end_offsets(self, now: float, *, keep: bool) -> None:
@@ -203,7 +191,7 @@ class SetpointMixer:
         """End rates and the region of interest: the gimbal stays where it points."""
         self._roi = None
         self._turn(now)
-        self.current = self.current and stopped(self.current)
+        self.current = self.current and self.current.stopped()
         self._send(now)
 
     def close(self, now: float) -> None:
@@ -310,7 +298,7 @@ class SetpointMixer:
         if converts:
             if ahead is None:
                 return
-            sent = in_vehicle_frame(sent, ahead)
+            sent = sent.in_vehicle_frame(ahead)
         self._give(sent)
 
     def _give(self, sent: Setpoint) -> None:
