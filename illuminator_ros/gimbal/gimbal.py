@@ -150,7 +150,7 @@ class Gimbal:
         if reports.connect(now):
             self._take_due = self._settings.auto_take_control
         is_first = reports.last_control is None
-        if not reports.take_control(now, is_releasing=self._requests.is_releasing):
+        if not reports.update_control(now, is_releasing=self._requests.is_releasing):
             return
         if not reports.in_control:
             self._yaw_lock.cancel(self.unavailable(now), now)

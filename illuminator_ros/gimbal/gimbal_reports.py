@@ -58,11 +58,11 @@ def _is_late(time_boot_ms: int, newest: int) -> bool:
     return 0 < (newest - time_boot_ms) % (1 << 32) < LATE_LIMIT
 
 
-def _silence(what: str, heard_at: float, now: float) -> str:
+def _silence(what: str, liveness: Liveness, now: float) -> str:
     """Return that something is silent, for people."""
-    if heard_at == -math.inf:
-        return f'{what} has not been heard'
-    return f'nothing from {what} for {format_seconds(now - heard_at)}'
+    age = now - liveness.heard_at
+    return f'nothing from {what} for {format_seconds(age)}' if math.isfinite(age) else (
+        f'{what} has not been heard')
 
 
 class RemoteManager:
@@ -274,7 +274,7 @@ class GimbalReports:
         self._emit(DeviceConnected(self._key, f'manager {self.manager.address}'))
         return True
 
-    def take_control(self, now: float, *, is_releasing: bool) -> bool:
+    def update_control(self, now: float, *, is_releasing: bool) -> bool:
         """
         Report a change of control; return whether it has changed.
 
@@ -317,14 +317,13 @@ class GimbalReports:
         manager, device = self.manager, self.device
         if not manager.liveness.is_heard(now):
             return self.link_problem or _silence(
-                f'manager {manager.address}', manager.liveness.heard_at, now)
+                f'manager {manager.address}', manager.liveness, now)
         if device.liveness.is_heard(now):
             return ''
         if device.without_id.is_heard(now):
             return (f'{self._key.address} has several gimbals and sends attitudes without '
                     'gimbal_device_id, so they cannot be told apart')
-        return self.link_problem or _silence(
-            f'device {self._key}', device.liveness.heard_at, now)
+        return self.link_problem or _silence(f'device {self._key}', device.liveness, now)
 
     def absence(self, now: float) -> str:
         """Return that the manager is lost, for people; '' if it is heard."""
