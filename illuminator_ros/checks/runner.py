@@ -79,6 +79,8 @@ class CheckRunner(Generic[T]):
         self._on_result = on_result
         # Why there is no device to check any more.
         self._lost = ''
+        # The state to be restored, as text.
+        self._saved = ''
 
     @property
     def passed(self) -> bool:
@@ -144,9 +146,12 @@ class CheckRunner(Generic[T]):
             raise _Unreached(self._lost)
         if one.needs_consent and not self._session.consent:
             raise Skipped(f'the {device} would {self._checks.risk}: {NOT_AGREED}')
-        if one.changes and not (self.changed or await self._session.save()):
-            raise Skipped(f'the {device} does not report its state, so it could not be restored')
-        self.changed |= one.changes
+        if one.changes and not self.changed:
+            saved = await self._session.save()
+            if saved is None:
+                raise Skipped(
+                    f'the {device} does not report its state, so it could not be restored')
+            self._saved, self.changed = saved, True
 
     async def _restore(self) -> None:
         """Restore the device; repeat this for :data:`RESTORE_TIMEOUT` while its state differs."""
@@ -166,6 +171,6 @@ class CheckRunner(Generic[T]):
         self.left_changed = bool(differing)
         self.restored = f'the {device} is as it was{self._checks.traces}' if not differing else (
             f'THE {device.upper()} IS NOT AS IT WAS ({", ".join(differing)}): it was '
-            + self._session.saved)
+            + self._saved)
         if self._session.danger:
             self.restored = f'stopped: {self._session.danger}; {self.restored}'

@@ -53,7 +53,7 @@ MESSAGE_TIMEOUT = 1.0
 # s after a final acknowledgement, so that a duplicate is not assigned to the next command.
 SETTLE_TIME = 0.05
 # s; the time for which an answer that must not come is awaited.
-NO_ANSWER_TIME = 0.7
+NO_ANSWER_TIME = 0.75
 LOST_TIMEOUT = 5.0
 REJECTION_PAUSE = 0.5
 DISCOVERY_INTERVAL = 1.0
@@ -220,14 +220,9 @@ class Session(Endpoint):
         """
         return ''
 
-    @property
-    def saved(self) -> str:
-        """Return the saved state, as text."""
+    async def save(self) -> str | None:
+        """Save the state of the device; return it as text, None if the device reports none."""
         return ''
-
-    async def save(self) -> bool:
-        """Save the state of the device; return whether the device reports one."""
-        return True
 
     async def restore(self) -> list[str]:
         """Restore the saved state; return the names of the values that still differ from it."""
@@ -256,20 +251,17 @@ class Session(Endpoint):
             line = self.record.note('<', ('' if is_device else f'from {source}: ')
                                     + self.describe(message), now)
             self.record.add(message, now)
-            if isinstance(message, CommandAck):
-                self._acknowledge(message, line)
+            if isinstance(message, CommandAck) and (
+                    one := self._latest.get(message.command)) and len(one.acks) < MAX_ACKS:
+                one.acks.append(Ack(
+                    now, message.result, message.progress, messages.target_of(message)))
+                one.lines.append(line)
             if not self.danger and (danger := self.danger_of(message)):
                 self.danger = danger
                 # Restoring is stopped, too.
                 self.runner.restoring = False
                 self.runner.interrupt(now)
         self.runner.advance(now)
-
-    def _acknowledge(self, ack: CommandAck, line: str) -> None:
-        one = self._latest.get(ack.command)
-        if one is not None and len(one.acks) < MAX_ACKS:
-            one.acks.append(Ack(self.now, ack.result, ack.progress, messages.target_of(ack)))
-            one.lines.append(line)
 
     def poll(self, now: float) -> None:
         """See :meth:`Endpoint.poll`."""
@@ -316,13 +308,15 @@ class Session(Endpoint):
         if self.now - self.components.last_heard > LOST_TIMEOUT:
             raise DeviceLost
 
-    def send(self, message: Message, source: Address | None = None) -> None:
-        """Send a message from an address, by default the session's."""
-        self._give(message, self.describe(message), source)
+    def send(self, message: Message, source: Address | None = None, text: str = '') -> str:
+        """
+        Send a message from an address, by default the session's; return its line in the log.
 
-    def _give(self, message: Message, text: str, source: Address | None) -> str:
+        :param text: the message in the log, '' for that of :meth:`describe`.
+        """
         self.outgoing.append((source or self.address, message))
-        return self.record.note('>', text + (f' from {source}' if source else ''), self.now)
+        return self.record.note('>', (text or self.describe(message))
+                                + (f' from {source}' if source else ''), self.now)
 
     # For coroutines
 
@@ -388,7 +382,7 @@ class Session(Endpoint):
 
     async def command(
         self, command: int, *params: float, as_int: bool = False, confirmation: int = 0,
-        target: Address | None = None, source: Address | None = None,
+        target: Address | None = None, source: Address | None = None, is_foreign: bool = False,
     ) -> Transaction:
         """
         Send a command; repeat it while it is not acknowledged or is temporarily rejected.
@@ -396,17 +390,20 @@ class Session(Endpoint):
         :param as_int: whether it is sent as COMMAND_INT.
         :param target: None for the device.
         :param source: the address that sends it, None for the session's.
+        :param is_foreign: whether the device must not answer it, so that it is sent once.
         :raises DeviceLost: if the device has stopped sending.
         """
         is_deaf = len(self.transactions) >= UNANSWERED and not any(
             one.acks for one in self.transactions)
-        attempts, timeout = (1, MESSAGE_TIMEOUT) if is_deaf else (ATTEMPTS, ACK_TIMEOUT)
+        attempts, timeout = (1, NO_ANSWER_TIME) if is_foreign else (
+            1, MESSAGE_TIMEOUT) if is_deaf else (ATTEMPTS, ACK_TIMEOUT)
         # A device that has rejected a command temporarily so often is not waited for again.
-        is_stuck = any(one.rejections == REJECTIONS for one in self.transactions)
+        is_stuck = is_foreign or any(one.rejections == REJECTIONS for one in self.transactions)
         for rejections in range(1, 2 if is_stuck else REJECTIONS + 1):
             # Separate requirements cover COMMAND_INT and other addresses.
-            one = self._begin(
+            one = self._latest[command] = Transaction(
                 command, params, expected=not as_int and target is None and source is None)
+            self.transactions.append(one)
             for attempt in range(attempts):
                 self._send(one, target or self.device, confirmation + attempt, as_int=as_int,
                            source=source)
@@ -419,19 +416,6 @@ class Session(Endpoint):
             await self.sleep(REJECTION_PAUSE)
         return one
 
-    async def send_to_other(self, target: Address, command: int, *params: float) -> Transaction:
-        """Send a command to another address, and return it with the answers of the device."""
-        one = self._begin(command, params, expected=False)
-        self._send(one, target)
-        await self.until(lambda: one.acks, NO_ANSWER_TIME)
-        await self.sleep(SETTLE_TIME)
-        return one
-
-    def _begin(self, command: int, params: tuple[float, ...], *, expected: bool) -> Transaction:
-        one = self._latest[command] = Transaction(command, params, expected)
-        self.transactions.append(one)
-        return one
-
     def _send(
         self, one: Transaction, target: Address, confirmation: int = 0, *, as_int: bool = False,
         source: Address | None = None,
@@ -442,9 +426,9 @@ class Session(Endpoint):
         ) if as_int else messages.CommandLong(
             *target, one.command, min(confirmation, 255), p1, p2, p3, p4, p5, p6, p7)
         one.sent.append(self.now)
-        one.lines.append(self._give(
-            message, f'{message.get_type()} to {target}: {one.text}'
-            + (f', confirmation {confirmation}' if confirmation else ''), source))
+        one.lines.append(self.send(
+            message, source, f'{message.get_type()} to {target}: {one.text}'
+            + (f', confirmation {confirmation}' if confirmation else '')))
 
     async def _answered(self, one: Transaction, timeout: float) -> bool:
         """Wait for the result of an attempt; return whether the device has received it."""

@@ -35,6 +35,9 @@ HAS_FOLLOW = _flags('GIMBAL_DEVICE_CAP_FLAGS_HAS_AXIS_FOLLOW')
 HAS_LOCK = _flags('GIMBAL_DEVICE_CAP_FLAGS_HAS_AXIS_LOCK')
 LOCKS = _flags('GIMBAL_DEVICE_FLAGS_AXIS_LOCK')
 AT_LIMIT = _flags('GIMBAL_DEVICE_ERROR_FLAGS_AT_AXIS_LIMIT')
+# GIMBAL_DEVICE_ERROR_FLAGS of normal operation, which show no defect.
+CONDITIONS = (sum(AT_LIMIT) | mavlink.GIMBAL_DEVICE_ERROR_FLAGS_CALIBRATION_RUNNING
+              | mavlink.GIMBAL_DEVICE_ERROR_FLAGS_NO_MANAGER)
 # Roll and pitch are relative to the horizon.
 LEVEL = mavlink.GIMBAL_DEVICE_FLAGS_ROLL_LOCK | mavlink.GIMBAL_DEVICE_FLAGS_PITCH_LOCK
 # rad; angles that differ by less are equal.

@@ -31,7 +31,7 @@ from .messages import (
     rates_of,
     REMOVE_SENDER,
 )
-from ..mavlink.command_sender import Command, CommandSender
+from ..mavlink.command_sender import Command, CommandSender, request_message
 from ..mavlink.component import Payload
 from ..mavlink.dialect import mavlink
 from ..mavlink.messages import Address, Heartbeat, Message
@@ -99,7 +99,7 @@ class GimbalClient(Payload):
     def link_closed(self, now: float, reason: str) -> None:
         """See :meth:`Payload.link_closed`."""
         for gimbal in self.gimbals.values():
-            gimbal.components_lost(gimbal.addresses, now, reason)
+            gimbal.components_lost(gimbal.reports.addresses, now, reason)
 
     def components_lost(self, lost: Collection[Address], now: float, reason: str) -> None:
         """See :meth:`Payload.components_lost`."""
@@ -114,22 +114,26 @@ class GimbalClient(Payload):
         elif isinstance(message, Heartbeat):
             self._hear(source, message, now)
             for gimbal in self.gimbals.values():
-                gimbal.heard(source, now, message.autopilot)
+                if gimbal.reports.heard(source, now, message.autopilot):
+                    gimbal.update(now)
         elif isinstance(message, GimbalManagerStatus):
             if gimbal := self._managed(source, message.gimbal_device_id, now):
                 gimbal.take_status(source, message, now)
-                if gimbal.lacks_information_of(source):
+                if gimbal.reports.lacks_information_of(source):
                     self._reopen(source, now)
         elif isinstance(message, GimbalManagerInformation):
             if gimbal := self._managed(source, message.gimbal_device_id, now):
-                gimbal.take_information(source, message, now)
+                if manager := gimbal.reports.announce(source, now):
+                    manager.information = message
+                    gimbal.update(now)
                 component = self._components.get(source)
                 if component is not None and not any(
-                        one.lacks_information_of(source) for one in self.gimbals.values()):
+                        one.reports.lacks_information_of(source)
+                        for one in self.gimbals.values()):
                     component.query.stop()
         elif (isinstance(message, GimbalDeviceInformation)
                 and (gimbal := self._sender(source, message.gimbal_device_id, now))):
-            gimbal.take_device_information(message)
+            gimbal.reports.device.take_information(message)
 
     # Gimbals
 
@@ -160,7 +164,7 @@ class GimbalClient(Payload):
             found = own[0] if len(own) == 1 else None
             if len(own) > 1:
                 for one in own:
-                    one.heard_without_id(now)
+                    one.reports.device.without_id.hear(now)
         return found
 
     # Discovery
@@ -172,29 +176,26 @@ class GimbalClient(Payload):
 
     def _component(self, address: Address, now: float) -> _Component | None:
         """Return a component that may be a manager, None if there are too many."""
-        component = self._components.get(address)
-        if component is None and (
-                len(self._components) < MAX_COMPONENTS or self._forget_component(now)):
-            component = self._components[address] = _Component(now)
-        return component
+        components = self._components
+        if address not in components:
+            if len(components) >= MAX_COMPONENTS:
+                silent = min(components, key=lambda one: components[one].heard_at)
+                if now < components[silent].heard_at + FORGET_AFTER:
+                    return None
+                del components[silent]
+            components[address] = _Component(now)
+        return components[address]
 
     def _hear(self, source: Address, heartbeat: Heartbeat, now: float) -> None:
-        if component := self._components.get(source):
-            if now >= component.heard_at + RETURN_AFTER:
+        is_known = source in self._components
+        if component := self._component(source, now):
+            is_likely = (heartbeat.autopilot != mavlink.MAV_AUTOPILOT_INVALID
+                         or heartbeat.type == mavlink.MAV_TYPE_GIMBAL)
+            if not is_known:
+                component.query.due = now if is_likely else now + UNLIKELY_DELAY
+            elif now >= component.heard_at + RETURN_AFTER:
                 component.query = Retries(GIMBAL_MESSAGE)
             component.heard_at = now
-        elif component := self._component(source, now):
-            likely = (heartbeat.autopilot != mavlink.MAV_AUTOPILOT_INVALID
-                      or heartbeat.type == mavlink.MAV_TYPE_GIMBAL)
-            component.query = Retries(
-                GIMBAL_MESSAGE, now if likely else now + UNLIKELY_DELAY)
-
-    def _forget_component(self, now: float) -> bool:
-        address, component = min(self._components.items(), key=lambda item: item[1].heard_at)
-        if now < component.heard_at + FORGET_AFTER:
-            return False
-        del self._components[address]
-        return True
 
     def _reopen(self, manager: Address, now: float) -> None:
         """Request the information of a manager that has sent a status but no information."""
@@ -209,13 +210,11 @@ class GimbalClient(Payload):
         component.query.note_try(now)
         self._next_query = now + REQUEST_SPACING
         if now < component.heard_at + FORGET_AFTER:
-            message_id = float(GimbalManagerInformation.id)
-            self._commands.start(
-                Command(address, mavlink.MAV_CMD_REQUEST_MESSAGE, (message_id,)), now)
+            self._commands.start(request_message(address, GimbalManagerInformation.id), now)
 
     def _query_due(self) -> float:
         return max(self._next_query, min(
-            (one.query.due for one in self._components.values()), default=math.inf))
+            [one.query.due for one in self._components.values()], default=math.inf))
 
     # The end
 

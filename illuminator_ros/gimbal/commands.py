@@ -21,7 +21,7 @@ import math
 from typing import NamedTuple
 
 from .axes import LEVEL
-from .messages import GimbalManagerStatus, REMOVE_SENDER, UNCHANGED
+from .messages import GimbalManagerStatus, NO_COMPONENT, REMOVE_SENDER, UNCHANGED
 from ..mavlink.command_sender import CommandPosition
 from ..mavlink.dialect import flag_names, mavlink
 from ..mavlink.messages import Address
@@ -42,6 +42,10 @@ class Control:
         """Return the control that a status shows."""
         return cls(_component(status.primary_control_sysid, status.primary_control_compid),
                    _component(status.secondary_control_sysid, status.secondary_control_compid))
+
+    def params(self) -> tuple[int, ...]:
+        """Return the params of MAV_CMD_DO_GIMBAL_MANAGER_CONFIGURE that give this control."""
+        return *(self.primary or NO_COMPONENT), *(self.secondary or NO_COMPONENT)
 
     def includes(self, component: Address) -> bool:
         """Return whether a component has primary or secondary control."""
@@ -97,6 +101,11 @@ class Flag(NamedTuple):
     flag: int
     needed: int
     is_set: bool = True
+
+    @property
+    def is_pose(self) -> bool:
+        """Whether it alone sets the attitude."""
+        return self.flag != mavlink.GIMBAL_DEVICE_FLAGS_YAW_LOCK
 
     def change(self, device_id: int) -> PlainChange[GimbalDeviceAttitudeStatus]:
         """

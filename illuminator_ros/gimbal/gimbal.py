@@ -12,45 +12,35 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""One gimbal: its managers and its device, requests and setpoints."""
+"""One gimbal: requests and setpoints of this component, and its control of the gimbal."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Collection
 from dataclasses import dataclass
 import math
-from typing import TypeVar
 
 from . import events
 from . import messages as gimbal
-from .axes import known_ranges, Ranges
-from .commands import Flag, NEUTRAL, point, RETRACT, setpoint_flags, YAW_LOCKS
-from .gimbal_control import GimbalControl, REQUEST_LIMIT
-from .remote_managers import (
-    is_late,
-    RemoteManager,
-    RemoteManagers,
-    silence,
-    SILENCE_LIMIT,
-    STOP_LIMIT,
-)
+from .axes import known_ranges
+from .commands import Flag, setpoint_flags
+from .gimbal_reports import GimbalReports
+from .gimbal_requests import GimbalRequests, YawLock
 from .setpoint_stream import SetpointStream, SuspendedBy
-from .yaw_lock import YawLock
-from ..mavlink.command_sender import CommandResult, CommandSender
-from ..mavlink.dialect import mavlink, short_names
+from ..mavlink.command_sender import CommandSender
+from ..mavlink.dialect import mavlink
 from ..mavlink.messages import Address
-from ..mavlink.retries import GIMBAL_MESSAGE, Retries
 from ..payload.arbitration import Cause, HolderChanged
 from ..payload.command_sources import Sources, SourceSettings
-from ..payload.confirmed_command import Desired, Done, Result
-from ..payload.device_events import DeviceConnected, DeviceDisconnected, DeviceHeld
-from ..payload.device_property import answer, Caller, Outcome, Property
-from ..payload.liveness import Liveness
+from ..payload.confirmed_command import Done, Result
+from ..payload.device_events import DeviceHeld
+from ..payload.device_property import answer
 from ..payload.messages import GeoPoint, GimbalDeviceAttitudeStatus
-from ..payload.mount_attitude import MountAttitude, Wxyz, YawFrame
+from ..payload.mount_attitude import Wxyz, YawFrame
 from ..payload.rotation import Quaternion, Vector
 
-S = TypeVar('S')
+# s for which a release of control waits until the attitude shows that the gimbal stands.
+STOP_LIMIT = 0.45
 
 
 @dataclass(frozen=True)
@@ -73,72 +63,6 @@ class GimbalSettings:
     sources: SourceSettings | None = None
 
 
-class _Device:
-    """
-    The reports of the device of a gimbal; times are s.
-
-    :param interval: between its attitudes; 0 for its own.
-    :ivar without_id: of attitudes that may be those of another gimbal.
-    :ivar problem: why the last status has no attitude, '' if it has one.
-    """
-
-    def __init__(self, address: Address, interval: float) -> None:
-        self.liveness = Liveness(SILENCE_LIMIT)
-        self.without_id = Liveness(SILENCE_LIMIT)
-        self.attitude_at = -math.inf
-        self._status_time = 0
-        self.attitude: MountAttitude | None = None
-        self.problem = ''
-        self.flags = self.errors = 0
-        self.identity: events.DeviceIdentity | None = None
-        self.ranges: Ranges | None = None
-        self._address = address
-        self._interval = interval
-        self.connected()
-
-    def connected(self) -> None:
-        """Request everything from now on: the device may have restarted."""
-        self._identity_query = Retries(GIMBAL_MESSAGE)
-        self._interval_query = Retries(
-            GIMBAL_MESSAGE, -math.inf if self._interval else math.inf)
-
-    def take_information(self, message: gimbal.GimbalDeviceInformation) -> None:
-        """Take its identity and its ranges."""
-        self.identity, self.ranges = events.DeviceIdentity.of(message), known_ranges(message)
-        self._identity_query.stop()
-
-    def take_status(self, status: GimbalDeviceAttitudeStatus, now: float) -> bool:
-        """Take its attitude and its flags; return whether the status counts: late ones do not."""
-        self.liveness.hear(now)
-        if is_late(status.time_boot_ms, self._status_time):
-            return False
-        self._status_time, self.attitude_at = status.time_boot_ms, now
-        self.flags, self.errors = status.flags, status.failure_flags
-        try:
-            self.attitude, self.problem = MountAttitude.from_status(status), ''
-        except ValueError as error:
-            self.attitude, self.problem = None, str(error)
-        return True
-
-    def poll(self, manager: RemoteManager, now: float) -> None:
-        """Request what it does not send by itself."""
-        if self._identity_query.begin_try(now):
-            manager.request(gimbal.GimbalDeviceInformation.id, now, to=self._address)
-        if self._interval_query.begin_try(now):
-            manager.send(
-                mavlink.MAV_CMD_SET_MESSAGE_INTERVAL,
-                (float(GimbalDeviceAttitudeStatus.id), self._interval * 1e6), now,
-                self._interval_answered, to=self._address)
-
-    def next_deadline(self) -> float:
-        """Return when :meth:`poll` is due, s."""
-        return min(self._identity_query.due, self._interval_query.due)
-
-    def _interval_answered(self, result: CommandResult, now: float) -> None:
-        if result.result is not None:
-            self._interval_query.stop()
-
-
 class Gimbal:
     """
     One gimbal device, for a component that may control it; in the link's thread.
@@ -148,6 +72,7 @@ class Gimbal:
     :param manager: has announced it.
     :param emit: takes its events.
     :ivar was_commanded: whether a user has ever sent it a request or a setpoint.
+    :ivar reports: of its managers and its device; :meth:`update` follows each change of them.
     """
 
     def __init__(
@@ -156,185 +81,110 @@ class Gimbal:
     ) -> None:
         self.key = key
         self.was_commanded = False
+        self.reports = GimbalReports(key, manager, commands, settings.attitude_interval, emit)
+        self.sources = Sources(settings.sources)
         self._commands = commands
         self._settings = settings
         self._emit = emit
-        self._managers = RemoteManagers(key, manager, commands, emit)
-        self._device = _Device(key.address, settings.attitude_interval)
-        self._control = GimbalControl(key, commands.address, emit)
+        self._requests = GimbalRequests(key, manager, commands)
         self._setpoints = SetpointStream(
             self._message, commands.send, settings.setpoint_timeout,
-            lambda: self._manager.pose_frame())
+            lambda: self._requests.pose_since)
         self._yaw_lock = YawLock(self._setpoints.hold)
-        self._sources = Sources(settings.sources)
-        self._connected = False
-        self._link_problem = ''
+        # Whether control must be taken as soon as no component has it.
+        self._take_due = False
+        # Whether a request for control is under way, or was neither refused nor confirmed.
+        self._may_have_control = False
 
-    # Liveness
-
-    @property
-    def _manager(self) -> RemoteManager:
-        return self._managers.used
-
-    def components_lost(self, lost: Collection[Address], now: float, reason: str) -> None:
-        """Record that some components cannot be reached, and the reason."""
-        if self.key.address in lost or self._manager.address in lost:
-            self._link_problem = reason
-            self._yaw_lock.cancel(reason, now)
-        self._managers.components_lost(lost, now, reason)
-        if self.key.address in lost:
-            self._device.liveness.lose(now)
-        self._check(now)
-        self._settle(now)
+    # Reports
 
     @property
     def lost_at(self) -> float:
-        """Return when a manager last announced the gimbal or its device was last heard, s."""
-        return max(self._managers.announced_at, self._device.liveness.heard_at)
+        """Return when it was last heard, s."""
+        return self.reports.heard_at
 
-    def heard(self, address: Address, now: float, autopilot: int) -> None:
-        """Take the heartbeat of a component, which may be the device or one of its managers."""
-        manager = self._managers.get(address)
-        is_device = address == self.key.address and not self.key.number
-        if manager is not None:
-            manager.liveness.hear(now)
-            manager.autopilot = autopilot
-        if is_device:
-            self._device.liveness.hear(now)
-        if manager is not None or is_device:
-            self._check(now)
+    def components_lost(self, lost: Collection[Address], now: float, reason: str) -> None:
+        """Record that some components cannot be reached, and the reason."""
+        if self.reports.lose(lost, now, reason):
+            self._yaw_lock.cancel(reason, now)
+        if self.reports.manager.address in lost:
+            self._requests.cancel(reason, now)
+        self.update(now)
+        self._settle(now)
 
-    def heard_without_id(self, now: float) -> None:
-        """Note a message of its device or of another gimbal of the same address."""
-        self._device.without_id.hear(now)
-
-    @property
-    def addresses(self) -> set[Address]:
-        """Return the addresses of its device and of its managers."""
-        return {self.key.address, *self._managers.all}
-
-    def lacks_information_of(self, address: Address) -> bool:
-        """Return whether a component manages it without GIMBAL_MANAGER_INFORMATION so far."""
-        manager = self._managers.get(address)
-        return manager is not None and manager.information is None
-
-    def unreachable(self, now: float) -> str:
-        """Return why the gimbal is not connected, for people; '' if it is."""
-        manager = self._manager
-        if not manager.liveness.is_heard(now):
-            return self._link_problem or silence(
-                f'manager {manager.address}', manager.liveness.heard_at, now)
-        device = self._device
-        if device.liveness.is_heard(now):
-            return ''
-        if device.without_id.is_heard(now):
-            return (f'{self.key.address} has several gimbals and sends attitudes without '
-                    'gimbal_device_id, so they cannot be told apart')
-        return self._link_problem or silence(
-            f'device {self.key}', device.liveness.heard_at, now)
-
-    def _check(self, now: float) -> None:
-        """Choose the manager, and report changes of connection and control."""
-        self._managers.choose(now)
-        reason = self.unreachable(now)
-        if self._connected is bool(reason):
-            self._connected = not reason
-            if reason:
-                self._emit(DeviceDisconnected(self.key, reason))
-            else:
-                self._link_problem = ''
-                self._control.take_due = self._settings.auto_take_control
-                self._device.connected()
-                self._emit(DeviceConnected(
-                    self.key, f'manager {self._manager.address}'))
-        control = self._manager.known_control(now)
-        if control == self._control.known:
-            return
-        is_first = self._control.update(control, self._manager, now)
-        if not self.in_control:
-            self._yaw_lock.cancel(self.unavailable(now), now)
-        if control is None:
-            # The manager that had shown this component in control takes the zero.
-            last = self._manager.control
-            self._setpoints.control_unknown(
-                now, is_heard=self._manager.liveness.is_heard(now), can_send=(
-                    not self._link_problem and last is not None
-                    and last.primary == self._commands.address))
-        elif not self.in_control:
-            self._setpoints.control_lost()
-        elif is_first:
-            self._setpoints.control_found()
-
-    # Messages
-
-    def take_information(
-        self, source: Address, message: gimbal.GimbalManagerInformation, now: float,
+    def take_status(
+        self, source: Address, status: gimbal.GimbalManagerStatus, now: float,
     ) -> None:
-        """Take GIMBAL_MANAGER_INFORMATION of the gimbal."""
-        if manager := self._managers.announce(source, now):
-            manager.information = message
-            self._check(now)
-
-    def take_status(self, source: Address, status: gimbal.GimbalManagerStatus, now: float) -> None:
         """Take GIMBAL_MANAGER_STATUS of the gimbal."""
-        manager = self._managers.announce(source, now)
+        manager = self.reports.announce(source, now)
         if manager is not None and manager.take_status(status, now):
-            self._check(now)
-            manager.confirm_control(status, now)
+            self.update(now)
+            if manager is self.reports.manager:
+                self._requests.control.reported(status, now)
             self._settle(now)
-
-    def take_device_information(self, message: gimbal.GimbalDeviceInformation) -> None:
-        """Take GIMBAL_DEVICE_INFORMATION of the device."""
-        self._device.take_information(message)
 
     def take_attitude(self, status: GimbalDeviceAttitudeStatus, now: float) -> None:
         """Take GIMBAL_DEVICE_ATTITUDE_STATUS of the device."""
-        device, manager = self._device, self._manager
+        device, setpoints = self.reports.device, self._setpoints
         if not device.take_status(status, now):
             return
-        self._check(now)
-        manager.confirm_pose(status, now)
+        self.update(now)
+        requests = self._requests
+        requests.pose.reported(status, now)
         self._settle(now)
         self._yaw_lock.reported(status, now)
-        self._setpoints.reported(status, device.attitude, now, may_send=(
-            self.in_control
-            and not (manager.pose_changes.desired or manager.place_changes.desired)))
-        if manager.is_releasing and self._setpoints.stands:
-            self._setpoints.forget()
-            manager.release_due = -math.inf
+        setpoints.reported(status, now, may_send=(
+            self.reports.in_control and not (requests.pose.desired or requests.place.desired)))
+        if requests.is_releasing and setpoints.forget_zero():
+            requests.release_due = -math.inf
         self._emit(events.AttitudeReceived(
             self.key, device.attitude, device.flags, device.errors))
+
+    def update(self, now: float) -> None:
+        """Follow changes of the manager, of the connection, and of control."""
+        reports, setpoints = self.reports, self._setpoints
+        if reports.choose(now):
+            self._requests.cancel('the manager was lost', now)
+            self._settle(now)
+            self._requests = GimbalRequests(self.key, reports.manager.address, self._commands)
+        if reports.connect(now):
+            self._take_due = self._settings.auto_take_control
+        is_first = reports.last_control is None
+        if not reports.update_control(now, is_releasing=self._requests.is_releasing):
+            return
+        if not reports.in_control:
+            self._yaw_lock.cancel(self.unavailable(now), now)
+        if reports.control is None:
+            # The manager that had shown this component in control takes the zero.
+            manager = reports.manager
+            setpoints.control_unknown(now, is_heard=manager.liveness.is_heard(now), can_send=(
+                not reports.link_problem and manager.control is not None
+                and manager.control.primary == self._commands.address))
+        elif is_first or not reports.in_control:
+            setpoints.control_changed(is_lost=not reports.in_control)
 
     # Control
 
     @property
-    def in_control(self) -> bool:
-        """Whether this component has primary control, and the manager is heard."""
-        return self._control.is_ours
-
-    @property
     def has_any_control(self) -> bool:
         """Whether this component has primary or secondary control, as far as it is known."""
-        return self._control.has_any
+        control = self.reports.control
+        return self._may_have_control or (
+            control is not None and control.includes(self._commands.address))
 
     def unavailable(self, now: float) -> str:
         """Return why the gimbal cannot be commanded now, for people; '' if it can."""
-        return (self._commands.refusal or self._commands.lateness(now) or self._absence(now)
-                or (self._manager.lack_of_status(now) if self._control.known is None
-                    else self._control.lack(self._manager)))
-
-    def _absence(self, now: float) -> str:
-        """Return that the manager is lost, for people; '' if it is heard."""
-        if self._manager.liveness.is_heard(now):
-            return ''
-        return f'gimbal {self.key} is not connected: {self.unreachable(now)}'
+        return (self._commands.refusal or self._commands.lateness(now)
+                or self.reports.lack_of_control(now)
+                or (f'control of gimbal {self.key} is being released'
+                    if self._requests.is_releasing else ''))
 
     def _begin(self, now: float) -> None:
         """Begin a request or a setpoint of a user, which may come before the poll that is due."""
         self.was_commanded = True
         # A later setpoint or request must not be undone.
         self._yaw_lock.stop_resending()
-        self._check(now)
+        self.update(now)
 
     def take_control(self, now: float, done: Done) -> None:
         """Take primary control; succeed only if GIMBAL_MANAGER_STATUS shows it."""
@@ -344,31 +194,30 @@ class Gimbal:
     def release_control(self, now: float, done: Done) -> None:
         """Stop, and release control; succeed only if GIMBAL_MANAGER_STATUS shows it."""
         self._begin(now)
-        manager, setpoints = self._manager, self._setpoints
         # Nothing that comes after the zero may turn the gimbal, as ArduPilot would let it.
-        self._cancel_moves('superseded by a release of control', now, superseded=True)
-        may_turn = setpoints.may_turn
-        setpoints.end(now)
-        if may_turn and manager.liveness.is_heard(now):
+        may_turn = self._setpoints.may_turn
+        self._end_commands('superseded by a release of control', now, superseded=True)
+        if may_turn and self.reports.manager.liveness.is_heard(now):
             # No command stops a gimbal everywhere: PX4 reads unset angles as 0.
-            setpoints.stop(now)
-            manager.release_due = now + STOP_LIMIT
+            self._setpoints.stop(now)
+            self._requests.release_due = now + STOP_LIMIT
         self._request_control(False, now, done)
 
     def _request_control(self, take: bool, now: float, done: Done) -> None:
-        refusal = self._commands.refusal if take else ''
-        if refusal := refusal or self._absence(now):
+        control = self.reports.control
+        if refusal := (self._commands.refusal if take else '') or self.reports.absence(now):
             done(Result(False, refusal), now)
-            return
-        wish = 'take control' if take else 'release control'
-        result = self._control.request(take, self._manager, now, Caller(done, now, detail=wish))
-        if result is not None:
-            done(self._released(result), now)
+        elif not take and control is not None and not self.has_any_control:
+            # PX4 would take the system id from another component of our system.
+            done(self._released(Result(True, f'not in control: {control}')), now)
+        else:
+            self._may_have_control |= take
+            self._requests.request_control(take, now, done)
         self._settle(now)
 
     def _released(self, result: Result) -> Result:
         """Take the result of a release of control."""
-        self._manager.release_due = -math.inf
+        self._requests.release_due = -math.inf
         if result.success and self._setpoints.may_turn:
             return result._replace(
                 message=f'{result.message}; no attitude shows that the gimbal stands')
@@ -376,47 +225,28 @@ class Gimbal:
 
     def _settle(self, now: float) -> None:
         """Answer the callers whose requests have ended."""
-        for manager in list(self._managers.all.values()):
-            for changes, outcome in manager.take_outcomes():
-                answer(outcome.callers, self._ended(manager, changes, outcome, now), now)
-
-    def _ended(
-        self, manager: RemoteManager, changes: Property[S], outcome: Outcome[S], now: float,
-    ) -> Result:
-        """Return the result of a request, for its callers."""
-        result = outcome.result
-        if changes is manager.pose_changes:
-            self._setpoints.request_ended(SuspendedBy.POSE, result)
-        elif changes is manager.place_changes:
-            self._setpoints.request_ended(SuspendedBy.PLACE, result)
-        elif outcome.desired.change.params[0] == gimbal.REMOVE_SENDER:
-            result = self._released(self._control.ended(False, result, manager))
-        else:
-            result = self._control.ended(True, result, manager)
-        wish = outcome.callers[0].detail if outcome.callers else ''
-        return self._explained(result, manager, wish, now) if result.refused else result
-
-    def _explained(
-        self, result: Result, manager: RemoteManager, wish: str, now: float,
-    ) -> Result:
-        """Add the manager, the wish and the control to a refusal."""
-        known = self._control.known
-        primary = known and known.primary
-        if primary and not self.in_control and result.permanent:
-            advice = f'{primary} has control and must release it first'
-        else:
-            who = 'this node' if self.in_control else primary or 'no component'
-            advice = self.unreachable(now) or (
-                f'{who} has control: the log of the manager may have the reason'
-                if known is not None else manager.lack_of_status(now))
-        reason = result.message.removeprefix('refused: ')
-        return result._replace(
-            message=f'manager {manager.address} refused "{wish}": {reason}; {advice}')
+        for kind, outcome in self._requests.take_outcomes():
+            result = outcome.result
+            if kind is not None:
+                self._setpoints.request_ended(kind, result)
+            else:
+                is_release = outcome.desired.change.params[0] == gimbal.REMOVE_SENDER
+                if result.success or result.refused and not is_release:
+                    self._may_have_control = False
+                if is_release:
+                    result = self._released(result)
+                elif result.success and not self.reports.manager.enforces_control:
+                    result = result._replace(message=f'{result.message}; ArduPilot also obeys '
+                                                     'components without control')
+            if result.refused:
+                wish = outcome.callers[0].detail if outcome.callers else ''
+                result = self.reports.explained(result, wish, now)
+            answer(outcome.callers, result, now)
 
     def close(self, now: float) -> None:
         """Answer all requests; :meth:`release_control` is still possible."""
         self._yaw_lock.cancel(self._commands.refusal, now, superseded=True)
-        self._managers.close(self._commands.refusal, now)
+        self._requests.cancel(self._commands.refusal, now, superseded=True)
         self._settle(now)
 
     def change_settings(self, settings: GimbalSettings, now: float) -> None:
@@ -424,34 +254,30 @@ class Gimbal:
         self._settings = settings
         self._setpoints.change_timeout(settings.setpoint_timeout, now)
         if settings.sources:
-            self._sources.set_lease(settings.sources.timeout)
-            self._take_holder(self._sources.poll(now), now)
+            self.sources.set_lease(settings.sources.timeout)
+            self._take_holder(self.sources.poll(now), now)
 
     # Sources
 
-    def claim(self, source: str, now: float) -> str:
-        """Claim the gimbal for a stream; return any refusal of its source, '' for none."""
-        self._take_holder(self._sources.poll(now), now)
-        self._take_over(source, now)
-        self._take_holder(self._sources.claim(source, now), now)
-        return self._sources.refusal(source)
+    def claim(self, source: str, now: float, *, is_call: bool = False) -> str:
+        """
+        Let a source command the gimbal; return why it may not, '' if it may.
 
-    def begin_call(self, source: str, now: float) -> str:
-        """Begin a call; return why its source may not command the gimbal, '' if it may."""
-        self._take_holder(self._sources.poll(now), now)
-        if refusal := self._sources.refusal(source):
-            return refusal
-        self._take_over(source, now)
-        self._sources.begin_call(source)
-        return ''
+        A stream claims the gimbal at once, a call when :meth:`end_call` notes that it succeeded.
+        """
+        self._take_holder(self.sources.poll(now), now)
+        refusal = self.sources.refusal(source)
+        if self.sources.takes_over(source):
+            self._end_commands(f'held by {source}', now)
+        if not is_call:
+            self._take_holder(self.sources.claim(source, now), now)
+        elif not refusal:
+            self.sources.begin_call(source)
+        return refusal
 
     def end_call(self, source: str, now: float, *, success: bool) -> None:
         """End a call, which claims the gimbal if it has succeeded."""
-        self._take_holder(self._sources.end_call(source, now, success=success), now)
-
-    def refusal(self, source: str) -> str:
-        """Return why a source may not command the gimbal, for people; '' if it may."""
-        return self._sources.refusal(source)
+        self._take_holder(self.sources.end_call(source, now, success=success), now)
 
     def release(self, source: str, now: float) -> str:
         """
@@ -459,14 +285,9 @@ class Gimbal:
 
         :return: the source that holds it now, '' if none does.
         """
-        self._take_holder(self._sources.poll(now), now)
-        self._take_holder(self._sources.release(source, now), now)
-        return self._sources.holder or ''
-
-    def _take_over(self, source: str, now: float) -> None:
-        """End the setpoint and the requests of another source, unless it is a higher one."""
-        if self._sources.takes_over(source):
-            self._end_commands(f'held by {source}', now)
+        self._take_holder(self.sources.poll(now), now)
+        self._take_holder(self.sources.release(source, now), now)
+        return self.sources.holder or ''
 
     def _take_holder(self, change: HolderChanged[str] | None, now: float) -> None:
         """Take a change of the source that holds the gimbal."""
@@ -476,59 +297,30 @@ class Gimbal:
             self._end_commands(f'held by {change.after or "no source"}', now)
         self._emit(DeviceHeld(self.key, change))
 
-    def _end_commands(self, message: str, now: float) -> None:
+    def _end_commands(self, message: str, now: float, *, superseded: bool = False) -> None:
+        """End the setpoint, and the requests that may turn the gimbal or stop it later."""
         self._setpoints.end(now)
-        self._cancel_moves(message, now)
+        self._requests.cancel_moves(message, now, superseded=superseded)
+        self._yaw_lock.cancel(message, now, superseded=superseded)
         self._settle(now)
 
     # Requests
 
-    def set_neutral(self, now: float, done: Done) -> None:
-        """Turn the gimbal to its neutral position."""
-        self._set_flag(NEUTRAL, now, done)
-
-    def retract(self, now: float, done: Done) -> None:
-        """Turn the gimbal to its retracted position."""
-        self._set_flag(RETRACT, now, done)
-
-    def set_yaw_lock(self, lock: bool, now: float, done: Done) -> None:
-        """Stop; then hold the yaw against the earth, or let it follow the vehicle (GM-3)."""
+    def set_flag(self, flag: Flag, now: float, done: Done) -> None:
+        """Turn to a pose; or stop, and lock or unlock the yaw (GM-3)."""
         self._begin(now)
-        flag = YAW_LOCKS[lock]
-        if reason := self.unavailable(now) or self._missing(flag.needed):
+        requests, message = self._requests, f'superseded by {flag.goal}'
+        if reason := self.unavailable(now) or self.reports.missing(flag.needed):
             done(Result(False, reason), now)
-            return
-        self._manager.cancel_moves(f'superseded by {flag.goal}', now, superseded=True)
-        self._yaw_lock.want(flag, now, done)
-
-    def _set_flag(self, flag: Flag, now: float, done: Done) -> None:
-        self._begin(now)
-        if reason := self.unavailable(now) or self._missing(flag.needed):
-            done(Result(False, reason), now)
-            return
-        self._end_place_changes(flag.goal, now)
-        self._yaw_lock.cancel(f'superseded by {flag.goal}', now, superseded=True)
-        self._setpoints.suspend(now, SuspendedBy.POSE)
-        self._manager.pose_changes.want(
-            Desired(flag.change(self.key.device_id), limit=REQUEST_LIMIT), now,
-            Caller(done, now, detail=flag.wish))
+        elif flag.is_pose:
+            requests.cancel_places(message, now, superseded=True)
+            self._yaw_lock.cancel(message, now, superseded=True)
+            self._setpoints.suspend(now, SuspendedBy.POSE)
+            requests.set_pose(flag, now, done)
+        else:
+            requests.cancel_moves(message, now, superseded=True)
+            self._yaw_lock.want(flag, now, done)
         self._settle(now)
-
-    def _capabilities(self) -> int | None:
-        information = self._manager.information
-        return None if information is None else information.cap_flags
-
-    def _missing(self, *enough: int) -> str:
-        """Return that the gimbal has none of some capabilities, '' if it has or may have one."""
-        known = self._capabilities()
-        if known is None or any(one & known == one for one in enough):
-            return ''
-        names = [short_names('GIMBAL_DEVICE_CAP_FLAGS')[one] for one in enough]
-        return f'gimbal {self.key} does not have {" or ".join(names)}'
-
-    def clear_roi(self, now: float, done: Done) -> None:
-        """Stop pointing at a place."""
-        self.set_roi(None, now, done)
 
     def set_roi(
         self, place: GeoPoint | None, now: float, done: Done, *, is_stream: bool = False,
@@ -542,11 +334,8 @@ class Gimbal:
         if reason := self.unavailable(now):
             done(Result(False, reason), now)
             return
-        change = point(self.key.device_id, place)
         self._setpoints.suspend(now, SuspendedBy.PLACE, is_place=place is not None)
-        self._manager.request_place(
-            Desired(change, limit=REQUEST_LIMIT), now,
-            Caller(done, now, is_stream=is_stream, detail=change.goal))
+        self._requests.set_place(place, now, done, is_stream=is_stream)
         self._settle(now)
 
     # Setpoints
@@ -559,12 +348,13 @@ class Gimbal:
             :class:`~..payload.mount_attitude.MountAttitude`.
         :return: why it was not sent, for people; '' if it was.
         """
-        reason = self._begin_setpoint(now) or (self._missing(
+        self._begin(now)
+        reason = self.unavailable(now) or (self.reports.missing(
             mavlink.GIMBAL_DEVICE_CAP_FLAGS_HAS_YAW_LOCK,
             mavlink.GIMBAL_DEVICE_CAP_FLAGS_SUPPORTS_YAW_IN_EARTH_FRAME,
         ) if frame is YawFrame.EARTH else '')
         if not reason:
-            self._end_place_changes('a setpoint', now)
+            self._requests.cancel_places('superseded by a setpoint', now, superseded=True)
             self._setpoints.set_attitude(rotation, frame, now)
         return reason
 
@@ -577,9 +367,10 @@ class Gimbal:
         :return: why it was not sent, for people; '' if it was.
         """
         if any(map(math.isnan, angles)):
-            if reason := self._begin_setpoint(now):
+            self._begin(now)
+            if reason := self.unavailable(now):
                 return reason
-            base, attitude = self._setpoints.attitude(frame), self._device.attitude
+            base, attitude = self._setpoints.attitude(frame), self.reports.device.attitude
             if base is None and attitude is not None:
                 base = attitude.seen_from(frame)
             if base is None:
@@ -596,83 +387,61 @@ class Gimbal:
 
         :return: why they were not sent, for people; '' if they were.
         """
-        reason = self._begin_setpoint(now)
+        self._begin(now)
+        reason = self.unavailable(now)
         if not reason:
-            self._end_place_changes('a setpoint', now)
+            self._requests.cancel_places('superseded by a setpoint', now, superseded=True)
             self._setpoints.set_rates(rates, now)
         return reason
-
-    def _begin_setpoint(self, now: float) -> str:
-        self._begin(now)
-        return self.unavailable(now)
-
-    def _cancel_moves(self, message: str, now: float, *, superseded: bool = False) -> None:
-        """End the requests that may turn the gimbal, or stop it later."""
-        self._manager.cancel_moves(message, now, superseded=superseded)
-        self._yaw_lock.cancel(message, now, superseded=superseded)
-
-    def _end_place_changes(self, newer: str, now: float) -> None:
-        """Send no place again, which would undo a later setpoint or request."""
-        self._manager.cancel_places(f'superseded by {newer}', now, superseded=True)
 
     def _message(
         self, frame: YawFrame, q: Wxyz, rates: Vector,
     ) -> gimbal.GimbalManagerSetAttitude:
         flags = setpoint_flags(frame)
-        if self._missing(mavlink.GIMBAL_DEVICE_CAP_FLAGS_HAS_YAW_LOCK):
+        if self.reports.missing(mavlink.GIMBAL_DEVICE_CAP_FLAGS_HAS_YAW_LOCK):
             flags &= ~mavlink.GIMBAL_DEVICE_FLAGS_YAW_LOCK
         return gimbal.GimbalManagerSetAttitude(
-            *self._manager.address, flags, self.key.device_id, q, *rates)
+            *self.reports.manager.address, flags, self.key.device_id, q, *rates)
 
     # Time
 
     def poll(self, now: float) -> None:
         """Do everything that is due."""
-        self._check(now)
-        self._take_holder(self._sources.poll(now), now)
-        manager, control = self._manager, self._control
-        manager.poll(now)
+        def taken(result: Result, now: float) -> None:
+            if not result.success:
+                self._emit(events.AutomaticTakeFailed(self.key, result.message))
+
+        self.update(now)
+        self._take_holder(self.sources.poll(now), now)
+        self._requests.poll(now)
         self._yaw_lock.poll(now)
         self._settle(now)
-        if self.in_control:
+        if self.reports.in_control:
             self._setpoints.poll(now)
-        if not self._connected:
-            return
-        if control.take_due and control.known is not None:
-            control.take_due = False
-            if control.known.primary is None:
-                self._request_control(True, now, self._taken_automatically)
-        if manager.status_query.begin_try(now):
-            manager.request(gimbal.GimbalManagerStatus.id, now)
-        self._device.poll(manager, now)
-
-    def _taken_automatically(self, result: Result, now: float) -> None:
-        if not result.success:
-            self._emit(events.AutomaticTakeFailed(self.key, result.message))
+        control = self.reports.control
+        if self._take_due and self.reports.is_connected and control is not None:
+            self._take_due = False
+            if control.primary is None:
+                self._request_control(True, now, taken)
+        self.reports.poll(now)
 
     def next_deadline(self) -> float:
         """Return when :meth:`poll` is due, infinity if never."""
-        manager = self._manager
-        is_known = self._control.known is not None
-        if self._connected and is_known and self._control.take_due:
+        reports = self.reports
+        if self._take_due and reports.is_connected and reports.control is not None:
             return -math.inf
-        due = min(self._sources.next_deadline(), self._yaw_lock.next_deadline(),
-                  manager.next_deadline())
-        if is_known:
-            due = min(due, manager.control_deadline())
-        if self._connected:
-            due = min(due, manager.liveness.silent_at, manager.status_query.due,
-                      self._device.liveness.silent_at, self._device.next_deadline())
-        return min(due, self._setpoints.next_deadline()) if self.in_control else due
+        return min(self.sources.next_deadline(), self._yaw_lock.next_deadline(),
+                   self._requests.next_deadline(), reports.next_deadline(),
+                   self._setpoints.next_deadline() if self.reports.in_control else math.inf)
 
     def snapshot(self, now: float) -> events.GimbalSnapshot:
         """Return the gimbal at this moment."""
-        manager, device, sources = self._manager, self._device, self._sources
-        information = manager.information
+        reports, device, sources = self.reports, self.reports.device, self.sources
+        manager, information = reports.manager, reports.manager.information
         return events.GimbalSnapshot(
-            self.key, self.unreachable(now), self._managers.addresses, self._capabilities(),
+            self.key, reports.unreachable(now), reports.heard_managers, reports.capabilities,
             device.ranges or (known_ranges(information) if information else None),
             device.identity, device.attitude, device.attitude_at, device.problem, device.flags,
-            device.errors, self._control.known, self._control.since, self.in_control,
+            device.errors, reports.control, reports.control_since, self.reports.in_control,
             manager.status_at, manager.enforces_control, self._setpoints.sent,
             sources.shown_holder, sources.since)

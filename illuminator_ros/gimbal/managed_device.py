@@ -18,16 +18,23 @@ from __future__ import annotations
 
 import math
 
-from .axes import Ranges, TURNING
-from .manager_setpoint import GimbalModel, POSES, Setpoint
+from .axes import HAS_AXIS, HAS_LOCK, known_ranges, Ranges, read_capabilities, TURNING, UNLIMITED
+from .manager_setpoint import POSES, Setpoint
 from .manager_state import ManagerState, StateTracker
 from .messages import GimbalDeviceInformation, rates_of
 from .vehicle_state import VehicleState
-from ..mavlink.command_sender import Command, CommandResult, CommandSender
+from ..mavlink.command_sender import CommandResult, CommandSender, request_message
 from ..mavlink.dialect import mavlink
-from ..mavlink.retries import DEVICE_INFORMATION
+from ..mavlink.retries import DEVICE_INFORMATION, Retries
 from ..payload.messages import GimbalDeviceAttitudeStatus
-from ..payload.mount_attitude import heading_of, rotation_of, STILL, yaw_frame, YawFrame
+from ..payload.mount_attitude import (
+    heading_of,
+    names_frame,
+    rotation_of,
+    STILL,
+    yaw_frame,
+    YawFrame,
+)
 from ..payload.rotation import Vector
 
 # Requests for GIMBAL_DEVICE_INFORMATION without the message after which the manager announces the
@@ -39,30 +46,48 @@ INFORMATION_TIMEOUT = 2.0
 ATTITUDE_AGE = 1.0
 
 
+# The capability that a flag needs.
+_NEEDED = {mavlink.GIMBAL_DEVICE_FLAGS_RETRACT: mavlink.GIMBAL_DEVICE_CAP_FLAGS_HAS_RETRACT,
+           mavlink.GIMBAL_DEVICE_FLAGS_NEUTRAL: mavlink.GIMBAL_DEVICE_CAP_FLAGS_HAS_NEUTRAL,
+           mavlink.GIMBAL_DEVICE_FLAGS_YAW_LOCK: mavlink.GIMBAL_DEVICE_CAP_FLAGS_HAS_YAW_LOCK}
+
+
+def _capabilities(ranges: Ranges) -> int:
+    """Return those of a gimbal that is stabilised and points to any attitude within the ranges."""
+    capabilities = mavlink.GIMBAL_DEVICE_CAP_FLAGS_HAS_NEUTRAL
+    if not ranges[2].is_fixed:
+        capabilities |= mavlink.GIMBAL_DEVICE_CAP_FLAGS_HAS_YAW_FOLLOW
+    for range_, *flags in zip(ranges, HAS_AXIS, HAS_LOCK, strict=True):
+        capabilities |= 0 if range_.is_fixed else sum(flags)
+    return capabilities
+
+
 class ManagedDevice:
     """
     The facts that a manager knows of its device. Times are s.
 
     :param tracker: knows its address.
     :param ranges: of the axes of a device without MAVLink.
-    :ivar model: its abilities.
+    :ivar capabilities: 0 where unknown.
+    :ivar ranges: of roll, pitch, and yaw relative to the vehicle.
+    :ivar newest: status, None before the first.
     :ivar information: None until it has come.
-    :ivar request_due: when the information is requested.
+    :ivar request: of the information.
     """
 
     def __init__(
         self, tracker: StateTracker, commands: CommandSender, vehicle: VehicleState,
         ranges: Ranges,
     ) -> None:
-        self.model = GimbalModel() if tracker.has_mavlink else GimbalModel.from_ranges(ranges)
+        self.capabilities, self.ranges = (
+            (0, UNLIMITED) if tracker.has_mavlink else (_capabilities(ranges), ranges))
         self.information: GimbalDeviceInformation | None = None
-        self.request_due = math.inf
+        self.request = Retries(DEVICE_INFORMATION, math.inf)
         self._tracker = tracker
         self._commands = commands
         self._vehicle = vehicle
-        self._status: GimbalDeviceAttitudeStatus | None = None
-        self._status_at = -math.inf
-        self._requests = 0
+        self.newest: GimbalDeviceAttitudeStatus | None = None
+        self._newest_at = -math.inf
 
     # Information
 
@@ -70,57 +95,59 @@ class ManagedDevice:
     def is_awaited(self) -> bool:
         """Whether its information is requested and may still come."""
         return (self._tracker.has_mavlink and self.information is None
-                and self._requests < INFORMATION_REQUESTS)
+                and self.request.tried < INFORMATION_REQUESTS)
 
     def found(self, now: float) -> None:
         """Request its information."""
         if self._tracker.has_mavlink and self.information is None:
-            self.request_due = now
+            self.request.due = now
 
     def lost(self) -> None:
         """Forget its abilities: the next device may be another one."""
-        self.request_due, self._requests = math.inf, 0
+        self.request = Retries(DEVICE_INFORMATION, math.inf)
         if self._tracker.has_mavlink:
-            self.information, self.model = None, GimbalModel()
+            self.information, self.capabilities, self.ranges = None, 0, UNLIMITED
 
     def take_information(self, message: GimbalDeviceInformation) -> None:
         """Take GIMBAL_DEVICE_INFORMATION."""
-        self.information, self.request_due = message, math.inf
-        self.model = GimbalModel.from_information(message)
+        self.information = message
+        self.capabilities, self.ranges = read_capabilities(message), known_ranges(message)
+        self.request.stop()
 
     def poll(self, now: float) -> None:
         """Request the information if that is due."""
-        if now >= self.request_due and self._tracker.device is not None:
-            self.request_due = math.inf
-            command = Command(self._tracker.device, mavlink.MAV_CMD_REQUEST_MESSAGE,
-                              (GimbalDeviceInformation.id,))
+        if now >= self.request.due and self._tracker.device is not None:
+            self.request.stop()
             self._commands.start(
-                command, now, self._answered, deadline=now + INFORMATION_TIMEOUT)
+                request_message(self._tracker.device, GimbalDeviceInformation.id), now,
+                self._answered, deadline=now + INFORMATION_TIMEOUT)
 
     def _answered(self, result: CommandResult, now: float) -> None:
         if self.information is None and self._tracker.state is not ManagerState.NO_DEVICE:
-            self._requests += 1
-            self.request_due = now + DEVICE_INFORMATION.wait(self._requests)
+            self.request.note_try(now)
 
     # Reports
 
     def take_status(self, status: GimbalDeviceAttitudeStatus, now: float) -> None:
         """Take GIMBAL_DEVICE_ATTITUDE_STATUS."""
-        self._status, self._status_at = status, now
+        self.newest, self._newest_at = status, now
 
     def status(self, now: float) -> GimbalDeviceAttitudeStatus | None:
         """Return the newest status, None if it is out of date."""
-        return self._status if now < self._status_at + ATTITUDE_AGE else None
+        return self.newest if now < self._newest_at + ATTITUDE_AGE else None
+
+    def lacks(self, flags: int) -> int:
+        """Return the flags that it cannot follow."""
+        return sum([flag for flag, needed in _NEEDED.items()
+                    if flags & flag and self.capabilities and not self.capabilities & needed])
 
     def accepts_earth_frame(self, now: float) -> bool:
         """Return whether it accepts a yaw relative to north."""
         status = self.status(now)
-        return self.model.accepts_earth_frame(status.flags if status else None)
-
-    @property
-    def has_reported(self) -> bool:
-        """Whether it has ever sent a status."""
-        return self._status is not None
+        if status is not None and names_frame(status.flags):
+            return bool(status.flags & mavlink.GIMBAL_DEVICE_FLAGS_ACCEPTS_YAW_IN_EARTH_FRAME)
+        return not self.capabilities or bool(
+            self.capabilities & mavlink.GIMBAL_DEVICE_CAP_FLAGS_SUPPORTS_YAW_IN_EARTH_FRAME)
 
     def heading(self, now: float) -> float | None:
         """Return the vehicle's heading as the device reports it, else as the vehicle does."""

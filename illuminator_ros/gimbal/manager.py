@@ -25,24 +25,26 @@ from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass, field
 import math
 import random
+from typing import TypeAlias
 
 from . import messages as gimbal
 from .axes import AT_LIMIT, range_fields, Ranges, UNLIMITED
+from .commands import Control
 from .managed_device import ManagedDevice
 from .manager_control import ControlArbiter, ControlSettings, Role, RoleHolderChanged
-from .manager_events import AddressShared, ManagerEvent, RequestRefused
 from .manager_setpoint import AnySetpoint, read_roi, read_setpoint, Refused, Setpoint
 from .manager_state import ManagerState, StateChanged, StateTracker
-from .setpoint_mixer import SetpointMixer
+from .setpoint_mixer import SetpointEvent, SetpointMixer
 from .vehicle_state import VehicleState
 from ..mavlink import messages as mav
 from ..mavlink.command_sender import Command, CommandSender
 from ..mavlink.component import Payload
 from ..mavlink.dialect import mavlink, replaced
-from ..mavlink.messages import Address, AnyCommand, Params, params_of
+from ..mavlink.messages import Address, AnyCommand, params_of
 from ..payload.listeners import Listeners
 from ..payload.messages import Attitude, GimbalDeviceAttitudeStatus, GlobalPositionInt
-from ..payload.mount_attitude import AXES
+from ..payload.mount_attitude import AXES, to_mavlink, YawFrame
+from ..payload.rotation import Quaternion
 
 # s between GIMBAL_MANAGER_STATUS, and between those that are sent because control has changed.
 STATUS_INTERVAL = 0.2
@@ -68,6 +70,25 @@ class ManagerSettings:
     ranges: Ranges = UNLIMITED
 
 
+@dataclass(frozen=True)
+class RequestRefused:
+    """A setpoint or a command of a player was refused."""
+
+    player: Address
+    reason: str
+
+
+@dataclass(frozen=True)
+class AddressShared:
+    """Two senders with different heartbeats use the address of one player."""
+
+    player: Address
+
+
+ManagerEvent: TypeAlias = (
+    StateChanged | RoleHolderChanged | RequestRefused | AddressShared | SetpointEvent)
+
+
 class GimbalManager(Payload):
     """
     The manager of one gimbal: messages and commands of players, and reports to them.
@@ -78,6 +99,7 @@ class GimbalManager(Payload):
     :ivar events: each a :data:`ManagerEvent`.
     :ivar tracker: its state, its device and other managers.
     :ivar control: the players in primary and in secondary control.
+    :ivar setpoints: of the device.
     :ivar vehicle: the state of the vehicle, from the link or from ROS.
     """
 
@@ -106,16 +128,12 @@ class GimbalManager(Payload):
         self._commands = commands
         self._reported = reported
         self._device = ManagedDevice(self.tracker, commands, self.vehicle, settings.ranges)
-        self._setpoints = SetpointMixer(
+        self.setpoints = SetpointMixer(
             self._device, self.vehicle, self.tracker, commands, self.events.emit)
         # Whether a request for GIMBAL_MANAGER_INFORMATION came too early.
         self._is_awaited = False
         self._measured_at = self._changed_at = -math.inf
         self._status_due = math.inf
-        self._handlers: dict[int, Callable[[Address, AnyCommand, float], None]] = {
-            mavlink.MAV_CMD_DO_GIMBAL_MANAGER_PITCHYAW: self._pitch_yaw,
-            mavlink.MAV_CMD_DO_SET_ROI_LOCATION: self._set_roi,
-            mavlink.MAV_CMD_DO_SET_ROI_NONE: self._set_roi}
 
     # The payload
 
@@ -133,7 +151,7 @@ class GimbalManager(Payload):
             self.tracker.link_closed(now)
         elif self.control.primary.holder in lost:
             # Its control ends with its lease, unless it is heard again.
-            self._setpoints.stop(now)
+            self.setpoints.stop(now)
 
     def receive(self, source: Address, message: mav.Message, now: float) -> None:
         """See :meth:`Payload.receive`."""
@@ -150,7 +168,7 @@ class GimbalManager(Payload):
                     or not self.tracker.hear_device(source, now)):
                 return
             if isinstance(message, GimbalDeviceAttitudeStatus):
-                self.take_attitude(message, now)
+                self._take_attitude(message, now)
             else:
                 self._device.take_information(message)
         elif isinstance(message, gimbal.GimbalManagerInformation | gimbal.GimbalManagerStatus):
@@ -181,24 +199,26 @@ class GimbalManager(Payload):
                 self._report(information)
             if not self.tracker.has_mavlink and now >= self._measured_at + MEASURED_AGE:
                 # The setpoint of a device that reports no attitude is its attitude.
-                self._take_attitude(self._setpoints.as_status(now), now)
-        if now >= self._setpoints.due:
-            self._setpoints.poll(now)
-        self._setpoints.rate_stop.poll(now)
+                sent = self.setpoints.sent
+                self._take_attitude(self._measured(
+                    sent and sent.attitude or Quaternion(), YawFrame.VEHICLE, now), now)
+        if now >= self.setpoints.due:
+            self.setpoints.poll(now)
+        self.setpoints.rate_stop.poll(now)
 
     def next_deadline(self) -> float:
         """See :meth:`Payload.next_deadline`."""
         return min(self.tracker.next_deadline(), self.control.next_deadline(),
-                   self._device.request_due, self._status_due, self._setpoints.due,
-                   self._setpoints.rate_stop.due)
+                   self._device.request.due, self._status_due, self.setpoints.due,
+                   self.setpoints.rate_stop.due)
 
     def _state_changed(self, change: StateChanged, now: float) -> None:
         after = change.after
         self._status_due = now if after is ManagerState.ACTIVE else math.inf
         if after is ManagerState.ACTIVE:
-            self._setpoints.activate(now)
+            self.setpoints.activate(now)
         else:
-            self._setpoints.deactivate(now, forget=after is not ManagerState.LISTENING)
+            self.setpoints.deactivate(now, forget=after is not ManagerState.LISTENING)
         if after is ManagerState.LISTENING:
             # Another manager may send no status, but answers a request.
             self._commands.send(Command(
@@ -219,25 +239,29 @@ class GimbalManager(Payload):
 
     def close(self, now: float) -> None:
         """See :meth:`Payload.close`: the device stays where it is, and follows nothing more."""
-        self._setpoints.close(now)
-
-    @property
-    def is_stopping(self) -> bool:
-        """Whether a rate of zero is repeated until the device stands."""
-        return self._setpoints.rate_stop.is_running
+        self.setpoints.close(now)
 
     # The device and the vehicle, from the link or from ROS
 
-    def take_attitude(self, status: GimbalDeviceAttitudeStatus, now: float) -> None:
-        """Take the attitude of the device, from the link or, without MAVLink, from ROS."""
+    def take_attitude(self, value: tuple[Quaternion, YawFrame], now: float) -> None:
+        """Take the attitude of a device without MAVLink, from ROS."""
         self._measured_at = now
-        self._take_attitude(status, now)
+        self._take_attitude(self._measured(to_mavlink(*value), value[1], now), now)
+
+    def _measured(
+        self, q: Sequence[float], frame: YawFrame, now: float,
+    ) -> GimbalDeviceAttitudeStatus:
+        """Return the status of a device without MAVLink that has an attitude."""
+        heading = self.vehicle.heading(now)
+        return GimbalDeviceAttitudeStatus(
+            0, 0, mav.time_boot_ms(now), int(frame.flag), q, math.nan, math.nan, math.nan, 0,
+            math.nan if heading is None else heading, math.nan)
 
     def _take_attitude(self, status: GimbalDeviceAttitudeStatus, now: float) -> None:
         self._device.take_status(status, now)
-        self._setpoints.rate_stop.reported(status, now)
-        if not self.tracker.has_mavlink and self.tracker.state is ManagerState.ACTIVE:
-            setpoints = self._setpoints
+        self.setpoints.rate_stop.reported(status, now)
+        if not self.tracker.has_mavlink and self.is_active:
+            setpoints = self.setpoints
             flags = 0 if setpoints.current is None else setpoints.current.operation
             limits = sum(AT_LIMIT[AXES.index(one.axis)] for one in setpoints.clipped)
             self._report(replaced(
@@ -246,7 +270,7 @@ class GimbalManager(Payload):
 
     def vehicle_changed(self, now: float) -> None:
         """Send the vehicle's state to the device, unless an autopilot does."""
-        if self.tracker.device is not None and self.tracker.state is ManagerState.ACTIVE and (
+        if self.tracker.device is not None and self.is_active and (
                 message := self.vehicle.for_device(self.tracker.device, now)):
             self._commands.send(message)
 
@@ -254,7 +278,7 @@ class GimbalManager(Payload):
 
     def take_setpoint(self, source: Address, message: AnySetpoint, now: float) -> None:
         """Take a setpoint of a player."""
-        if self._commands.refusal and source == self.address:
+        if source == self.address and self._commands.refusal:
             # The client in this process ends its own rate, which has ended already.
             return
         if (message.target_system not in (0, self.address.system)
@@ -262,7 +286,7 @@ class GimbalManager(Payload):
                 or message.gimbal_device_id not in (0, self.tracker.device_id)):
             return
         try:
-            self._follow(source, read_setpoint(message, self._device.model.ranges), now)
+            self._follow(source, read_setpoint(message, self._device.ranges), now)
         except ValueError as error:
             self.events.emit(RequestRefused(source, str(error)))
 
@@ -278,28 +302,45 @@ class GimbalManager(Payload):
         if command.command not in gimbal.DEVICE_ID_PARAM:
             return None
         device_id = params[gimbal.DEVICE_ID_PARAM[command.command]]
-        if device_id not in (0, self.tracker.device_id):
-            self.events.emit(RequestRefused(
-                source, f'gimbal device id {device_id:g} is neither {self.tracker.device_id} nor '
-                '0 for all'))
-            return mavlink.MAV_RESULT_DENIED
-        if command.command == mavlink.MAV_CMD_DO_GIMBAL_MANAGER_CONFIGURE:
-            return self._configure(source, params, now)
         try:
-            self._check_active()
-            self._handlers[command.command](source, command, now)
-        except Refused as refused:
+            if device_id not in (0, self.tracker.device_id):
+                raise Refused(f'gimbal device id {device_id:g} is neither '
+                              f'{self.tracker.device_id} nor 0 for all')
+            if command.command != mavlink.MAV_CMD_DO_GIMBAL_MANAGER_CONFIGURE:
+                self._move(source, command, now)
+            # Control may be released at the end.
+            elif self.is_active or self._commands.refusal:
+                self._control_changed(self.control.configure(source, params, now), now)
+            else:
+                return self._inactive_result
+        except (ValueError, OverflowError) as error:
             # The result of a command has no reason.
-            self.events.emit(RequestRefused(source, str(refused)))
-            return refused.result
+            self.events.emit(RequestRefused(source, str(error)))
+            return error.result if isinstance(error, Refused) else mavlink.MAV_RESULT_DENIED
         return mavlink.MAV_RESULT_ACCEPTED
+
+    def _move(self, source: Address, command: AnyCommand, now: float) -> None:
+        """Follow angles, rates or a place."""
+        self._check_active()
+        if command.command == mavlink.MAV_CMD_DO_GIMBAL_MANAGER_PITCHYAW:
+            *angles_and_rates, flags, _, _ = params_of(command)
+            self._follow(source, Setpoint.from_pitch_yaw(
+                0 if math.isnan(flags) else int(flags), *map(math.radians, angles_and_rates)), now)
+        else:
+            self._check_control(source)
+            is_none = command.command == mavlink.MAV_CMD_DO_SET_ROI_NONE
+            self.setpoints.point(None if is_none else read_roi(command), now)
+
+    @property
+    def is_active(self) -> bool:
+        """Whether it announces the device and gives it setpoints."""
+        return self.tracker.state is ManagerState.ACTIVE
 
     def _check_active(self) -> None:
         """Raise :class:`Refused` if the manager gives no setpoints now."""
-        if reason := self._commands.refusal or (
-                '' if self.tracker.state is ManagerState.ACTIVE else
-                f'the manager is not active: {self.tracker.state.value}'):
-            raise Refused(reason, self._inactive_result)
+        if self._commands.refusal or not self.is_active:
+            raise Refused(self._commands.refusal or 'the manager is not active: '
+                          f'{self.tracker.state.value}', self._inactive_result)
 
     @property
     def _inactive_result(self) -> int:
@@ -307,51 +348,30 @@ class GimbalManager(Payload):
         return (mavlink.MAV_RESULT_DENIED if self.tracker.state is ManagerState.INACTIVE
                 else mavlink.MAV_RESULT_TEMPORARILY_REJECTED)
 
-    def _configure(self, source: Address, params: Params, now: float) -> int:
-        # Control may be released at the end.
-        if self.tracker.state is not ManagerState.ACTIVE and not self._commands.refusal:
-            return self._inactive_result
-        try:
-            changes = self.control.configure(source, params, now)
-        except ValueError as error:
-            self.events.emit(RequestRefused(source, str(error)))
-            return mavlink.MAV_RESULT_DENIED
-        self._control_changed(changes, now)
-        return mavlink.MAV_RESULT_ACCEPTED
-
     def _control_changed(self, changes: Sequence[RoleHolderChanged], now: float) -> None:
         # The gimbal stays where it points until the next player sends a setpoint.
         for change in changes:
             if change.role is Role.SECONDARY:
-                self._setpoints.end_offsets(now, keep=self.control.primary.holder is None)
+                self.setpoints.end_offsets(now, keep=self.control.primary.holder is None)
             else:
                 if change.after == self.control.holder(Role.SECONDARY):
                     # Offsets do not shift the setpoints of the player that sent them.
-                    self._setpoints.end_offsets(now, keep=True)
-                self._setpoints.stop(now)
+                    self.setpoints.end_offsets(now, keep=True)
+                self.setpoints.stop(now)
             self.events.emit(change)
         if changes and self._status_due < math.inf and now >= self._changed_at + CHANGE_INTERVAL:
             # An additional status, so that players need not wait for the next regular one.
             self._changed_at = now
             self._report(self.status(now))
 
-    def _pitch_yaw(self, source: Address, command: AnyCommand, now: float) -> None:
-        *angles_and_rates, flags, _, _ = params_of(command)
-        try:
-            request = Setpoint.from_pitch_yaw(
-                0 if math.isnan(flags) else int(flags), *map(math.radians, angles_and_rates))
-        except (ValueError, OverflowError) as error:
-            raise Refused(str(error)) from error
-        self._follow(source, request, now)
-
     def _follow(self, player: Address, request: Setpoint, now: float) -> None:
         """Follow the request of a player, unless it is refused."""
         self._check_active()
         if self.control.secondary.holder == player != self.control.primary.holder:
-            self._setpoints.add(request, self.settings.nudge_limit, now)
+            self.setpoints.add(request, self.settings.nudge_limit, now)
         else:
             self._check_control(player)
-            self._setpoints.set(request, now)
+            self.setpoints.set(request, now)
 
     def _check_control(self, player: Address) -> None:
         """Raise :class:`Refused` unless a player has primary control."""
@@ -359,14 +379,6 @@ class GimbalManager(Payload):
         if holder != player:
             raise Refused(
                 f'{holder} has control' if holder else 'the player must take control first')
-
-    def _set_roi(self, source: Address, command: AnyCommand, now: float) -> None:
-        self._check_control(source)
-        if command.command == mavlink.MAV_CMD_DO_SET_ROI_NONE:
-            self._setpoints.end_place(now)
-        else:
-            place, is_relative = read_roi(command)
-            self._setpoints.point(place, now, is_relative=is_relative)
 
     # Reports
 
@@ -377,14 +389,13 @@ class GimbalManager(Payload):
 
     def status(self, now: float) -> gimbal.GimbalManagerStatus:
         """Return GIMBAL_MANAGER_STATUS, which contains the players in control."""
-        setpoint, device = self._setpoints.current, self._device.status(now)
+        setpoint, device = self.setpoints.current, self._device.status(now)
         flags = 0 if setpoint is None else setpoint.device_flags
         if device is not None:
             flags |= device.flags & mavlink.GIMBAL_DEVICE_FLAGS_ACCEPTS_YAW_IN_EARTH_FRAME
-        primary, secondary = (self.control.holder(role) or gimbal.NO_COMPONENT for role in Role)
+        control = Control(self.control.primary.holder, self.control.secondary.holder)
         return gimbal.GimbalManagerStatus(
-            mav.time_boot_ms(now), flags, self.tracker.device_id, *primary,
-            *secondary)
+            mav.time_boot_ms(now), flags, self.tracker.device_id, *control.params())
 
     def _send_requested(self, message_id: float, now: float) -> int | None:
         make: dict[int, Callable[[float], mav.Message | None]] = {
@@ -394,7 +405,7 @@ class GimbalManager(Payload):
         if message_id not in make:
             return None
         message = make[int(message_id)](now)
-        if self.tracker.state is not ManagerState.ACTIVE or message is None:
+        if not self.is_active or message is None:
             self._is_awaited |= message_id == gimbal.GimbalManagerInformation.id
             return self._inactive_result
         self._report(message)
@@ -406,20 +417,19 @@ class GimbalManager(Payload):
             # Clients request the message once, and would never know the device's capabilities.
             return None
         # The manager itself computes the attitude towards a place.
-        model = self._device.model
         capabilities = (
-            model.capabilities | mavlink.GIMBAL_MANAGER_CAP_FLAGS_CAN_POINT_LOCATION_GLOBAL)
+            self._device.capabilities | mavlink.GIMBAL_MANAGER_CAP_FLAGS_CAN_POINT_LOCATION_GLOBAL)
         return gimbal.GimbalManagerInformation(
             mav.time_boot_ms(now), capabilities, self.tracker.device_id,
-            **range_fields(model.ranges))
+            **range_fields(self._device.ranges))
 
     def _device_information(self, now: float) -> gimbal.GimbalDeviceInformation | None:
         """Return GIMBAL_DEVICE_INFORMATION, which clients may request from the manager."""
-        device_id, model = self.tracker.device_id, self._device.model
+        device_id, device = self.tracker.device_id, self._device
         if self.tracker.has_mavlink:
-            return self._device.information and replaced(
-                self._device.information, gimbal_device_id=device_id)
+            return device.information and replaced(
+                device.information, gimbal_device_id=device_id)
         return gimbal.GimbalDeviceInformation(
             mav.time_boot_ms(now), b'illuminator_ros', b'gimbal behind ROS', b'', 0, 0, 0,
-            model.capabilities & 0xFFFF, 0, **range_fields(model.ranges),
+            device.capabilities & 0xFFFF, 0, **range_fields(device.ranges),
             gimbal_device_id=device_id, cap_flags2=0)

@@ -142,7 +142,7 @@ class ControlArbiter:
 
     def next_deadline(self) -> float:
         """Return when :meth:`poll` is due, infinity if never."""
-        return min(arbiter.next_deadline() for arbiter in self._arbiters.values())
+        return min(self.primary.next_deadline(), self.secondary.next_deadline())
 
     def _wanted(
         self, role: Role, source: Address, system: float, component: float,

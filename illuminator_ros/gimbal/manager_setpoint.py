@@ -23,28 +23,17 @@ is relative to north or to the vehicle's heading: see :class:`~..payload.mount_a
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 import math
 from typing import NamedTuple
 
 from . import messages as gimbal
-from .axes import (
-    HAS_AXIS,
-    HAS_LOCK,
-    known_ranges,
-    LEVEL,
-    Range,
-    Ranges,
-    RATE_LIMIT,
-    read_capabilities,
-    UNLIMITED,
-)
+from .axes import LEVEL, Range, Ranges, RATE_LIMIT, UNLIMITED
 from .messages import rates_of
 from ..mavlink.command_sender import DEGREE_SCALE
 from ..mavlink.dialect import MAV_RESULT_COMMAND_UNSUPPORTED_MAV_FRAME, mavlink
 from ..mavlink.messages import AnyCommand, CommandInt, params_of
 from ..payload.messages import GeoPoint
-from ..payload.mount_attitude import AXES, names_frame, STILL, UNSET_VECTOR, yaw_frame, YawFrame
+from ..payload.mount_attitude import AXES, STILL, UNSET_VECTOR, yaw_frame, YawFrame
 from ..payload.rotation import Quaternion, Vector
 
 # Flags that alone set the attitude.
@@ -60,56 +49,8 @@ _TOLERANCE = 1e-5
 _HYSTERESIS = math.radians(10)
 # rad/s at full deflection of GIMBAL_MANAGER_SET_MANUAL_CONTROL, which leaves it open.
 MANUAL_RATE = 0.5
-# The capability that a flag needs.
-_NEEDED = {mavlink.GIMBAL_DEVICE_FLAGS_RETRACT: mavlink.GIMBAL_DEVICE_CAP_FLAGS_HAS_RETRACT,
-           mavlink.GIMBAL_DEVICE_FLAGS_NEUTRAL: mavlink.GIMBAL_DEVICE_CAP_FLAGS_HAS_NEUTRAL,
-           mavlink.GIMBAL_DEVICE_FLAGS_YAW_LOCK: mavlink.GIMBAL_DEVICE_CAP_FLAGS_HAS_YAW_LOCK}
 # Equatorial radius, m, and squared eccentricity of WGS 84.
 _RADIUS, _ECCENTRICITY_2 = 6378137.0, 6.69437999014e-3
-
-
-@dataclass(frozen=True)
-class GimbalModel:
-    """
-    The abilities of a gimbal; all unknown at first.
-
-    :param capabilities: 0 where unknown.
-    :param ranges: of roll, pitch, and yaw relative to the vehicle.
-    """
-
-    capabilities: int = 0
-    ranges: Ranges = UNLIMITED
-
-    @classmethod
-    def from_information(cls, message: gimbal.GimbalDeviceInformation) -> GimbalModel:
-        """Read the message of a device, see :func:`known_ranges`."""
-        return cls(read_capabilities(message), known_ranges(message))
-
-    @classmethod
-    def from_ranges(cls, ranges: Ranges) -> GimbalModel:
-        """Return a gimbal that is stabilised and points to any attitude within the ranges."""
-        capabilities = mavlink.GIMBAL_DEVICE_CAP_FLAGS_HAS_NEUTRAL
-        if not ranges[2].is_fixed:
-            capabilities |= mavlink.GIMBAL_DEVICE_CAP_FLAGS_HAS_YAW_FOLLOW
-        for range_, *flags in zip(ranges, HAS_AXIS, HAS_LOCK, strict=True):
-            capabilities |= 0 if range_.is_fixed else sum(flags)
-        return cls(capabilities, ranges)
-
-    def lacks(self, flags: int) -> int:
-        """Return the flags that the gimbal cannot follow."""
-        return sum(flag for flag, needed in _NEEDED.items()
-                   if flags & flag and self.capabilities and not self.capabilities & needed)
-
-    def accepts_earth_frame(self, reported: int | None) -> bool:
-        """
-        Return whether the gimbal accepts a yaw relative to north.
-
-        :param reported: the flags that the device reports now, None if it reports none.
-        """
-        if reported is not None and names_frame(reported):
-            return bool(reported & mavlink.GIMBAL_DEVICE_FLAGS_ACCEPTS_YAW_IN_EARTH_FRAME)
-        return not self.capabilities or bool(
-            self.capabilities & mavlink.GIMBAL_DEVICE_CAP_FLAGS_SUPPORTS_YAW_IN_EARTH_FRAME)
 
 
 class Refused(ValueError):
@@ -131,7 +72,7 @@ class Setpoint(NamedTuple):
     :param flags: GIMBAL_DEVICE_FLAGS.
     :param frame: of its yaw.
     :param angles: roll, pitch, yaw, rad. In a request NaN leaves an axis as it is; after
-        :func:`resolve` all are NaN for a pose, or where only the rates count.
+        :meth:`resolved` all are NaN for a pose, or where only the rates count.
     :param rates: of the axes, rad/s; NaN where none is given.
     :param turning: the rates at which the manager turns the angles, rad/s.
     :param since: when the angles apply, s.
@@ -177,7 +118,45 @@ class Setpoint(NamedTuple):
     @property
     def device_flags(self) -> int:
         """Return the flags for the device."""
-        return self.operation | self.frame.flag
+        return self.flags & _PASSED_BITS | self.frame.flag
+
+    def resolved(self, current: Vector, now: float, *, turns: bool) -> Setpoint:
+        """
+        Return the setpoint that this request makes.
+
+        :param current: the angles, in the frame of the request, of axes without an angle; not used
+            for a pose or, unless ``turns``, for rates only.
+        :param turns: whether the manager must turn the gimbal where only rates are given.
+        """
+        if self.is_pose:
+            return self._replace(angles=UNSET_VECTOR, rates=UNSET_VECTOR, since=now)
+        if self.has_all_angles:
+            return self._replace(since=now)
+        known = [rate if math.isfinite(rate) else 0.0 for rate in self.rates]
+        if self.has_rates_only and not turns:
+            return self._replace(rates=_vector(known), since=now)
+        angles, rates, turning = zip(*(
+            (angle, rate, 0.0) if math.isfinite(angle) else (old, math.nan, known_rate)
+            for angle, rate, old, known_rate in zip(
+                self.angles, self.rates, current, known, strict=True)), strict=True)
+        return self._replace(
+            angles=_vector(angles), rates=_vector(rates), turning=_vector(turning), since=now)
+
+    def stopped(self) -> Setpoint:
+        """Return the setpoint that ends the motion of this one."""
+        return self._replace(
+            turning=STILL, rates=STILL if self.has_rates_only else UNSET_VECTOR)
+
+    def offsets(self, limit: float) -> Vector:
+        """Return what a player in secondary control adds by it, rad, each within the limit."""
+        return _vector([Range(-limit, limit).clip(angle) if math.isfinite(angle) else 0.0
+                        for angle in self.angles])
+
+    def in_vehicle_frame(self, heading: float) -> Setpoint:
+        """Return it with its yaw relative to the vehicle instead of north."""
+        return self._replace(
+            frame=YawFrame.VEHICLE, flags=self.flags & ~mavlink.GIMBAL_DEVICE_FLAGS_YAW_LOCK,
+            angles=turned_by(self.angles, -heading))
 
     @classmethod
     def _checked(cls, flags: int, angles: Vector, rates: Vector) -> Setpoint:
@@ -189,10 +168,12 @@ class Setpoint(NamedTuple):
         """
         # The definitions of the angles have no larger values. So a larger one is an error, and to
         # subtract turns from it would turn the gimbal to a pose that no player has requested.
-        if any(abs(angle) > math.pi + _TOLERANCE for angle in angles):
-            raise ValueError('an angle is beyond 180 degrees')
-        if any(abs(rate) > RATE_LIMIT for rate in rates):
-            raise ValueError(f'a rate is beyond {RATE_LIMIT:.4f} rad/s')
+        for values, limit, error in (
+                (angles, math.pi + _TOLERANCE, 'an angle is beyond 180 degrees'),
+                (rates, RATE_LIMIT, f'a rate is beyond {RATE_LIMIT:.4f} rad/s')):
+            for value in values:
+                if abs(value) > limit:
+                    raise ValueError(error)
         return cls(flags, yaw_frame(flags), angles, rates)
 
     @classmethod
@@ -222,27 +203,6 @@ class Setpoint(NamedTuple):
         roll = math.nan if math.isnan(pitch) and math.isnan(yaw) else 0.0
         return cls._checked(flags, (roll, pitch, yaw), (math.nan, pitch_rate, yaw_rate))
 
-    @classmethod
-    def from_manual_control(
-        cls, message: gimbal.GimbalManagerSetManualControl, ranges: Ranges,
-    ) -> Setpoint:
-        """
-        Read GIMBAL_MANAGER_SET_MANUAL_CONTROL: shares of the ranges, and of :data:`MANUAL_RATE`.
-
-        :raises ValueError: if a value is beyond -1..1; also see :meth:`_checked`.
-        """
-        values = message.pitch, message.yaw, message.pitch_rate, message.yaw_rate
-        if any(abs(value) > 1 for value in values):
-            raise ValueError('a deflection is beyond -1 and 1')
-
-        def share(value: float, range_: Range) -> float:
-            return value * (min(range_.high, math.pi) if value > 0
-                            else -max(range_.low, -math.pi))
-
-        return cls.from_pitch_yaw(
-            message.flags, share(message.pitch, ranges[1]), share(message.yaw, ranges[2]),
-            message.pitch_rate * MANUAL_RATE, message.yaw_rate * MANUAL_RATE)
-
 
 # A message that sets the attitude of a gimbal.
 AnySetpoint = (gimbal.GimbalManagerSetAttitude | gimbal.GimbalManagerSetPitchyaw
@@ -257,15 +217,23 @@ def read_setpoint(message: AnySetpoint, ranges: Ranges) -> Setpoint:
     """
     if isinstance(message, gimbal.GimbalManagerSetAttitude):
         return Setpoint.from_attitude(message, ranges)
+    values = message.pitch, message.yaw, message.pitch_rate, message.yaw_rate
     if isinstance(message, gimbal.GimbalManagerSetManualControl):
-        return Setpoint.from_manual_control(message, ranges)
-    return Setpoint.from_pitch_yaw(
-        message.flags, message.pitch, message.yaw, message.pitch_rate, message.yaw_rate)
+        # Shares of the ranges, and of a rate.
+        if any(abs(value) > 1 for value in values):
+            raise ValueError('a deflection is beyond -1 and 1')
+        pitch, yaw = (value * (min(range_.high, math.pi) if value > 0
+                               else -max(range_.low, -math.pi))
+                      for value, range_ in zip(values[:2], ranges[1:], strict=True))
+        values = pitch, yaw, values[2] * MANUAL_RATE, values[3] * MANUAL_RATE
+    return Setpoint.from_pitch_yaw(message.flags, *values)
 
 
 def _are_within(angles: Sequence[float], ranges: Sequence[Range]) -> bool:
-    return all(range_.low <= angle <= range_.high
-               for angle, range_ in zip(angles, ranges, strict=True))
+    for angle, range_ in zip(angles, ranges, strict=True):
+        if not range_.low <= angle <= range_.high:
+            return False
+    return True
 
 
 def _nearest_reading(angles: Vector, ranges: Ranges) -> Vector:
@@ -285,41 +253,6 @@ def _nearest_reading(angles: Vector, ranges: Ranges) -> Vector:
         abs(range_.clip(angle) - angle) for angle, range_ in zip(one[:2], ranges, strict=False)))
 
 
-def resolve(request: Setpoint, current: Vector, now: float, *, turns: bool) -> Setpoint:
-    """
-    Return the setpoint that a request makes.
-
-    :param current: the angles, in the frame of the request, of axes without an angle; not used for
-        a pose or, unless ``turns``, for rates only.
-    :param turns: whether the manager must turn the gimbal where only rates are given.
-    """
-    if request.is_pose:
-        return request._replace(angles=UNSET_VECTOR, rates=UNSET_VECTOR, since=now)
-    if request.has_all_angles:
-        return request._replace(since=now)
-    known = [rate if math.isfinite(rate) else 0.0 for rate in request.rates]
-    if request.has_rates_only and not turns:
-        return request._replace(rates=_vector(known), since=now)
-    angles, rates, turning = zip(*(
-        (angle, rate, 0.0) if math.isfinite(angle) else (old, math.nan, known_rate)
-        for angle, rate, old, known_rate in zip(
-            request.angles, request.rates, current, known, strict=True)), strict=True)
-    return request._replace(
-        angles=_vector(angles), rates=_vector(rates), turning=_vector(turning), since=now)
-
-
-def stopped(setpoint: Setpoint) -> Setpoint:
-    """Return the setpoint that ends the motion of another one."""
-    rates = STILL if setpoint.has_rates_only else UNSET_VECTOR
-    return setpoint._replace(turning=STILL, rates=rates)
-
-
-def nudge(request: Setpoint, limit: float) -> Vector:
-    """Return the offsets that a player in secondary control adds, rad, each within the limit."""
-    return _vector([Range(-limit, limit).clip(angle) if math.isfinite(angle) else 0.0
-                    for angle in request.angles])
-
-
 class Clipped(NamedTuple):
     """An angle beyond the range of its axis, rad: as requested, and the limit."""
 
@@ -337,7 +270,7 @@ def turned(
 
     The other parameters are those of :func:`clip`.
     """
-    if offsets == STILL == setpoint.turning or not setpoint.has_all_angles:
+    if not setpoint.has_all_angles:
         return setpoint
     elapsed = now - setpoint.since
     roll, pitch, yaw = (
@@ -417,13 +350,6 @@ def _nearest(
 
     angle = math.remainder(angle, math.tau)
     return min((angle, angle + math.tau, angle - math.tau), key=distance)
-
-
-def in_vehicle_frame(setpoint: Setpoint, heading: float) -> Setpoint:
-    """Return a setpoint with its yaw relative to the vehicle instead of north."""
-    return setpoint._replace(
-        frame=YawFrame.VEHICLE, flags=setpoint.flags & ~mavlink.GIMBAL_DEVICE_FLAGS_YAW_LOCK,
-        angles=turned_by(setpoint.angles, -heading))
 
 
 def turned_by(angles: Vector, yaw: float) -> Vector:

@@ -29,14 +29,11 @@ import math
 from .client import GimbalClient
 from .gimbal import GimbalSettings
 from .manager import GimbalManager, ManagerSettings
-from .manager_setpoint import AnySetpoint
 from ..mavlink import messages as mav
 from ..mavlink.command_receiver import CommandReceiver
-from ..mavlink.command_sender import Command, CommandSender, CommandStatus
-from ..mavlink.component import HEARTBEAT_INTERVAL, Payload
-from ..mavlink.dialect import mavlink
+from ..mavlink.command_sender import Command, CommandSender
+from ..mavlink.component import Component, Payload
 from ..mavlink.messages import AnyCommand
-from ..payload.messages import GimbalDeviceAttitudeStatus
 
 _FOR_CLIENT = frozenset(GimbalClient.messages)
 
@@ -58,29 +55,28 @@ class ManagerWithClient(Payload):
         self._reports: deque[mav.Message] = deque()
         self.manager = GimbalManager(commands, settings, reported=self._reports.append)
         self._commands = commands
-        self._own = CommandSender(commands.address, commands.timeout, commands.retries)
-        self.client = GimbalClient(self._own, client)
+        own = CommandSender(commands.address, commands.timeout, commands.retries)
+        self.client = GimbalClient(own, client)
+        # It is given no messages: it would drop those of its own address.
+        self._component = Component(own, [self.client])
         self._received = CommandReceiver(commands.address)
-        self._heartbeat_due = math.inf
 
     def link_opened(self, now: float) -> None:
         """See :meth:`Payload.link_opened`."""
-        self._heartbeat_due = min(self._heartbeat_due, now)
+        self._component.link_opened(now)
         self.manager.link_opened(now)
 
     def link_closed(self, now: float, reason: str) -> None:
         """See :meth:`Payload.link_closed`."""
-        self._heartbeat_due = math.inf
-        self._own.end_all(now, CommandStatus.LINK_LOST)
         self.manager.link_closed(now, reason)
-        self.client.link_closed(now, reason)
+        self._component.link_closed(now, reason)
 
     def components_lost(
         self, lost: Collection[mav.Address], now: float, reason: str,
     ) -> None:
         """See :meth:`Payload.components_lost`."""
         self.manager.components_lost(lost, now, reason)
-        self.client.components_lost(lost, now, reason)
+        self._component.components_lost(lost, now, reason)
 
     def may_send_at_end(self, sent: Command | mav.Message) -> bool:
         """See :meth:`Payload.may_send_at_end`."""
@@ -89,20 +85,16 @@ class ManagerWithClient(Payload):
     def close(self, now: float) -> None:
         """See :meth:`Payload.close`."""
         self.manager.close(now)
-        self._own.close(now, self.client.may_send_at_end, self._commands.refusal)
-        self.client.close(now)
+        self._component.close(now, self._commands.refusal)
 
     def receive(self, source: mav.Address, message: mav.Message, now: float) -> None:
         """See :meth:`Payload.receive`."""
         if isinstance(message, mav.CommandAck):
-            self._own.acknowledge(source, message, now)
+            self._component.commands.acknowledge(source, message, now)
         else:
             self.manager.receive(source, message, now)
             if source == self.manager.tracker.device and type(message) in _FOR_CLIENT:
                 self.client.receive(source, message, now)
-        # A setpoint causes no message for the client.
-        if not isinstance(message, AnySetpoint):
-            self._exchange(now)
 
     def receive_conflicting(self, message: mav.Message, now: float) -> None:
         """See :meth:`Payload.receive_conflicting`."""
@@ -112,49 +104,36 @@ class ManagerWithClient(Payload):
         self, source: mav.Address, command: AnyCommand, now: float,
     ) -> int | None:
         """See :meth:`Payload.execute`."""
-        result = self.manager.execute(source, command, now)
-        self._exchange(now)
-        return result
-
-    def take_attitude(self, status: GimbalDeviceAttitudeStatus, now: float) -> None:
-        """See :meth:`GimbalManager.take_attitude`."""
-        self.manager.take_attitude(status, now)
-        self._exchange(now)
+        return self.manager.execute(source, command, now)
 
     def poll(self, now: float) -> None:
         """See :meth:`Payload.poll`."""
-        if now >= self._heartbeat_due:
-            self._heartbeat_due = now + HEARTBEAT_INTERVAL
-            alive = mav.heartbeat(mavlink.MAV_TYPE_ONBOARD_CONTROLLER)
-            self.client.receive(self._commands.address, alive, now)
-            self.manager.receive(self._commands.address, alive, now)
         self.manager.poll(now)
-        self._own.poll(now)
-        self.client.poll(now)
-        self._exchange(now)
-
-    def next_deadline(self) -> float:
-        """See :meth:`Payload.next_deadline`."""
-        if self._own.outgoing:
-            return -math.inf
-        return min(self._heartbeat_due, self.manager.next_deadline(), self.client.next_deadline(),
-                   self._own.next_deadline())
-
-    def _exchange(self, now: float) -> None:
-        """Pass the messages of manager and client to each other until neither has one."""
-        while self._reports or self._own.outgoing:
+        self._component.poll(now)
+        # Pass the messages of manager and client to each other until neither has one.
+        outgoing = self._component.outgoing
+        while self._reports or outgoing:
             if self._reports:
                 self.client.receive(self._commands.address, self._reports.popleft(), now)
             else:
-                self._deliver(*self._own.outgoing.popleft(), now)
+                self._deliver(*outgoing.popleft(), now)
+
+    def next_deadline(self) -> float:
+        """See :meth:`Payload.next_deadline`."""
+        if self._reports or self._component.outgoing:
+            return -math.inf
+        return min(self.manager.next_deadline(), self._component.next_deadline())
 
     def _deliver(self, source: mav.Address, message: mav.Message, now: float) -> None:
         """Give a message of the client to the manager, or send it to another component."""
-        if mav.target_of(message) != self._commands.address:
+        if isinstance(message, mav.Heartbeat):
+            self._reports.append(message)
+            self.manager.receive(source, message, now)
+        elif mav.target_of(message) != self._commands.address:
             self._commands.send(message)
         elif isinstance(message, AnyCommand):
             ack = self._received.take(source, message, now, self.manager.execute)
             if ack is not None:
-                self._own.acknowledge(source, ack, now)
+                self._component.commands.acknowledge(source, ack, now)
         else:
             self.manager.receive(source, message, now)

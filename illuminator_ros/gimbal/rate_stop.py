@@ -41,20 +41,16 @@ class TurningDetector:
         """Compare later attitudes only."""
         self._seen = None
 
-    def turns(
-        self, status: GimbalDeviceAttitudeStatus, attitude: MountAttitude | None, now: float,
-    ) -> bool | None:
-        """
-        Return whether the device turns, None if that is not known yet.
-
-        :param attitude: in the status, None if it has none.
-        """
+    def turns(self, status: GimbalDeviceAttitudeStatus, now: float) -> bool | None:
+        """Return whether the device turns, None if that is not known yet."""
         rates = rates_of(status)
         if any(abs(rate) > TURNING for rate in rates):
             return True
         if all(map(math.isfinite, rates)):
             return False
-        if attitude is None:
+        try:
+            attitude = MountAttitude.from_status(status)
+        except ValueError:
             return None
         if self._seen is None or self._seen[0].frame is not attitude.frame:
             self._seen = attitude, now
@@ -111,11 +107,7 @@ class RateStop:
         """Take a status of the device."""
         if not self.is_running:
             return
-        try:
-            attitude = MountAttitude.from_status(status)
-        except ValueError:
-            attitude = None
-        turns = self._detector.turns(status, attitude, now)
+        turns = self._detector.turns(status, now)
         # An earlier status may be older than the zero.
         if turns is False and now >= self._begun + ATTITUDE_SPACING:
             self._end(True)

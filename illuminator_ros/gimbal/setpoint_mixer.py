@@ -17,35 +17,23 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import dataclass
 import functools
 import math
+from typing import TypeAlias
 
-from . import manager_events as events
 from .axes import LEVEL
 from .managed_device import ManagedDevice
-from .manager_setpoint import (
-    clip,
-    Clipped,
-    direction,
-    in_vehicle_frame,
-    nudge,
-    Refused,
-    resolve,
-    Setpoint,
-    stopped,
-    turned,
-    turned_by,
-)
+from .manager_setpoint import clip, Clipped, direction, Refused, Setpoint, turned, turned_by
 from .manager_state import ManagerState, StateTracker
 from .messages import GimbalDeviceSetAttitude
 from .rate_stop import RateStop
 from .vehicle_state import VehicleState
 from ..mavlink.command_sender import CommandSender
 from ..mavlink.dialect import mavlink, short_names
-from ..mavlink.messages import time_boot_ms
-from ..payload.messages import GeoPoint, GimbalDeviceAttitudeStatus
+from ..payload.messages import GeoPoint
 from ..payload.mount_attitude import AXES, STILL, UNSET_QUATERNION, YawFrame
-from ..payload.rotation import Quaternion, Vector
+from ..payload.rotation import Vector
 
 # s between repetitions of a constant setpoint, at most 1 s by the specification; and between
 # setpoints that follow a place, the vehicle or a rate.
@@ -55,6 +43,45 @@ FOLLOW_INTERVAL = 0.05
 # leap after a pause of the process.
 STEP_LIMIT = 0.1
 HEADING_UNKNOWN = 'the heading of the vehicle is unknown'
+
+
+@dataclass(frozen=True)
+class AnglesClipped:
+    """Angles beyond the ranges of the device are clipped; once for an axis and a setpoint."""
+
+    clipped: tuple[Clipped, ...]
+
+
+@dataclass(frozen=True)
+class SetpointSent:
+    """A device without MAVLink must take a setpoint, which is mixed and clipped."""
+
+    setpoint: Setpoint
+
+
+@dataclass(frozen=True)
+class ReferenceLost:
+    """
+    The gimbal no longer follows its region of interest, or a yaw relative to north.
+
+    :param unknown: the unknown value of the vehicle: ``position`` or ``heading``.
+    """
+
+    unknown: str
+
+
+@dataclass(frozen=True)
+class RateStopped:
+    """
+    A rate has ended, since the manager gives no more setpoints.
+
+    :param stands: whether an attitude has shown in time that the device stands.
+    """
+
+    stands: bool
+
+
+SetpointEvent: TypeAlias = AnglesClipped | SetpointSent | ReferenceLost | RateStopped
 
 
 class SetpointMixer:
@@ -71,7 +98,7 @@ class SetpointMixer:
 
     def __init__(
         self, device: ManagedDevice, vehicle: VehicleState, tracker: StateTracker,
-        commands: CommandSender, emit: Callable[[events.ManagerEvent], None],
+        commands: CommandSender, emit: Callable[[SetpointEvent], None],
     ) -> None:
         self.current: Setpoint | None = None
         self.sent: Setpoint | None = None
@@ -106,7 +133,7 @@ class SetpointMixer:
         """
         self.due = math.inf
         if forget:
-            self.current = (stopped(self.current) if self.current and self.current.has_rates_only
+            self.current = (self.current.stopped() if self.current and self.current.has_rates_only
                             else None)
             self._roi, self._offsets = None, STILL
             self.clipped, self._reported = (), {}
@@ -117,24 +144,24 @@ class SetpointMixer:
         zero = self.current
         if zero is not None and zero.has_rates_only:
             zero = (zero if zero.frame is YawFrame.VEHICLE or self._device.accepts_earth_frame(now)
-                    else in_vehicle_frame(zero, 0.0))
+                    else zero.in_vehicle_frame(0.0))
             self.rate_stop.begin(functools.partial(self._give, zero), now, was_sent=was_sent)
 
     def _rate_stopped(self, stands: bool) -> None:
         if stands:
             self.current = None
-        self._emit(events.RateStopped(stands))
+        self._emit(RateStopped(stands))
 
     # Players
 
     def set(self, request: Setpoint, now: float) -> None:  # noqa: A003
         """Follow a request of the player in primary control; :raises Refused: if it cannot."""
-        if lacking := self._device.model.lacks(request.flags):
+        if lacking := self._device.lacks(request.flags):
             names = (name for flag, name in short_names('GIMBAL_DEVICE_FLAGS').items()
                      if flag & lacking)
             raise Refused(f'the gimbal does not have {", ".join(names)}')
-        self.current = resolve(
-            request, self._start(request, now), now, turns=not self._tracker.has_mavlink)
+        self.current = request.resolved(
+            self._start(request, now), now, turns=not self._tracker.has_mavlink)
         self._roi = None
         self._send(now)
 
@@ -147,7 +174,7 @@ class SetpointMixer:
         """
         if request.is_pose or not request.has_angles:
             raise Refused('secondary control adds angles only')
-        self._offsets = nudge(request, limit)
+        self._offsets = request.offsets(limit)
         self._send(now)
 
     def end_offsets(self, now: float, *, keep: bool) -> None:
@@ -164,7 +191,7 @@ class SetpointMixer:
         """End rates and the region of interest: the gimbal stays where it points."""
         self._roi = None
         self._turn(now)
-        self.current = self.current and stopped(self.current)
+        self.current = self.current and self.current.stopped()
         self._send(now)
 
     def close(self, now: float) -> None:
@@ -174,48 +201,38 @@ class SetpointMixer:
             self._end_rate(now, was_sent=True)
         self.current, self.due = None, math.inf
 
-    def point(self, place: GeoPoint, now: float, *, is_relative: bool) -> None:
+    def point(self, roi: tuple[GeoPoint, bool] | None, now: float) -> None:
         """
-        Follow a place.
+        Follow a place, None for none any more.
 
-        :param is_relative: whether its altitude is relative to the home position.
+        :param roi: the place, and whether its altitude is relative to the home position.
         :raises Refused: if position or heading of the vehicle are unknown.
         """
+        self._roi = None if roi is None else self._known_place(*roi, now)
+        self.poll(now)
+
+    def _known_place(self, place: GeoPoint, is_relative: bool, now: float) -> GeoPoint:
         above = self._vehicle.home_altitude if is_relative else 0.0
-        if above is None or self._vehicle.position(now) is None or (
+        if above is None or self._vehicle.position.get(now) is None or (
                 self._device.heading(now) is None
                 and not self._device.accepts_earth_frame(now)):
             raise Refused('the position or the heading of the vehicle is unknown',
                           mavlink.MAV_RESULT_TEMPORARILY_REJECTED)
-        self._roi = place._replace(altitude=place.altitude + above)
-        self.poll(now)
-
-    def end_place(self, now: float) -> None:
-        """Follow no place any more."""
-        self._roi = None
-        self._send(now)
+        return place._replace(altitude=place.altitude + above)
 
     def poll(self, now: float) -> None:
         """Send the setpoint, which follows the region of interest if there is one."""
         if self._roi is not None:
-            position = self._vehicle.position(now)
+            position = self._vehicle.position.get(now)
             self._note_lost('position', is_lost=position is None)
             if position and (angles := direction(position, self._roi)) is not None:
                 lock = mavlink.GIMBAL_DEVICE_FLAGS_YAW_LOCK
                 self.current = Setpoint(
-                    LEVEL | (lock & ~self._device.model.lacks(lock)), YawFrame.EARTH,
+                    LEVEL | (lock & ~self._device.lacks(lock)), YawFrame.EARTH,
                     (0.0, *angles), since=now)
         self._send(now)
 
     # The path to the device
-
-    def as_status(self, now: float) -> GimbalDeviceAttitudeStatus:
-        """Return the setpoint as the attitude of a device that reports none."""
-        sent, heading = self.sent, self._vehicle.heading(now)
-        return GimbalDeviceAttitudeStatus(
-            0, 0, time_boot_ms(now), mavlink.GIMBAL_DEVICE_FLAGS_YAW_IN_VEHICLE_FRAME,
-            sent and sent.attitude or Quaternion(), math.nan, math.nan, math.nan, 0,
-            math.nan if heading is None else heading, math.nan)
 
     def _start(self, request: Setpoint, now: float) -> Vector:
         """Return the angles that a request changes; :raises Refused: if they are unknown."""
@@ -236,7 +253,7 @@ class SetpointMixer:
             angles, known = self.current.angles, self.current.frame
         elif reported := self._device.pointing(now):
             angles, known = reported
-        elif self.sent is not None or self._device.has_reported:
+        elif self.sent is not None or self._device.newest is not None:
             raise Refused('the attitude of the gimbal is unknown')
         if known is frame:
             return angles
@@ -253,10 +270,11 @@ class SetpointMixer:
 
     def _turn(self, now: float, offsets: Vector = STILL) -> None:
         """Turn the setpoint by the rates that the device does not follow, and by offsets."""
-        if (before := self.current) is not None:
+        before = self.current
+        if before is not None and not offsets == STILL == before.turning:
             self.current = turned(
                 before._replace(since=max(before.since, now - STEP_LIMIT)), now,
-                self._device.model.ranges, self._ahead(before, now), offsets, self.clipped)
+                self._device.ranges, self._ahead(before, now), offsets, self.clipped)
 
     def _send(self, now: float) -> None:
         """Give the device the setpoint, with everything mixed and clipped."""
@@ -272,7 +290,7 @@ class SetpointMixer:
             FOLLOW_INTERVAL if setpoint.turning != STILL or converts or self._roi is not None
             else HOLD_INTERVAL)
         angles, self.clipped = clip(
-            setpoint, self._device.model.ranges, ahead, self._offsets, self.clipped)
+            setpoint, self._device.ranges, ahead, self._offsets, self.clipped)
         if self.clipped or self._reported:
             self._report_clipped(setpoint)
         sent = setpoint if angles is setpoint.angles else setpoint._replace(angles=angles)
@@ -280,14 +298,14 @@ class SetpointMixer:
         if converts:
             if ahead is None:
                 return
-            sent = in_vehicle_frame(sent, ahead)
+            sent = sent.in_vehicle_frame(ahead)
         self._give(sent)
 
     def _give(self, sent: Setpoint) -> None:
         """Give the device a setpoint."""
         self.sent = sent
         if not self._tracker.has_mavlink:
-            self._emit(events.SetpointSent(sent))
+            self._emit(SetpointSent(sent))
         elif self._tracker.device is not None:
             self._commands.send(GimbalDeviceSetAttitude(
                 *self._tracker.device, sent.device_flags, sent.attitude or UNSET_QUATERNION,
@@ -304,10 +322,10 @@ class SetpointMixer:
                           if request == requests[axis]}
         if new := tuple(one for one in self.clipped if one.axis not in self._reported):
             self._reported |= {one.axis: requests[one.axis] for one in new}
-            self._emit(events.AnglesClipped(new))
+            self._emit(AnglesClipped(new))
 
     def _note_lost(self, name: str, *, is_lost: bool) -> None:
         """Report once that a value of the vehicle, which the setpoint needs, is unknown."""
         if is_lost and name not in self._lost:
-            self._emit(events.ReferenceLost(name))
+            self._emit(ReferenceLost(name))
         self._lost = self._lost | {name} if is_lost else self._lost - {name}

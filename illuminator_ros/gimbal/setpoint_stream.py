@@ -27,7 +27,6 @@ from ..mavlink.dialect import mavlink
 from ..payload.confirmed_command import Result
 from ..payload.messages import GimbalDeviceAttitudeStatus
 from ..payload.mount_attitude import (
-    MountAttitude,
     STILL,
     to_mavlink,
     UNSET_QUATERNION,
@@ -101,20 +100,20 @@ class SetpointStream:
     :param make: returns the message of a setpoint.
     :param send: sends a message.
     :param timeout: from the last rate until a rate of zero is sent.
-    :param requested_frame: returns the yaw frame of a request that is under way, and since when.
+    :param pose_since: returns since when a request for a pose is under way, -inf if none is.
     :ivar sent: the number of messages.
     """
 
     def __init__(
         self, make: Callable[[YawFrame, Wxyz, Vector], GimbalManagerSetAttitude],
         send: Callable[[GimbalManagerSetAttitude], None], timeout: float,
-        requested_frame: Callable[[], tuple[YawFrame | None, float]],
+        pose_since: Callable[[], float],
     ) -> None:
         self.sent = 0
         self._make = make
         self._send_message = send
         self._timeout = timeout
-        self._requested_frame = requested_frame
+        self._pose_since = pose_since
         self._last: _Setpoint | None = None
         # The setpoint that the last request of each kind has suspended, and its place.
         self._suspended: dict[SuspendedBy, tuple[_Setpoint | None, _Setpoint]] = {}
@@ -156,10 +155,11 @@ class SetpointStream:
 
     def _yaw_frame(self, now: float) -> YawFrame:
         """Return the yaw frame that rates keep, which implies the yaw lock."""
-        requested, since = self._requested_frame()
+        since = self._pose_since()
         if since <= self._attitude_at > now - LOCK_DELAY:
             return self._attitude_frame
-        return requested or self._reported_frame
+        # The flags of a pose clear the lock.
+        return YawFrame.VEHICLE if since > -math.inf else self._reported_frame
 
     def suspend(self, now: float, kind: SuspendedBy, *, is_place: bool = False) -> None:
         """
@@ -204,43 +204,30 @@ class SetpointStream:
         assert self._last is not None
         self._last.due.insert(0, now + ATTITUDE_SPACING)
 
-    @property
-    def stands(self) -> bool:
-        """Whether an attitude has shown since the last zero that the gimbal stands."""
-        return self._last is not None and self._last.stands
-
-    def forget(self) -> None:
-        """Note that the gimbal follows no setpoint any more: the last zero has arrived."""
-        self._last = None
+    def forget_zero(self) -> bool:
+        """Forget the last zero if an attitude has shown since that the gimbal stands."""
+        has_arrived = self._last is not None and self._last.stands
+        if has_arrived:
+            self._last = None
+        return has_arrived
 
     def end(self, now: float) -> None:
         """Repeat no attitude, and end a rate or a place with a zero once it can be sent."""
         if self._last is not None and self._last.kind is not Kind.ZERO:
             self._last.due = [now] if self._last.moves else []
 
-    def control_lost(self) -> None:
+    def control_changed(self, *, is_lost: bool) -> None:
         """
-        Send nothing any more: another component has control.
+        Send nothing while another component has control; owe a zero to a gimbal that may turn.
 
-        If a rate lasts until this component has control again, it ends with a zero.
+        It is sent once this component has control, if the device then turns. Where this component
+        finds itself in control, a process before this one, with its address, had it: it was
+        killed, or it would have released control.
         """
-        if self._last and self._last.may_have_rate:
-            self._owe_zero()
-        else:
-            self._last = None
-
-    def control_found(self) -> None:
-        """
-        End a rate that lasts: a process before this one, with its address, had control.
-
-        It was killed, or it would have released control.
-        """
-        if self._last is None:
-            self._owe_zero()
-
-    def _owe_zero(self) -> None:
-        """Send a zero once this component has control, if the device then turns."""
-        self._last = _Setpoint(Kind.ZERO, due=[-math.inf] * len(REPEATS))
+        if not is_lost and self._last is not None:
+            return
+        owes = not is_lost or self._last is not None and self._last.may_have_rate
+        self._last = _Setpoint(Kind.ZERO, due=[-math.inf] * len(REPEATS)) if owes else None
 
     def control_unknown(self, now: float, *, can_send: bool, is_heard: bool) -> None:
         """
@@ -259,13 +246,11 @@ class SetpointStream:
             last.due.clear()
 
     def reported(
-        self, status: GimbalDeviceAttitudeStatus, attitude: MountAttitude | None, now: float, *,
-        may_send: bool,
+        self, status: GimbalDeviceAttitudeStatus, now: float, *, may_send: bool,
     ) -> None:
         """
         Take a status of the device, and send a zero again if the device still turns.
 
-        :param attitude: in the status, None if it has none.
         :param may_send: whether this component has control, and no request is under way, which may
             turn the gimbal.
         """
@@ -274,7 +259,7 @@ class SetpointStream:
         zero = self._last
         if not may_send or zero is None or zero.kind is not Kind.ZERO or not zero.due:
             return
-        turns = self._detector.turns(status, attitude, now)
+        turns = self._detector.turns(status, now)
         if now < zero.due[0]:
             return
         if turns is not None:

@@ -112,8 +112,10 @@ class MountProperties(GimbalMechanics, simulated.Properties):
     The properties of a simulated gimbal, with or without a manager of its own.
 
     :param status_interval: s between messages with its attitude.
+    :param device_id: gimbal_device_id of its messages, 0 for a component of its own.
     """
 
+    device_id: int = 0
     vendor: str = setting('illuminator_ros', 'TEXT', 'vendor_name', text)
     model: str = setting('simulator', 'TEXT', 'model_name', text)
     custom_name: str = setting('', 'TEXT', 'custom_name', text)
@@ -145,45 +147,64 @@ class GimbalProperties(MountProperties):
         return Address(self.address.system, self.manager_id) if self.manager_id else None
 
 
-class SimulatedMount:
-    """
-    The gimbal of a device, or of a manager that is its own device: its motion and its reports.
+def _turn(device: Any, words: list[str], now: float) -> simulated.Effect:
+    pitch, yaw = (math.radians(_degrees(word)) for word in words)
+    return partial(device.motion.turn, pitch, yaw, now)
 
-    :param device_id: gimbal_device_id of its messages, 0 for a component of its own.
+
+COMMANDS: tuple[simulated.ConsoleCommand[Any, simulated.Effect], ...] = (
+    simulated.ConsoleCommand('turn PITCH YAW', 'turn it by hand, degrees, relative to horizon '
+                             'and vehicle', _turn),
+)
+
+
+class SimulatedMount(simulated.SimulatedDevice):
+    """
+    The motion of a gimbal and its reports, for a device and for a manager that is its own device.
+
+    :ivar motion: of its axes.
     """
 
-    def __init__(
-        self, properties: MountProperties, behaviour: GimbalBehaviour, device_id: int, now: float,
-    ) -> None:
-        self.motion = GimbalMotion(properties, now)
-        self._properties = properties
-        self._device_id = device_id
+    commands = COMMANDS
+    properties: MountProperties
+    behaviour: GimbalBehaviour
+
+    def restart(self, now: float) -> None:
+        """See :meth:`SimulatedDevice.restart`."""
+        self.motion = GimbalMotion(self.properties, now)
         self._booted_at = now
         self._first_flags = self.motion.flags
         self._informed = self._reported = 0
-        self.behave(behaviour, now)
+        self.behave(self.behaviour, now)
+
+    def behave(self, behaviour: Behaviour, now: float) -> None:
+        """See :meth:`SimulatedDevice.behave`."""
+        super().behave(behaviour, now)
+        self.motion.advance(now)
+        self.motion.fail(self.behaviour.frozen_axis, limited=self.behaviour.limits_range)
+
+    def reports(self) -> Mapping[type[Message], simulated.Report]:
+        """See :meth:`SimulatedDevice.reports`."""
+        return {
+            GimbalDeviceAttitudeStatus: simulated.Report(
+                self.status, self.properties.status_interval),
+            gimbal.GimbalDeviceInformation: simulated.Report(self._information)}
 
     def uptime_ms(self, now: float) -> int:
         """Return the time since the start, ms, wrapping as the field does."""
         return time_boot_ms(now - self._booted_at)
 
-    def behave(self, behaviour: GimbalBehaviour, now: float) -> None:
-        """Behave differently from now on."""
-        self._behaviour = behaviour
-        self.motion.advance(now)
-        self.motion.fail(behaviour.frozen_axis, limited=behaviour.limits_range)
-
     def obey(self, setpoint: Setpoint, now: float) -> None:
         """Take a setpoint, see :meth:`GimbalMotion.obey`."""
         stop = setpoint.has_rates_only and not any(
             rate for rate in setpoint.rates if math.isfinite(rate))
-        if not self._behaviour.ignores_changes and (self._behaviour.stops or not stop):
+        if not self.behaviour.ignores_changes and (self.behaviour.stops or not stop):
             self.motion.obey(setpoint, now)
 
     @property
     def flags(self) -> int:
         """Return the flags of the setpoint as they are reported."""
-        return self._first_flags if self._behaviour.frozen_flags else self.motion.flags
+        return self._first_flags if self.behaviour.frozen_flags else self.motion.flags
 
     def status(self, now: float, failures: int = 0) -> GimbalDeviceAttitudeStatus | None:
         """
@@ -191,7 +212,7 @@ class SimulatedMount:
 
         :param failures: GIMBAL_DEVICE_ERROR_FLAGS besides the flags of the axes.
         """
-        behaviour, motion = self._behaviour, self.motion
+        behaviour, motion = self.behaviour, self.motion
         if not behaviour.reports:
             return None
         motion.advance(now)
@@ -204,7 +225,7 @@ class SimulatedMount:
             # In older devices YAW_LOCK also selects the frame.
             frame = yaw_frame(flags)
         if behaviour.accepts_earth_always or known and (
-                self._properties.capabilities
+                self.properties.capabilities
                 & mavlink.GIMBAL_DEVICE_CAP_FLAGS_SUPPORTS_YAW_IN_EARTH_FRAME):
             flags |= mavlink.GIMBAL_DEVICE_FLAGS_ACCEPTS_YAW_IN_EARTH_FRAME
         q = motion.attitude(frame)
@@ -219,22 +240,21 @@ class SimulatedMount:
             0, 0, self.uptime_ms(now), flags, q, roll_rate, pitch_rate,
             yaw_rate + (turning if frame is YawFrame.EARTH else 0.0),
             failures | behaviour.false_flags, motion.vehicle.yaw if known else math.nan, turning,
-            self._device_id)
+            self.properties.device_id)
 
     def limits(self) -> Mapping[str, float]:
         """Return the fields roll_min to yaw_max of an INFORMATION message."""
-        fields = range_fields(self._properties.ranges)
-        if self._behaviour.limits_in_degrees:
+        fields = range_fields(self.properties.ranges)
+        if self.behaviour.limits_in_degrees:
             fields = {name: math.degrees(value) for name, value in fields.items()}
         self._informed += 1
-        return fields if self._behaviour.static_information else {
+        return fields if self.behaviour.static_information else {
             **fields, 'pitch_max': fields['pitch_max'] + 0.01 * self._informed}
 
-    def information(self, now: float) -> gimbal.GimbalDeviceInformation | None:
-        """Return the INFORMATION of a device, None if it sends none."""
-        if not self._behaviour.identifies:
+    def _information(self, now: float) -> gimbal.GimbalDeviceInformation | None:
+        properties, capabilities = self.properties, self.properties.capabilities
+        if not self.behaviour.identifies:
             return None
-        properties, capabilities = self._properties, self._properties.capabilities
         vendor, model, custom = (
             name.encode()[:31] for name in (
                 properties.vendor, properties.model, properties.custom_name))
@@ -243,8 +263,8 @@ class SimulatedMount:
         return gimbal.GimbalDeviceInformation(
             self.uptime_ms(now), vendor, model, custom, version, version,
             properties.address.system << 8 | properties.address.component,
-            capabilities & 0xFFFF, 0, **self.limits(),
-            gimbal_device_id=self._device_id, cap_flags2=capabilities)
+            capabilities & 0xFFFF, 0, **self.limits(), gimbal_device_id=properties.device_id,
+            cap_flags2=capabilities)
 
     def describe(self, now: float, *notes: str) -> simulated.Snapshot:
         """Return the actual state of this moment, for people."""
@@ -260,18 +280,7 @@ class SimulatedMount:
             (*shown, motion.moving), motion.travelled / TRAVEL_STEP)
 
 
-def _turn(device: Any, words: list[str], now: float) -> simulated.Effect:
-    pitch, yaw = (math.radians(_degrees(word)) for word in words)
-    return partial(device.mount.motion.turn, pitch, yaw, now)
-
-
-COMMANDS: tuple[simulated.ConsoleCommand[Any, simulated.Effect], ...] = (
-    simulated.ConsoleCommand('turn PITCH YAW', 'turn it by hand, degrees, relative to horizon '
-                             'and vehicle', _turn),
-)
-
-
-class SimulatedGimbal(simulated.SimulatedDevice):
+class SimulatedGimbal(SimulatedMount):
     """
     A simulated gimbal device, without the link: see :class:`SimulatedDevice`.
 
@@ -282,40 +291,21 @@ class SimulatedGimbal(simulated.SimulatedDevice):
         gimbal.GimbalManagerInformation, gimbal.GimbalManagerStatus,
         gimbal.GimbalDeviceSetAttitude, gimbal.AutopilotStateForGimbalDevice,
         gimbal.GimbalManagerSetAttitude)
-    sends = (GimbalDeviceAttitudeStatus, gimbal.GimbalDeviceInformation)
     faults = FAULTS
-    commands = COMMANDS
     properties: GimbalProperties
-    behaviour: GimbalBehaviour
-
-    def __init__(self, properties: GimbalProperties) -> None:
-        super().__init__(properties)
-        self.restart(0.0)
 
     def restart(self, now: float) -> None:
         """See :meth:`SimulatedDevice.restart`; it forgets its manager."""
-        self.mount = SimulatedMount(self.properties, self.behaviour, 0, now)
+        super().restart(now)
         self.manager = self.properties.manager
         self._announced_at = now
 
-    def behave(self, behaviour: Behaviour, now: float) -> None:
-        """See :meth:`SimulatedDevice.behave`."""
-        super().behave(behaviour, now)
-        self.mount.behave(self.behaviour, now)
-
-    def streams(self) -> Mapping[int, float]:
-        """See :meth:`SimulatedDevice.streams`."""
-        return {GimbalDeviceAttitudeStatus.id: self.properties.status_interval}
-
-    def message(self, message_id: int, now: float) -> Message | None:
-        """See :meth:`SimulatedDevice.message`."""
-        if message_id == GimbalDeviceAttitudeStatus.id:
-            self._expire(now)
-            return self.mount.status(
-                now, 0 if self.manager else mavlink.GIMBAL_DEVICE_ERROR_FLAGS_NO_MANAGER)
-        if message_id == gimbal.GimbalDeviceInformation.id:
-            return self.mount.information(now)
-        return None
+    def status(self, now: float, failures: int = 0) -> GimbalDeviceAttitudeStatus | None:
+        """See :class:`SimulatedMount`."""
+        self._expire(now)
+        if not self.manager:
+            failures |= mavlink.GIMBAL_DEVICE_ERROR_FLAGS_NO_MANAGER
+        return super().status(now, failures)
 
     def receive(self, source: Address, message: Message, now: float) -> Iterable[Message]:
         """See :meth:`SimulatedDevice.receive`."""
@@ -346,7 +336,7 @@ class SimulatedGimbal(simulated.SimulatedDevice):
         except ValueError:
             return
         # An angular velocity of 0 means unknown.
-        self.mount.motion.take_heading(
+        self.motion.take_heading(
             roll, pitch, yaw, message.angular_velocity_z or math.nan, now)
 
     def _obey(
@@ -357,15 +347,15 @@ class SimulatedGimbal(simulated.SimulatedDevice):
             setpoint = Setpoint.from_attitude(message)
         except ValueError:
             return
-        if setpoint.frame is YawFrame.VEHICLE or self.mount.motion.heading_known(now):
-            self.mount.obey(setpoint, now)
+        if setpoint.frame is YawFrame.VEHICLE or self.motion.heading_known(now):
+            self.obey(setpoint, now)
 
     def snapshot(self, now: float) -> simulated.Snapshot:
         """See :meth:`SimulatedDevice.snapshot`."""
         self._expire(now)
-        return self.mount.describe(
+        return self.describe(
             now, f'manager {self.manager}' if self.manager else 'no manager',
-            '' if self.mount.motion.heading_known(now) else 'heading unknown')
+            '' if self.motion.heading_known(now) else 'heading unknown')
 
 
 SIMULATED = simulated.SimulatedType(

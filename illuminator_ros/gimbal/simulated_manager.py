@@ -33,20 +33,19 @@ from . import messages as gimbal
 from .axes import LEVEL, Range
 from .manager_setpoint import AnySetpoint, direction, read_roi, read_setpoint, Refused, Setpoint
 from .messages import DEVICE_ID_PARAM, NO_COMPONENT
-from .simulated_device import COMMANDS, GimbalBehaviour, MountProperties, SimulatedMount
+from .simulated_device import GimbalBehaviour, MountProperties, SimulatedMount
 from ..mavlink.dialect import mavlink, replaced
 from ..mavlink.messages import Address, AnyCommand, Message, params_of
 from ..payload.messages import (
     Attitude,
     GeoPoint,
-    GimbalDeviceAttitudeStatus,
     GlobalPositionInt,
     is_plausible,
     place_of,
 )
 from ..payload.mount_attitude import UNSET_VECTOR, YawFrame
 from ..simulation import simulated
-from ..simulation.faults import Behaviour, fault, FaultTable
+from ..simulation.faults import fault, FaultTable
 from ..simulation.settings import geo_point, integer, number, setting
 
 # s between messages with the state of the manager ("Gimbal Manager Status").
@@ -159,7 +158,7 @@ PROFILES = {
 }
 
 
-class SimulatedManager(simulated.SimulatedDevice):
+class SimulatedManager(SimulatedMount):
     """
     A simulated gimbal with a manager, without the link: see :class:`SimulatedDevice`.
 
@@ -170,57 +169,44 @@ class SimulatedManager(simulated.SimulatedDevice):
     messages = (
         gimbal.GimbalManagerSetAttitude, gimbal.GimbalManagerSetPitchyaw,
         gimbal.GimbalManagerSetManualControl, Attitude, GlobalPositionInt)
-    sends = (gimbal.GimbalManagerInformation, gimbal.GimbalManagerStatus,
-             GimbalDeviceAttitudeStatus, gimbal.GimbalDeviceInformation)
     changes = frozenset(DEVICE_ID_PARAM)
     faults = FAULTS
-    commands = COMMANDS
     properties: ManagerProperties
     behaviour: ManagerBehaviour
 
     def __init__(self, properties: ManagerProperties) -> None:
         super().__init__(properties)
         self._position = properties.position
-        self.restart(0.0)
 
     def restart(self, now: float) -> None:
         """See :meth:`SimulatedDevice.restart`; no component has control."""
+        super().restart(now)
         self.primary = self.secondary = NO_COMPONENT
         self._roi: GeoPoint | None = None
         self._base = UNSET_VECTOR
-        self.mount = SimulatedMount(
-            self.properties, self.behaviour, self.properties.device_id, now)
-        self.mount.motion.take_heading(
+        self.motion.take_heading(
             0.0, 0.0, math.radians(self.properties.heading), 0.0, now, math.inf)
 
-    def behave(self, behaviour: Behaviour, now: float) -> None:
-        """See :meth:`SimulatedDevice.behave`."""
-        super().behave(behaviour, now)
-        self.mount.behave(self.behaviour, now)
+    def reports(self) -> Mapping[type[Message], simulated.Report]:
+        """See :meth:`SimulatedDevice.reports`."""
+        return {gimbal.GimbalManagerStatus: simulated.Report(
+                    self._manager_status, STATUS_INTERVAL),
+                gimbal.GimbalManagerInformation: simulated.Report(self._manager_information),
+                **super().reports()}
 
-    def streams(self) -> Mapping[int, float]:
-        """See :meth:`SimulatedDevice.streams`."""
-        return {gimbal.GimbalManagerStatus.id: STATUS_INTERVAL,
-                GimbalDeviceAttitudeStatus.id: self.properties.status_interval}
+    def _manager_status(self, now: float) -> gimbal.GimbalManagerStatus | None:
+        flags = self.flags if self.behaviour.shows_flags else LEVEL
+        primary, secondary = (
+            (NO_COMPONENT, NO_COMPONENT) if self.behaviour.frozen_control
+            else (self.primary, self.secondary))
+        return gimbal.GimbalManagerStatus(
+            self.uptime_ms(now), int(flags), self.properties.device_id, *primary, *secondary,
+        ) if self.behaviour.reports else None
 
-    def message(self, message_id: int, now: float) -> Message | None:
-        """See :meth:`SimulatedDevice.message`."""
-        behaviour, mount, device_id = self.behaviour, self.mount, self.properties.device_id
-        if message_id == gimbal.GimbalManagerStatus.id and behaviour.reports:
-            flags = mount.flags if behaviour.shows_flags else LEVEL
-            control = (NO_COMPONENT, NO_COMPONENT) if behaviour.frozen_control else (
-                self.primary, self.secondary)
-            return gimbal.GimbalManagerStatus(
-                mount.uptime_ms(now), int(flags), device_id, *control[0], *control[1])
-        if message_id == gimbal.GimbalManagerInformation.id and behaviour.identifies:
-            return gimbal.GimbalManagerInformation(
-                mount.uptime_ms(now), int(self.properties.capabilities), device_id,
-                **mount.limits())
-        if message_id == GimbalDeviceAttitudeStatus.id:
-            return mount.status(now)
-        if message_id == gimbal.GimbalDeviceInformation.id:
-            return mount.information(now)
-        return None
+    def _manager_information(self, now: float) -> gimbal.GimbalManagerInformation | None:
+        return gimbal.GimbalManagerInformation(
+            self.uptime_ms(now), int(self.properties.capabilities), self.properties.device_id,
+            **self.limits()) if self.behaviour.identifies else None
 
     # Setpoints
 
@@ -239,7 +225,7 @@ class SimulatedManager(simulated.SimulatedDevice):
     def _take_vehicle(self, message: Attitude | GlobalPositionInt, now: float) -> None:
         if isinstance(message, Attitude):
             if is_plausible(message):
-                self.mount.motion.take_heading(
+                self.motion.take_heading(
                     message.roll, message.pitch, message.yaw, message.yawspeed, now, math.inf)
         else:
             self._position = place_of(message)
@@ -288,7 +274,7 @@ class SimulatedManager(simulated.SimulatedDevice):
         else:
             self._base = setpoint.angles
         self._roi = None
-        self.mount.obey(setpoint, now)
+        self.obey(setpoint, now)
 
     # Commands
 
@@ -374,11 +360,11 @@ class SimulatedManager(simulated.SimulatedDevice):
     def _clear_roi(self, now: float) -> None:
         # "After this command the gimbal manager should ... assume a neutral position."
         self._roi = None
-        self.mount.obey(Setpoint(mavlink.GIMBAL_DEVICE_FLAGS_NEUTRAL | LEVEL), now)
+        self.obey(Setpoint(mavlink.GIMBAL_DEVICE_FLAGS_NEUTRAL | LEVEL), now)
 
     def _point_at_roi(self, now: float) -> None:
         if self._roi is not None and (angles := direction(self._position, self._roi)):
-            self.mount.obey(Setpoint(
+            self.obey(Setpoint(
                 LEVEL | mavlink.GIMBAL_DEVICE_FLAGS_YAW_LOCK, YawFrame.EARTH, (0.0, *angles)), now)
 
     def snapshot(self, now: float) -> simulated.Snapshot:
@@ -386,7 +372,7 @@ class SimulatedManager(simulated.SimulatedDevice):
         control = ', '.join(
             f'{name} {one}' for name, one in (
                 ('primary', self.primary), ('secondary', self.secondary)) if one != NO_COMPONENT)
-        return self.mount.describe(
+        return self.describe(
             now, control or 'no control', 'region of interest' if self._roi else '')
 
 

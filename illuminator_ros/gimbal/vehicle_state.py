@@ -51,7 +51,7 @@ class _Latest(Generic[T]):
         # Of ROS, and of the link.
         self._values: list[tuple[T | None, float]] = [(None, -math.inf)] * 2
 
-    def set(self, value: T, now: float, *, link: bool) -> None:  # noqa: A003
+    def set(self, value: T, now: float, *, link: bool = False) -> None:  # noqa: A003
         self._values[link] = value, now
 
     def get(self, now: float) -> T | None:
@@ -67,57 +67,40 @@ class VehicleState:
 
     Values of the link's autopilot take precedence over values from ROS. A value older than
     :data:`MAX_AGE` is unknown.
+
+    :ivar attitude: with the rate about the down axis, rad/s, NaN if unknown.
+    :ivar position: its place.
+    :ivar home_altitude: of the home position, m above mean sea level, None if unknown.
     """
 
     def __init__(self) -> None:
-        self._attitude: _Latest[Quaternion] = _Latest()
-        self._yaw_rate: _Latest[float] = _Latest()
+        self.attitude: _Latest[tuple[Quaternion, float]] = _Latest()
         self._velocity: _Latest[Vector] = _Latest()
-        self._position: _Latest[GeoPoint] = _Latest()
-        self._home_altitude: float | None = None
+        self.position: _Latest[GeoPoint] = _Latest()
+        self.home_altitude: float | None = None
         self._autopilot_at = self._sent_at = -math.inf
 
     def take(self, message: Attitude | GlobalPositionInt, now: float) -> None:
         """Take a message of the autopilot; ignore values that cannot be right, or no position."""
         if isinstance(message, Attitude):
-            if not (is_plausible(message) and is_rate(message.yawspeed)):
-                return
-            self._attitude.set(Quaternion.from_euler(
-                message.roll, message.pitch, message.yaw), now, link=True)
-            self._yaw_rate.set(message.yawspeed, now, link=True)
+            if is_plausible(message) and is_rate(message.yawspeed):
+                self.attitude.set((Quaternion.from_euler(
+                    message.roll, message.pitch, message.yaw), message.yawspeed), now, link=True)
         elif is_place(message):
-            self._position.set(place_of(message), now, link=True)
+            self.position.set(place_of(message), now, link=True)
             self._velocity.set(
                 (message.vx / 100, message.vy / 100, message.vz / 100), now, link=True)
-            self._home_altitude = (message.alt - message.relative_alt) / 1e3
-
-    def set_attitude(self, attitude: Quaternion, yaw_rate: float, now: float) -> None:
-        """Take an attitude from ROS, with the rate about the down axis, rad/s, NaN if unknown."""
-        self._attitude.set(attitude, now, link=False)
-        self._yaw_rate.set(yaw_rate, now, link=False)
+            self.home_altitude = (message.alt - message.relative_alt) / 1e3
 
     def set_velocity(self, velocity: Vector, now: float) -> None:
         """Take a velocity from ROS, m/s, unless it is not finite."""
         if all(map(math.isfinite, velocity)):
-            self._velocity.set(velocity, now, link=False)
-
-    def set_position(self, position: GeoPoint, now: float) -> None:
-        """Take a position from ROS."""
-        self._position.set(position, now, link=False)
+            self._velocity.set(velocity, now)
 
     def heading(self, now: float) -> float | None:
         """Return the yaw from north, rad, None if it is unknown."""
-        attitude = self._attitude.get(now)
-        return None if attitude is None else attitude.euler()[2]
-
-    def position(self, now: float) -> GeoPoint | None:
-        """Return the position, None if it is unknown."""
-        return self._position.get(now)
-
-    @property
-    def home_altitude(self) -> float | None:
-        """Return the altitude of the home position, m above mean sea level, None if unknown."""
-        return self._home_altitude
+        known = self.attitude.get(now)
+        return known and known[0].euler()[2]
 
     def autopilot_sent(self, now: float) -> None:
         """Note that an autopilot has sent AUTOPILOT_STATE_FOR_GIMBAL_DEVICE."""
@@ -129,13 +112,12 @@ class VehicleState:
 
         :return: None if an autopilot sends it, it was just sent, or the attitude is unknown.
         """
-        attitude, velocity = self._attitude.get(now), self._velocity.get(now)
-        if (attitude is None or now < self._autopilot_at + AUTOPILOT_SILENCE
+        known, velocity = self.attitude.get(now), self._velocity.get(now)
+        if (known is None or now < self._autopilot_at + AUTOPILOT_SILENCE
                 or now < self._sent_at + AUTOPILOT_INTERVAL):
             return None
         self._sent_at = now
-        yaw_rate = self._yaw_rate.get(now)
+        attitude, yaw_rate = known
         return AutopilotStateForGimbalDevice(
             *device, int(now * 1e6), attitude, 0, *(velocity or (math.nan,) * 3), 0, math.nan,
-            ESTIMATES_ATTITUDE | (ESTIMATES_VELOCITY if velocity else 0), 0,
-            math.nan if yaw_rate is None else yaw_rate)
+            ESTIMATES_ATTITUDE | (ESTIMATES_VELOCITY if velocity else 0), 0, yaw_rate)

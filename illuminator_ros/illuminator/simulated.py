@@ -26,7 +26,7 @@ from functools import partial
 import math
 
 from . import model
-from .messages import IlluminatorStatus, STATUS_ID
+from .messages import IlluminatorStatus
 from .simulated_properties import FAULTS, IlluminatorBehaviour, IlluminatorProperties, PROFILES
 from .thermal import ThermalModel, ThermalProperties
 from ..mavlink import messages as mav
@@ -39,6 +39,7 @@ from ..simulation.simulated import (
     ConsoleCommand,
     Effect,
     Reply,
+    Report,
     SimulatedDevice,
     SimulatedType,
     Snapshot,
@@ -87,7 +88,6 @@ class SimulatedIlluminator(SimulatedDevice):
 
     changes = frozenset({mavlink.MAV_CMD_ILLUMINATOR_ON_OFF,
                          mavlink.MAV_CMD_DO_ILLUMINATOR_CONFIGURE})
-    sends = (IlluminatorStatus, mav.ComponentInformationBasic)
     faults = FAULTS
     commands = COMMANDS
     properties: IlluminatorProperties
@@ -97,7 +97,6 @@ class SimulatedIlluminator(SimulatedDevice):
         super().__init__(properties)
         self.thermal = ThermalModel(properties.thermal, properties.ambient)
         self.thermal.set_sensor_failed(self.behaviour.thermistor_failed)
-        self.restart(0.0)
 
     def behave(self, behaviour: Behaviour, now: float) -> None:
         """See :meth:`SimulatedDevice.behave`."""
@@ -113,17 +112,10 @@ class SimulatedIlluminator(SimulatedDevice):
         self._booted_at = now
         self._warmed_at = now
 
-    def streams(self) -> Mapping[int, float]:
-        """See :meth:`SimulatedDevice.streams`."""
-        return {STATUS_ID: self.properties.status_interval}
-
-    def message(self, message_id: int, now: float) -> mav.Message | None:
-        """See :meth:`SimulatedDevice.message`."""
-        if message_id == STATUS_ID:
-            return self.status(now)
-        if message_id == mav.INFORMATION_ID and self.behaviour.identifies:
-            return self._information(now)
-        return None
+    def reports(self) -> Mapping[type[mav.Message], Report]:
+        """See :meth:`SimulatedDevice.reports`."""
+        return {IlluminatorStatus: Report(self.status, self.properties.status_interval),
+                mav.ComponentInformationBasic: Report(self._information)}
 
     def uptime_ms(self, now: float) -> int:
         """Return the time since the start, ms, wrapping as the field does."""
@@ -148,8 +140,10 @@ class SimulatedIlluminator(SimulatedDevice):
             strobe_range.min_strobe_period, strobe_range.max_strobe_period)
         return IlluminatorStatus(*fields, *self.properties.extension)
 
-    def _information(self, now: float) -> mav.ComponentInformationBasic:
+    def _information(self, now: float) -> mav.ComponentInformationBasic | None:
         behaviour, properties = self.behaviour, self.properties
+        if not behaviour.identifies:
+            return None
 
         def string(text: str, size: int) -> bytes:
             if behaviour.padding:

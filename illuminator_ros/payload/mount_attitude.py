@@ -52,11 +52,9 @@ class YawFrame(Enum):
     @property
     def flag(self) -> int:
         """Return the flag of messages that name the frame."""
-        return _FLAGS[self]
+        return _EARTH_BIT if self is YawFrame.EARTH else _VEHICLE_BIT
 
 
-_FLAGS = {YawFrame.EARTH: mavlink.GIMBAL_DEVICE_FLAGS_YAW_IN_EARTH_FRAME,
-          YawFrame.VEHICLE: mavlink.GIMBAL_DEVICE_FLAGS_YAW_IN_VEHICLE_FRAME}
 _EARTH_BIT = mavlink.GIMBAL_DEVICE_FLAGS_YAW_IN_EARTH_FRAME
 _VEHICLE_BIT = mavlink.GIMBAL_DEVICE_FLAGS_YAW_IN_VEHICLE_FRAME
 _LOCK_BIT = mavlink.GIMBAL_DEVICE_FLAGS_YAW_LOCK

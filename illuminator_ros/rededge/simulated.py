@@ -341,7 +341,6 @@ class SimulatedRedEdge(simulated.SimulatedDevice):
         self.images: deque[Image] = deque(maxlen=MAX_IMAGES)
         # Unix time at 0 on the link's clock.
         self._epoch = 0.0
-        self.restart(0.0)
 
     def restart(self, now: float) -> None:
         """See :meth:`SimulatedDevice.restart`; its own GPS has a fix at once."""

@@ -264,6 +264,15 @@ def finite(number: float) -> float | None:
     return number if abs(number) < 1e9 else None
 
 
+def numbers(typed: str, count: int) -> list[float]:
+    """Return finite numbers that were typed, empty if there are not so many."""
+    try:
+        found = [float(word) for word in typed.replace(',', ' ').split()]
+    except ValueError:
+        return []
+    return found if len(found) == count and all(map(math.isfinite, found)) else []
+
+
 def measured(value: float | None, unit: str, form: str = '.3g') -> str:
     """Return a number with its unit."""
     return UNKNOWN if value is None else f'{value:{form}} {unit}'

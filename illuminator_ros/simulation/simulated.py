@@ -60,6 +60,18 @@ class CommandReply(NamedTuple):
 Reply = CommandReply | None
 
 
+class Report(NamedTuple):
+    """
+    A message that a device sends on request, or as a stream.
+
+    :param make: returns the message of a moment, None if the device does not have it.
+    :param interval: of its stream by default, s, 0 for none; None if it cannot be streamed.
+    """
+
+    make: Callable[[float], Message | None]
+    interval: float | None = None
+
+
 class Snapshot(NamedTuple):
     """
     The state of a simulated device or component at a moment, for people.
@@ -127,7 +139,7 @@ class SimulatedDevice(ABC):
 
     :ivar records: rows of the payload's :class:`RecordType`.
     :cvar messages: the classes of the messages that it takes, besides commands.
-    :cvar sends: the classes of its messages.
+    :cvar sends: the classes of its messages, besides :meth:`reports`.
     :cvar changes: the MAV_CMDs that change its state.
     :cvar faults: the faults that it can have.
     :cvar commands: changes by a person, on the console.
@@ -143,6 +155,7 @@ class SimulatedDevice(ABC):
         self.properties = properties
         self.behaviour = self.normal = properties.behaviour
         self.records: Listeners[Sequence[str]] = Listeners()
+        self.restart(0.0)
 
     def behave(self, behaviour: Behaviour, now: float) -> None:
         """Behave differently from now on."""
@@ -154,13 +167,19 @@ class SimulatedDevice(ABC):
     def set_clock(self, unix_time: float, now: float) -> None:  # noqa: B027 - optional
         """Take the time of day (s, UTC), as from a GPS receiver of its own."""
 
+    def reports(self) -> Mapping[type[Message], Report]:
+        """Return the messages that it sends on request or as a stream."""
+        return {}
+
     def streams(self) -> Mapping[int, float]:
         """Return the default interval (s, 0 for none) of each streamed message, by message id."""
-        return {}
+        return {cls.id: one.interval for cls, one in self.reports().items()
+                if one.interval is not None}
 
     def message(self, message_id: int, now: float) -> Message | None:
         """Return a message of this moment, None if the device does not have it."""
-        return None
+        return next((one.make(now) for cls, one in self.reports().items()
+                     if cls.id == message_id), None)
 
     def receive(self, source: Address, message: Message, now: float) -> Iterable[Message]:
         """Take a message of one of the classes of ``messages``; return the messages to send."""
@@ -567,7 +586,8 @@ class SimulatedComponents(Endpoint, Generic[D]):
         self._peers: set[Address] = set()
         self.components = [SimulatedComponent(one, now, self.outgoing) for one in devices]
         self.sends = tuple(dict.fromkeys(
-            cls for one in self.components for cls in one.device.sends))
+            cls for one in self.components
+            for cls in (*one.device.sends, *one.device.reports())))
         self.messages = tuple(dict.fromkeys((
             messages.Heartbeat, messages.CommandLong, messages.CommandInt,
             *(cls for one in self.components for cls in one.device.messages))))

@@ -66,14 +66,14 @@ def dazzling(seen: list[Configuration]) -> list[Configuration]:
 def test_checks_that_need_consent_are_skipped_without_it_and_change_nothing(kind: str) -> None:
     one = start(kind, consent=False)
     if 'gimbal' in kind:
-        one.device.mount.motion.turn(-0.5, 0.4, one.link.now)
+        one.device.motion.turn(-0.5, 0.4, one.link.now)
     one.finish()
     assert {found.requirement.name for found in one.runner.results
             if 'not agreed to; see --yes' in found.detail
             } == {found.name for found in one.checks.requirements if found.needs_consent}
     assert one.runner.passed
     if 'gimbal' in kind:
-        assert one.device.mount.motion.angles == (0.0, -0.5, 0.4)
+        assert one.device.motion.angles == (0.0, -0.5, 0.4)
         assert getattr(one.device, 'primary', Address(0, 0)) == Address(0, 0)
     if kind == 'rededge':
         assert not one.device.images
@@ -170,7 +170,7 @@ def test_a_light_that_its_brightness_switches_on_does_not_get_back_a_brightness_
 def test_a_gimbal_that_turns_beyond_its_range_is_stopped_and_ends_the_run(kind: str) -> None:
     one = start(kind, 'no-limits')
     one.link.run_until(lambda: one.session.danger, within=200.0)
-    motion, stopped = one.device.mount.motion, one.device.mount.motion.angles
+    motion, stopped = one.device.motion, one.device.motion.angles
     one.finish()
     assert one.failed == {'range'}
     assert 'beyond its range of pitch, -120.0 to 45.0 deg' in one.result('range').detail

@@ -251,14 +251,14 @@ def _moves_when_unset(one: ChecksRun) -> None:
     def moved(original: Any, demand: Setpoint, *others: Any) -> None:
         unset = all(map(math.isnan, (*demand.angles, *demand.rates))) and not demand.is_pose
         original(Setpoint(angles=(0.0, 0.5, 0.0)) if unset else demand, *others)
-    _wrap(one.device.mount, 'obey', moved)
+    _wrap(one.device, 'obey', moved)
 
 
 def _turns_with_the_vehicle(one: ChecksRun) -> None:
     def turned(original: Any, demand: Setpoint, *others: Any) -> None:
         original(demand._replace(angles=(0.0, -0.26, 0.5)) if (
             demand.flags & mavlink.GIMBAL_DEVICE_FLAGS_YAW_LOCK) else demand, *others)
-    _wrap(one.device.mount, 'obey', turned)
+    _wrap(one.device, 'obey', turned)
 
 
 def _forgets_at_minus_1(one: ChecksRun) -> None:
@@ -443,7 +443,7 @@ def test_an_accepted_change_passes_where_the_light_reports_no_status() -> None:
 def test_the_heading_of_another_component_leaves_north_unchecked() -> None:
     names = {'north-needs-heading', 'earth-frame', 'yaw-lock'}
     one = start('gimbal', only=tuple(names))
-    one.device.mount.motion.take_heading(0.0, 0.0, 0.3, 0.0, one.link.now, math.inf)
+    one.device.motion.take_heading(0.0, 0.0, 0.3, 0.0, one.link.now, math.inf)
     assert one.finish().names(SKIPPED) == names
 
 

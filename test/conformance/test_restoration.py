@@ -98,7 +98,7 @@ def test_a_device_that_cannot_be_restored_is_reported_with_its_former_state() ->
     assert not light.runner.passed
 
     gimbal = start('gimbal')
-    gimbal.device.mount.motion.turn(-0.5, 0.0, gimbal.link.now)
+    gimbal.device.motion.turn(-0.5, 0.0, gimbal.link.now)
     gimbal.link.run(15.0)
     gimbal.fault('lie')
     assert gimbal.finish().runner.restored == (
@@ -121,7 +121,7 @@ def test_a_light_that_reports_no_status_is_not_changed() -> None:
 @pytest.mark.parametrize('after', [5.0, 12.0, 20.0, 31.0])
 def test_an_interrupted_run_turns_the_gimbal_back(kind: str, after: float) -> None:
     one = start(kind)
-    motion = one.device.mount.motion
+    motion = one.device.motion
     motion.turn(-0.5, 0.4, one.link.now)
     one.link.run(after)
     one.interrupt()
@@ -143,7 +143,7 @@ def test_control_is_given_back_to_the_player_that_had_it() -> None:
 @pytest.mark.parametrize('kind', ['gimbal', 'gimbal_manager'])
 def test_a_gimbal_keeps_its_yaw_lock(kind: str) -> None:
     one = start(kind, drift=0.0)
-    motion, lock = (one.device.mount.motion, mavlink.GIMBAL_DEVICE_FLAGS_YAW_LOCK
+    motion, lock = (one.device.motion, mavlink.GIMBAL_DEVICE_FLAGS_YAW_LOCK
                     | mavlink.GIMBAL_DEVICE_FLAGS_PITCH_LOCK)
     motion.obey(Setpoint(lock, angles=(0.0, -0.2, 0.1)), one.link.now)
     one.finish()

@@ -97,14 +97,14 @@ def test_attitudes_without_an_id_of_two_gimbals_are_named_as_the_reason() -> Non
     numbered = [FakeManager(device_id=number, attitude_number=0) for number in (1, 2)]
     rig = Rig(*numbered).run(3.0)
 
-    assert {one.unreachable(rig.now) for one in rig.client.gimbals.values()} == {
+    assert {one.reports.unreachable(rig.now) for one in rig.client.gimbals.values()} == {
         '1/1 has several gimbals and sends attitudes without gimbal_device_id, so they cannot be '
         'told apart'}
 
     for manager in numbered:
         manager.attitude_number = manager.device_id
     rig.run(1.0)
-    assert {one.unreachable(rig.now) for one in rig.client.gimbals.values()} == {''}
+    assert {one.reports.unreachable(rig.now) for one in rig.client.gimbals.values()} == {''}
 
 
 def test_attitude_of_a_device_that_sends_its_component_id_as_its_id_is_its_own() -> None:

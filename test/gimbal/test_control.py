@@ -45,13 +45,17 @@ import pytest
 from support.gimbals import (
     ALL,
     AUTOPILOT,
+    clear_roi,
     DEVICE,
     FakeManager,
     in_control,
     OTHER,
     OURS,
     PLACE,
+    retract,
     Rig,
+    set_neutral,
+    set_yaw_lock,
 )
 
 CONFIGURE = mavlink.MAV_CMD_DO_GIMBAL_MANAGER_CONFIGURE
@@ -124,7 +128,7 @@ def test_gm_16_control_that_no_status_shows_is_not_a_success(
 
     assert not success
     assert text in message
-    assert not rig.gimbal.in_control
+    assert not rig.gimbal.reports.in_control
 
 
 def test_control_that_was_requested_may_be_there_until_the_manager_has_refused_it() -> None:
@@ -185,7 +189,7 @@ def test_gm_16_of_requests_for_control_that_overlap_the_last_one_decides(
     assert [one.success for one in rig.results] == [False, True]
     assert rig.results[0].message == f'superseded by {last}'
     assert rig.results[1].message.startswith(f'{last}, confirmed')
-    assert rig.gimbal.in_control is (asks[1] is Gimbal.take_control)
+    assert rig.gimbal.reports.in_control is (asks[1] is Gimbal.take_control)
 
 
 def test_gm_18_a_request_ends_with_the_manager_that_got_it() -> None:
@@ -261,7 +265,7 @@ def test_gm_14_status_counts_unless_it_is_late(before: int, after: int, counts: 
     for time, primary in (before, OTHER), (after, OURS):
         rig.receive(AUTOPILOT, GimbalManagerStatus(time, 0, 154, *primary, 0, 0))
 
-    assert rig.gimbal.in_control is counts
+    assert rig.gimbal.reports.in_control is counts
 
 
 def status_requests(rig: Rig) -> int:
@@ -275,7 +279,7 @@ def test_gm_14_control_is_not_known_without_a_status_though_the_manager_is_heard
 
     rig.managers[0].reports = False
     rig.run(5.5)
-    assert rig.gimbal.in_control
+    assert rig.gimbal.reports.in_control
     assert status_requests(rig) >= 2
     assert rig.gimbal.set_rates((0.0, 0.0, 0.1), rig.now) == ''
     rig.run(0.6)
@@ -285,10 +289,10 @@ def test_gm_14_control_is_not_known_without_a_status_though_the_manager_is_heard
     assert rig.gimbal.set_rates((0.0, 0.0, 0.1), rig.now).startswith(
         'manager 1/1 has sent no GIMBAL_MANAGER_STATUS for 6.')
     rig.managers[0].reports = True
-    assert rig.run(0.5).gimbal.in_control
+    assert rig.run(0.5).gimbal.reports.in_control
 
 
-@pytest.mark.parametrize('ask', [Gimbal.take_control, Gimbal.release_control, Gimbal.clear_roi])
+@pytest.mark.parametrize('ask', [Gimbal.take_control, Gimbal.release_control, clear_roi])
 def test_gm_14_status_is_out_of_date_for_a_call_that_comes_before_the_poll(ask: Ask) -> None:
     rig = in_control()
     rig.now += 60.0
@@ -297,7 +301,7 @@ def test_gm_14_status_is_out_of_date_for_a_call_that_comes_before_the_poll(ask: 
 
     assert rig.results[0].message.startswith(
         'gimbal 1/154 is not connected: nothing from manager 1/1 for 60.')
-    assert not rig.gimbal.in_control
+    assert not rig.gimbal.reports.in_control
 
 
 @pytest.mark.parametrize('beat', [10, 50], ids=['', 'and a heartbeat each 5 s'])
@@ -314,10 +318,10 @@ def test_control_is_known_of_a_manager_that_sends_its_status_on_request_only(bea
 
 def test_control_is_not_known_in_a_silence_of_the_manager_of_a_silent_device() -> None:
     rig = Rig(FakeManager(primary=OURS, device_alive=False)).run(3.0)
-    assert rig.gimbal.in_control
+    assert rig.gimbal.reports.in_control
     rig.managers[0].alive = False
 
-    assert not rig.run(3.5).gimbal.in_control
+    assert not rig.run(3.5).gimbal.reports.in_control
 
 
 @pytest.mark.parametrize(('primary', 'was_lost'), [(OURS, False), (NONE, True), (OTHER, True)])
@@ -326,7 +330,7 @@ def test_control_is_not_known_in_a_silence_and_compared_with_control_before_afte
     rig = in_control()
     rig.managers[0].alive = False
     rig.run(4.0)
-    assert not rig.gimbal.in_control
+    assert not rig.gimbal.reports.in_control
     assert rig.all_of(ControlChanged)[-1] == ControlChanged(
         GimbalKey(DEVICE), Control(OURS), None, False, was_lost=False)
     assert 'not connected: nothing from manager 1/1' in asked(rig, Gimbal.take_control, 0.1)[1]
@@ -348,7 +352,7 @@ def test_control_is_taken_automatically_only_where_no_component_has_it(
     manager = FakeManager(primary=primary, results={CONFIGURE: result})
     rig = Rig(manager, auto_take_control=True).run(5.0)
 
-    assert rig.gimbal.in_control is (primary == NONE and not failures)
+    assert rig.gimbal.reports.in_control is (primary == NONE and not failures)
     assert len(commands(rig, CONFIGURE)) == (primary == NONE)
     assert [event.message for event in rig.all_of(AutomaticTakeFailed)] == failures
 
@@ -365,13 +369,13 @@ def test_gm_19_ardupilot_is_not_taken_for_a_manager_that_enforces_control() -> N
 
 
 FLAG_REQUESTS: list[tuple[Ask, int, bool, int]] = [
-    (Gimbal.set_neutral, mavlink.GIMBAL_DEVICE_FLAGS_NEUTRAL, True,
+    (set_neutral, mavlink.GIMBAL_DEVICE_FLAGS_NEUTRAL, True,
      mavlink.GIMBAL_DEVICE_CAP_FLAGS_HAS_NEUTRAL),
-    (Gimbal.retract, mavlink.GIMBAL_DEVICE_FLAGS_RETRACT, True,
+    (retract, mavlink.GIMBAL_DEVICE_FLAGS_RETRACT, True,
      mavlink.GIMBAL_DEVICE_CAP_FLAGS_HAS_RETRACT),
-    (lambda gimbal, now, done: gimbal.set_yaw_lock(True, now, done),
+    (lambda gimbal, now, done: set_yaw_lock(gimbal, True, now, done),
      mavlink.GIMBAL_DEVICE_FLAGS_YAW_LOCK, True, mavlink.GIMBAL_DEVICE_CAP_FLAGS_HAS_YAW_LOCK),
-    (lambda gimbal, now, done: gimbal.set_yaw_lock(False, now, done),
+    (lambda gimbal, now, done: set_yaw_lock(gimbal, False, now, done),
      mavlink.GIMBAL_DEVICE_FLAGS_YAW_LOCK, False, 0)]
 
 
@@ -460,7 +464,7 @@ def test_of_requests_for_the_yaw_lock_equal_ones_share_the_outcome_and_the_last_
 @pytest.mark.parametrize('later', [
     lambda gimbal, now, done: gimbal.set_rates((0.0, 0.1, 0.0), now),
     lambda gimbal, now, done: gimbal.set_attitude(Quaternion(), YawFrame.VEHICLE, now),
-    Gimbal.set_neutral])
+    set_neutral])
 def test_a_yaw_lock_that_is_not_shown_does_not_stop_a_later_setpoint_or_request(
         later: Ask) -> None:
     rig = in_control(setpoint_timeout=10.0)
@@ -508,7 +512,7 @@ def test_gm_8_place_to_point_at_is_sent_with_full_precision_above_sea_level() ->
     (sent,) = rig.messages(mav.CommandInt)
     assert (sent.command, sent.frame, sent.param1, sent.x, sent.y, sent.z) == (
         195, 0, 154, 473977419, 85455938, 488.5)
-    assert asked(rig, Gimbal.clear_roi)[0]
+    assert asked(rig, clear_roi)[0]
     assert commands(rig, mavlink.MAV_CMD_DO_SET_ROI_NONE) == [(154, 0, 0, 0, 0, 0, 0)]
 
 
@@ -517,7 +521,7 @@ def set_roi(gimbal: Gimbal, now: float, done: Done) -> None:
 
 
 @pytest.mark.parametrize('later', [
-    *(ask for ask, *_ in FLAG_REQUESTS), Gimbal.clear_roi, Gimbal.release_control,
+    *(ask for ask, *_ in FLAG_REQUESTS), clear_roi, Gimbal.release_control,
     lambda gimbal, now, done: gimbal.set_attitude(Quaternion(), YawFrame.VEHICLE, now),
     lambda gimbal, now, done: gimbal.set_rates((0.0, 0.1, 0.0), now)])
 def test_gm_8_place_without_an_answer_is_not_sent_again_after_a_later_setpoint_or_request(
@@ -540,9 +544,9 @@ def test_gm_8_place_without_an_answer_is_not_sent_again_after_a_later_setpoint_o
 def test_of_requests_for_a_pose_that_overlap_the_last_one_decides() -> None:
     rig = in_control()
     rig.managers[0].applies = False
-    Gimbal.set_neutral(rig.gimbal, rig.now, rig.done)
+    set_neutral(rig.gimbal, rig.now, rig.done)
     rig.run(0.1)
-    Gimbal.retract(rig.gimbal, rig.now, rig.done)
+    retract(rig.gimbal, rig.now, rig.done)
     rig.run(0.1)
     rig.managers[0].flags |= mavlink.GIMBAL_DEVICE_FLAGS_RETRACT
 
@@ -566,9 +570,9 @@ def test_of_places_in_a_stream_the_newest_is_sent_once_the_one_before_is_acknowl
 
 
 @pytest.mark.parametrize(('ask', 'command', 'wish'), [
-    (Gimbal.retract, mavlink.MAV_CMD_DO_GIMBAL_MANAGER_PITCHYAW, 'retract'),
+    (retract, mavlink.MAV_CMD_DO_GIMBAL_MANAGER_PITCHYAW, 'retract'),
     (set_roi, mavlink.MAV_CMD_DO_SET_ROI_LOCATION, 'point at 47, 8.5, 500 m'),
-    (Gimbal.clear_roi, mavlink.MAV_CMD_DO_SET_ROI_NONE, 'point at no place')])
+    (clear_roi, mavlink.MAV_CMD_DO_SET_ROI_NONE, 'point at no place')])
 def test_refusal_names_the_request_the_manager_and_who_has_control(
         ask: Ask, command: int, wish: str) -> None:
     rig = in_control()
@@ -596,7 +600,7 @@ def test_refusal_names_the_request_the_manager_and_who_has_control(
 
 @pytest.mark.parametrize(('result', 'zeros'), [
     (mavlink.MAV_RESULT_ACCEPTED, 1), (mavlink.MAV_RESULT_DENIED, 1 + len(REPEATS))])
-@pytest.mark.parametrize('ask', [*(ask for ask, *_ in POSES), Gimbal.clear_roi, set_roi])
+@pytest.mark.parametrize('ask', [*(ask for ask, *_ in POSES), clear_roi, set_roi])
 def test_zero_before_a_request_is_sent_again_only_if_the_request_fails(
         ask: Ask, result: int, zeros: int) -> None:
     rig = in_control()
@@ -613,7 +617,7 @@ def test_zero_before_a_request_is_sent_again_only_if_the_request_fails(
         -0.2, *[0] * zeros]
 
 
-@pytest.mark.parametrize('ask', [Gimbal.clear_roi, Gimbal.set_neutral])
+@pytest.mark.parametrize('ask', [clear_roi, set_neutral])
 def test_zero_is_not_sent_again_while_a_request_has_no_answer(ask: Ask) -> None:
     rig = in_control()
     rig.managers[0].rates = (0.0, -0.2, 0.0)
@@ -626,8 +630,8 @@ def test_zero_is_not_sent_again_while_a_request_has_no_answer(ask: Ask) -> None:
 
 
 @pytest.mark.parametrize('asks', [
-    (set_roi, Gimbal.set_neutral), (Gimbal.clear_roi, Gimbal.set_neutral),
-    (Gimbal.set_neutral, set_roi), (Gimbal.set_neutral, Gimbal.clear_roi)])
+    (set_roi, set_neutral), (clear_roi, set_neutral),
+    (set_neutral, set_roi), (set_neutral, clear_roi)])
 @pytest.mark.parametrize('refusal', [
     mavlink.MAV_RESULT_DENIED, mavlink.MAV_RESULT_TEMPORARILY_REJECTED], ids=['at once', 'later'])
 def test_zero_is_not_sent_again_to_a_gimbal_that_follows_another_request(
@@ -659,14 +663,14 @@ def test_zero_that_has_stopped_the_gimbal_is_not_sent_again_after_a_request() ->
     rig.run(3.0)
     manager.applies, manager.rates = False, (0.0, -0.2, 0.0)
 
-    assert not asked(rig, Gimbal.set_neutral)[0]
+    assert not asked(rig, set_neutral)[0]
 
     rig.run(3.0)
     assert [one.angular_velocity_y for one in rig.messages(GimbalManagerSetAttitude)] == [-0.2, 0]
 
 
 @pytest.mark.parametrize('answers', [True, False])
-@pytest.mark.parametrize('ask', [*(ask for ask, *_ in POSES), Gimbal.clear_roi, set_roi])
+@pytest.mark.parametrize('ask', [*(ask for ask, *_ in POSES), clear_roi, set_roi])
 def test_place_after_a_failed_request_ends_with_the_control_of_the_node(
         ask: Ask, answers: bool) -> None:
     rig = in_control()
@@ -701,7 +705,7 @@ def test_attitude_before_a_refused_request_is_still_the_one_that_angles_change(
 @pytest.mark.parametrize(('primary', 'reason'), [
     (OTHER, 'primary 1/195, secondary none'),
     (NONE, 'primary none, secondary none; take control first')])
-@pytest.mark.parametrize('ask', [*(ask for ask, *_ in FLAG_REQUESTS), Gimbal.clear_roi, set_roi])
+@pytest.mark.parametrize('ask', [*(ask for ask, *_ in FLAG_REQUESTS), clear_roi, set_roi])
 def test_gm_14_request_without_control_is_not_sent_and_tells_who_has_it(
         ask: Ask, primary: mav.Address, reason: str) -> None:
     rig = Rig(FakeManager(primary=primary)).run(3.0)
@@ -722,5 +726,6 @@ def test_gm_28_requests_and_setpoints_name_one_of_the_gimbals_of_a_manager(secon
     rig.run(1.0)
 
     assert rig.results[0].success
-    assert [one.key.device_id for one in rig.client.gimbals.values() if one.in_control] == [second]
+    assert [one.key.device_id for one in rig.client.gimbals.values()
+            if one.reports.in_control] == [second]
     assert (len(first.received), len(other.received)) == (0, 2)

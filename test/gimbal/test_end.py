@@ -17,20 +17,20 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from functools import partial
 import math
 import random
 from typing import Any
 
 from illuminator_ros.gimbal.gimbal import GimbalSettings
-from illuminator_ros.gimbal.manager import GimbalManager, ManagerSettings
-from illuminator_ros.gimbal.manager_events import RequestRefused, SetpointSent
+from illuminator_ros.gimbal.manager import GimbalManager, ManagerSettings, RequestRefused
 from illuminator_ros.gimbal.manager_with_client import ManagerWithClient
 from illuminator_ros.gimbal.messages import (
     GimbalDeviceSetAttitude,
     GimbalManagerSetAttitude,
     REMOVE_SENDER,
 )
-from illuminator_ros.gimbal.setpoint_mixer import HOLD_INTERVAL
+from illuminator_ros.gimbal.setpoint_mixer import HOLD_INTERVAL, SetpointSent
 from illuminator_ros.mavlink import messages as mav
 from illuminator_ros.mavlink.command_sender import CommandSender
 from illuminator_ros.mavlink.component import Component
@@ -51,7 +51,16 @@ from support.gimbal_manager import (
     position,
     region,
 )
-from support.gimbals import FakeManager, OURS, PLACE, Rig
+from support.gimbals import (
+    clear_roi,
+    FakeManager,
+    OURS,
+    PLACE,
+    retract,
+    Rig,
+    set_neutral,
+    set_yaw_lock,
+)
 from support.records import Answer
 
 ENDING = 'the bridge is ending'
@@ -82,8 +91,9 @@ def use(rig: Rig, draw: random.Random) -> list[Answer]:
     """Make a random request or setpoint, as a node does; return the answer that is due."""
     gimbal, now, answer = rig.gimbal, rig.now, Answer(rig.now)
     requests = (
-        gimbal.take_control, gimbal.take_control, gimbal.set_neutral, gimbal.retract,
-        gimbal.clear_roi, lambda *rest: gimbal.set_yaw_lock(draw.random() < 0.5, *rest),
+        gimbal.take_control, gimbal.take_control, partial(set_neutral, gimbal),
+        partial(retract, gimbal), partial(clear_roi, gimbal),
+        lambda *rest: set_yaw_lock(gimbal, draw.random() < 0.5, *rest),
         lambda *rest: gimbal.set_roi(PLACE, *rest))
     setpoints = (
         lambda: gimbal.set_rates((0.0, draw.random(), 0.2), now),

@@ -25,18 +25,12 @@ from hypothesis import assume, example, given
 from hypothesis import strategies as st
 from illuminator_ros.gimbal import managed_device, setpoint_mixer
 from illuminator_ros.gimbal.axes import Range
+from illuminator_ros.gimbal.manager import AddressShared, RequestRefused
 from illuminator_ros.gimbal.manager_control import (
     ControlSettings,
     IDENTITY_TIME,
     Role,
     RoleHolderChanged,
-)
-from illuminator_ros.gimbal.manager_events import (
-    AddressShared,
-    AnglesClipped,
-    ReferenceLost,
-    RequestRefused,
-    SetpointSent,
 )
 from illuminator_ros.gimbal.manager_state import ManagerState
 from illuminator_ros.gimbal.messages import (
@@ -50,6 +44,7 @@ from illuminator_ros.gimbal.messages import (
     GimbalManagerStatus,
     rates_of,
 )
+from illuminator_ros.gimbal.setpoint_mixer import AnglesClipped, ReferenceLost, SetpointSent
 from illuminator_ros.gimbal.vehicle_state import ESTIMATES_ATTITUDE
 from illuminator_ros.mavlink import messages as mav
 from illuminator_ros.mavlink.dialect import (
@@ -59,8 +54,8 @@ from illuminator_ros.mavlink.dialect import (
 )
 from illuminator_ros.payload.arbitration import Cause, Policy
 from illuminator_ros.payload.messages import GimbalDeviceAttitudeStatus
-from illuminator_ros.payload.mount_attitude import UNSET_QUATERNION, UNSET_VECTOR
-from illuminator_ros.payload.rotation import Quaternion
+from illuminator_ros.payload.mount_attitude import UNSET_QUATERNION, UNSET_VECTOR, YawFrame
+from illuminator_ros.payload.rotation import flip, Quaternion
 import pytest
 from support.gimbal_manager import (
     attitude_status,
@@ -852,7 +847,7 @@ def yaws(rig: ManagerRig) -> list[float]:
 
 def test_gm_22_a_device_without_mavlink_gets_no_message_of_the_gimbal_set() -> None:
     rig = in_control(**SERVO)
-    rig.manager.vehicle.set_attitude(Quaternion(), 0.0, rig.now)
+    rig.manager.vehicle.attitude.set((Quaternion(), 0.0), rig.now)
     rig.manager.vehicle_changed(rig.now)
 
     rig.give(PILOT, pitch_yaw(1.0, 0.3))
@@ -945,7 +940,7 @@ def test_gm_22_the_manager_answers_for_a_device_without_mavlink() -> None:
     [_, device], [_, manager] = (
         rig.give(PILOT, request(cls)) for cls in (GimbalDeviceInformation,
                                                   GimbalManagerInformation))
-    rig.manager.take_attitude(attitude_status(HALF), rig.now)
+    rig.manager.take_attitude((flip(Quaternion(*HALF)), YawFrame.VEHICLE), rig.now)
     rig.give(PILOT)
 
     assert (device.gimbal_device_id, manager.gimbal_device_id) == (1, 1)
@@ -962,7 +957,7 @@ def test_gm_22_a_limit_that_neutral_leaves_is_not_reported_any_more() -> None:
     flags = []
     for setpoint in (pitch_yaw(1.0, 0.0), pitch_yaw(flags=NEUTRAL)):
         rig.give(PILOT, setpoint)
-        rig.manager.take_attitude(attitude_status(), rig.now)
+        rig.manager.take_attitude((Quaternion(), YawFrame.VEHICLE), rig.now)
         rig.give(PILOT)
         flags.append(rig.messages(GimbalDeviceAttitudeStatus)[-1].failure_flags)
 
@@ -1008,7 +1003,7 @@ def test_the_device_gets_the_vehicles_state_from_ros_where_no_autopilot_sends_it
     rig = ManagerRig()
     vehicle = rig.manager.vehicle
     vehicle.set_velocity((1.0, 2.0, 3.0), rig.now)
-    vehicle.set_attitude(Q, 0.4, rig.now)
+    vehicle.attitude.set((Q, 0.4), rig.now)
     if autopilot_sends:
         rig.give(AUTOPILOT, AutopilotStateForGimbalDevice(
             *DEVICE, 0, HALF, 0, 0.0, 0.0, 0.0, 0, 0.0, 0, 0))

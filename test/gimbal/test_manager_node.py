@@ -114,7 +114,7 @@ def test_ros_points_a_mavlink_gimbal_and_tells_it_where_north_is(
             own_ros.publisher(geometry.QuaternionStamped, f'{NODE}/cmd/attitude', NODE).publish(
                 geometry.QuaternionStamped(header=VEHICLE, quaternion=turned(0, 20, 10)))
             # ROS: pitch down and yaw left are positive.
-            eventually(lambda: [round(math.degrees(one)) for one in gimbal.mount.motion.angles]
+            eventually(lambda: [round(math.degrees(one)) for one in gimbal.motion.angles]
                        == [0, -20, -10])
             status = report(own_ros, 'active')
             assert status.level == DiagnosticStatus.OK
@@ -131,7 +131,7 @@ def test_ros_points_a_mavlink_gimbal_and_tells_it_where_north_is(
             def north_is_known() -> bool:
                 for publisher, message in publishers:
                     publisher.publish(message)
-                return gimbal.mount.motion.heading_known(gimbal.mount.motion.now)
+                return gimbal.motion.heading_known(gimbal.motion.now)
 
             eventually(north_is_known)
         # The heading stays valid, since time hardly passes.
@@ -179,7 +179,7 @@ def test_sources_of_ros_hold_the_gimbal_by_rank_and_release_it(
     with manager(own_ros, port, sources=names, diagnostics_period=0.1) as program, \
             device(port) as gimbal, time_passes():
         def turned_to(yaw: float) -> bool:
-            return round(math.degrees(gimbal.mount.motion.angles[2])) == -yaw
+            return round(math.degrees(gimbal.motion.angles[2])) == -yaw
 
         source = own_ros.subscribe(String, f'{NODE}/source')
         source.wait_value('')
@@ -253,12 +253,12 @@ def test_rate_of_any_player_ends_with_the_node(own_ros: Ros) -> None:
           manager(own_ros, port, lease=3600.0) as program):
         program.wait_for('gimbal 1/154 is managed')
         Players(port).send(PILOT, configure(*PILOT), pitch_yaw(pitch_rate=0.0, yaw_rate=0.01))
-        eventually(lambda: gimbal.mount.motion.rates[2])
+        eventually(lambda: gimbal.motion.rates[2])
 
         assert program.end() == 0
 
-        eventually(lambda: not gimbal.mount.motion.rates[2])
-        assert gimbal.mount.motion.angles[2] < 0.5
+        eventually(lambda: not gimbal.motion.rates[2])
+        assert gimbal.motion.angles[2] < 0.5
 
 
 @pytest.mark.timeout(180)

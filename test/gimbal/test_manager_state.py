@@ -20,7 +20,7 @@ from collections.abc import Callable
 import math
 from pathlib import Path
 
-from illuminator_ros.gimbal.manager_events import RequestRefused
+from illuminator_ros.gimbal.manager import RequestRefused
 from illuminator_ros.gimbal.manager_state import (
     MANAGER_TIMEOUT,
     ManagerInput,

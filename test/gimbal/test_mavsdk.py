@@ -63,13 +63,13 @@ def points_to(device: SimulatedGimbal, pitch: float, yaw: float) -> Callable[[],
     """Return a condition: the gimbal has these angles relative to the vehicle, deg."""
     return lambda: all(
         abs(math.degrees(angle) - asked) < 0.5
-        for angle, asked in zip(device.mount.motion.angles[1:], (pitch, yaw), strict=True))
+        for angle, asked in zip(device.motion.angles[1:], (pitch, yaw), strict=True))
 
 
 def turns(device: SimulatedGimbal) -> Callable[[], bool]:
     """Return a condition: the gimbal has turned up by a degree since this call."""
-    before = device.mount.motion.angles[1]
-    return lambda: device.mount.motion.angles[1] > before + math.radians(1)
+    before = device.motion.angles[1]
+    return lambda: device.motion.angles[1] > before + math.radians(1)
 
 
 @pytest.mark.timeout(180)

@@ -19,10 +19,10 @@ from __future__ import annotations
 from collections.abc import Callable
 import math
 
-from illuminator_ros.gimbal.manager_events import RateStopped
 from illuminator_ros.gimbal.manager_state import ManagerState
 from illuminator_ros.gimbal.messages import GimbalDeviceSetAttitude, GimbalManagerStatus, rates_of
 from illuminator_ros.gimbal.rate_stop import ATTITUDE_SPACING
+from illuminator_ros.gimbal.setpoint_mixer import RateStopped
 from illuminator_ros.mavlink.messages import Address
 from illuminator_ros.mavlink.retries import ZERO_RATE
 from illuminator_ros.payload.mount_attitude import STILL
@@ -113,7 +113,7 @@ def test_a_zero_is_repeated_until_an_attitude_shows_that_the_device_stands(
 
     assert not rig.turns
     assert rig.results == [True]
-    assert not rig.manager.is_stopping
+    assert not rig.manager.setpoints.rate_stop.is_running
     # One more for each attitude that is compared.
     assert lost_zeros < len(rig.zeros) <= lost_zeros + 5
     assert all(math.isnan(value) for one in rig.zeros for value in one.q)
@@ -126,7 +126,7 @@ def test_a_device_that_goes_on_turning_is_reported_once_the_time_is_over(
 
     interrupt(rig)
     rig.pass_time(LIMIT - 0.1)
-    assert rig.manager.is_stopping
+    assert rig.manager.setpoints.rate_stop.is_running
     assert rig.results == []
     rig.pass_time(0.2)
 

@@ -28,7 +28,18 @@ from illuminator_ros.payload.mount_attitude import from_mavlink, to_mavlink, Yaw
 from illuminator_ros.payload.rotation import Quaternion, Vector
 import pytest
 from pytest import approx
-from support.gimbals import ALL, FakeManager, in_control, NAN, OTHER, OURS, PLACE, Rig
+from support.gimbals import (
+    ALL,
+    FakeManager,
+    in_control,
+    NAN,
+    OTHER,
+    OURS,
+    PLACE,
+    Rig,
+    set_neutral,
+    set_yaw_lock,
+)
 
 EARTH, VEHICLE = YawFrame.EARTH, YawFrame.VEHICLE
 LEVEL = mavlink.GIMBAL_DEVICE_FLAGS_ROLL_LOCK | mavlink.GIMBAL_DEVICE_FLAGS_PITCH_LOCK
@@ -138,7 +149,7 @@ def test_gm_2_rate_leaves_the_yaw_lock_as_the_device_has_it(shown: int, sent: in
 
 
 def request_lock(rig: Rig, lock: bool) -> None:
-    rig.gimbal.set_yaw_lock(lock, rig.now, rig.done)
+    set_yaw_lock(rig.gimbal, lock, rig.now, rig.done)
 
 
 def turn(rig: Rig) -> None:
@@ -198,7 +209,7 @@ def test_an_attitude_is_not_sent_again_after_a_request() -> None:
     send_attitude(rig)
     rig.run(0.1)
 
-    rig.gimbal.set_neutral(rig.now, rig.done)
+    set_neutral(rig.gimbal, rig.now, rig.done)
     rig.run(3.0)
 
     assert len(setpoints(rig)) == 1
@@ -327,7 +338,7 @@ def test_zero_that_is_lost_is_sent_again_when_the_device_is_heard_again() -> Non
     manager.alive = manager.device_alive = True
     rig.run(2.0)
 
-    assert rig.gimbal.in_control
+    assert rig.gimbal.reports.in_control
     assert manager.received[-1].angular_velocity_z == 0.0
 
 
@@ -335,7 +346,7 @@ def test_a_rate_ends_with_a_zero_when_the_manager_is_lost_which_may_hear_it() ->
     rig = in_control()
     manager = rig.managers[0]
     rig.managers = []
-    while rig.gimbal.in_control:
+    while rig.gimbal.reports.in_control:
         rig.gimbal.set_rates((0.0, 0.0, 0.2), rig.now)
         rig.run(0.1)
     assert [one.angular_velocity_z for _, one in setpoints(rig)[-2:]] == [approx(-0.2), 0.0]
@@ -343,7 +354,7 @@ def test_a_rate_ends_with_a_zero_when_the_manager_is_lost_which_may_hear_it() ->
     # It may not have heard it, either.
     rig.managers = [manager]
     rig.run(4.0)
-    assert rig.gimbal.in_control
+    assert rig.gimbal.reports.in_control
     assert [one.angular_velocity_z for one in manager.received] == [0.0]
 
 
@@ -364,7 +375,7 @@ def test_zero_of_a_release_while_the_manager_is_lost_is_sent_when_it_is_heard_ag
     manager.alive = True
     rig.run(2.0)
 
-    assert rig.gimbal.in_control
+    assert rig.gimbal.reports.in_control
     assert manager.received[-1].angular_velocity_z == 0.0
 
 
@@ -401,7 +412,7 @@ MOVES: list[Callable[[Rig], object]] = [
     lambda rig: rig.gimbal.set_rates((0.0, 0.2, 0.0), rig.now),
     lambda rig: rig.gimbal.set_attitude(Quaternion(), VEHICLE, rig.now),
     lambda rig: rig.gimbal.set_angles((0.0, 0.2, 0.0), VEHICLE, rig.now),
-    lambda rig: rig.gimbal.set_neutral(rig.now, rig.done),
+    lambda rig: set_neutral(rig.gimbal, rig.now, rig.done),
     lambda rig: rig.gimbal.set_roi(PLACE, rig.now, rig.done)]
 
 
@@ -427,7 +438,7 @@ def test_at_the_end_of_the_process_only_a_zero_and_the_release_are_sent() -> Non
 def test_nothing_moves_the_gimbal_while_its_control_is_released() -> None:
     rig = in_control()
     rig.managers[0].answers = False
-    rig.gimbal.set_neutral(rig.now, rig.done)
+    set_neutral(rig.gimbal, rig.now, rig.done)
     rig.gimbal.set_roi(PLACE, rig.now, rig.done)
     rig.run(0.1)
     asked_at = rig.now

@@ -27,7 +27,7 @@ from illuminator_ros.payload.command_sources import SourceSettings
 from illuminator_ros.payload.device_events import DeviceHeld
 from illuminator_ros.payload.mount_attitude import from_mavlink, YawFrame
 import pytest
-from support.gimbals import FakeManager, in_control, OURS, PLACE, Rig
+from support.gimbals import clear_roi, FakeManager, in_control, OURS, PLACE, Rig, set_neutral
 
 NAMES = ('safety', 'operator', 'default', 'autonomy')
 TIMEOUT = 2.0
@@ -120,7 +120,7 @@ def test_a_takeover_leaves_the_commands_to_another_gimbal_of_the_manager() -> No
     rig.managers[0].answers = rig.managers[1].answers = False
     for gimbal in (first, second):
         gimbal.claim('autonomy', rig.now)
-        gimbal.clear_roi(rig.now, rig.done)
+        clear_roi(gimbal, rig.now, rig.done)
     first.claim('safety', rig.now)
     rig.run(0.1)
 
@@ -133,8 +133,8 @@ def test_a_takeover_leaves_the_commands_to_another_gimbal_of_the_manager() -> No
 def test_a_stream_leaves_the_call_of_its_own_source_under_way() -> None:
     rig = shared()
     rig.managers[0].answers = False
-    rig.gimbal.begin_call('operator', rig.now)
-    rig.gimbal.clear_roi(rig.now, rig.done)
+    rig.gimbal.claim('operator', rig.now, is_call=True)
+    clear_roi(rig.gimbal, rig.now, rig.done)
     rig.gimbal.claim('operator', rig.now)
     rig.run(0.1)
 
@@ -145,7 +145,7 @@ def test_a_takeover_ends_the_commands_of_the_lower_source_and_their_resends() ->
     rig = shared()
     rig.managers[0].answers = False
     rig.gimbal.claim('autonomy', rig.now)
-    rig.gimbal.set_neutral(rig.now, rig.done)
+    set_neutral(rig.gimbal, rig.now, rig.done)
     rig.gimbal.claim('autonomy', rig.now)
     rig.gimbal.set_roi(PLACE, rig.now, rig.done)
     rig.run(0.1)
@@ -166,7 +166,7 @@ def test_a_check_of_a_claim_gives_no_source_the_gimbal(source: str, refusal: str
     rig = shared()
     point(rig, 'operator')
 
-    assert rig.gimbal.refusal(source) == refusal
+    assert rig.gimbal.sources.refusal(source) == refusal
     assert holder(rig) == 'operator'
 
 
@@ -174,7 +174,7 @@ def test_without_sources_all_are_alike() -> None:
     rig = in_control()
 
     assert [point(rig, source) for source in NAMES] == [''] * 4
-    assert rig.gimbal.refusal('autonomy') == ''
+    assert rig.gimbal.sources.refusal('autonomy') == ''
     assert rig.gimbal.release('autonomy', rig.now) == ''
     assert holder(rig) is None
     assert rig.all_of(DeviceHeld) == []

@@ -32,5 +32,5 @@ def test_values_that_cannot_be_right_are_ignored(wrong: Attitude | GlobalPositio
     vehicle = VehicleState()
     vehicle.take(wrong, 1.0)
     assert vehicle.heading(1.0) is None
-    assert vehicle.position(1.0) is None
+    assert vehicle.position.get(1.0) is None
     assert vehicle.for_device(DEVICE, 1.0) is None

@@ -154,15 +154,11 @@ class SimulatedWinch(simulated.SimulatedDevice):
     """A winch that releases and winds in at once."""
 
     changes = frozenset({mavlink.MAV_CMD_DO_WINCH})
-    sends = (WinchStatus,)
     line_length = 0.0
 
-    def streams(self) -> Mapping[int, float]:
-        return {WinchStatus.id: 1.0}
-
-    def message(self, message_id: int, now: float) -> Message | None:
-        return (WinchStatus(int(now * 1e6), self.line_length, 0, 0, 12, 0, 25, 1)
-                if message_id == WinchStatus.id else None)
+    def reports(self) -> Mapping[type[Message], simulated.Report]:
+        return {WinchStatus: simulated.Report(lambda now: WinchStatus(
+            int(now * 1e6), self.line_length, 0, 0, 12, 0, 25, 1), interval=1.0)}
 
     def execute(self, source: Address, command: AnyCommand, now: float) -> simulated.Reply:
         if command.command != mavlink.MAV_CMD_DO_WINCH:
@@ -200,13 +196,9 @@ class WinchSession(Session):
         return await self.command(
             mavlink.MAV_CMD_DO_WINCH, 1, mavlink.WINCH_RELATIVE_LENGTH_CONTROL, length)
 
-    async def save(self) -> bool:
+    async def save(self) -> str | None:
         self.before = await self.length()
-        return self.before is not None
-
-    @property
-    def saved(self) -> str:
-        return f'{self.before} m'
+        return None if self.before is None else f'{self.before} m'
 
     async def restore(self) -> list[str]:
         await self.release((self.before or 0.0) - (await self.length() or 0.0))

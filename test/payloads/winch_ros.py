@@ -16,10 +16,9 @@
 
 from __future__ import annotations
 
-import math
-
 from illuminator_ros.payload.confirmed_command import Result
-from illuminator_ros.ros.monitor_view import Device, Key, measured, Request, Topic, View
+from illuminator_ros.ros import monitor_view as shared
+from illuminator_ros.ros.monitor_view import Device, Key, Request, Topic
 from illuminator_ros.ros.node import CommandTopic, Interface, NodeInterface
 from illuminator_ros.ros.payload import Host, RosPayload, ServedPayload
 from payloads.winch import WinchClient
@@ -54,20 +53,17 @@ WINCH = RosPayload(
 
 def length(device: Device) -> str:
     """Return the released line."""
-    return measured(device.values.get('line_length'), 'm')
+    return shared.measured(device.values.get('line_length'), 'm')
 
 
 def release_key(device: Device, typed: str) -> Request | str:
     """Release line, m, or wind it in if negative."""
-    try:
-        metres = float(typed)
-    except ValueError:
-        metres = math.nan
-    return f'{typed!r} is not a length' if not math.isfinite(metres) else Request(
-        f'release {metres:g} m', 'cmd/release', Float32, Float32(data=metres))
+    found = shared.numbers(typed, 1)
+    return Request(f'release {found[0]:g} m', 'cmd/release', Float32, Float32(data=found[0])) if (
+        found) else f'{typed!r} is not a length'
 
 
-VIEW = View(
+VIEW = shared.View(
     'winch', {'line_length': Topic(Float32)}, ('line_length',), lambda device: [length(device)],
     lambda device: [('line', [f'{length(device)} released'])],
     (Key(('p',), 'release line', release_key, 'length (m, negative winds in)'),))

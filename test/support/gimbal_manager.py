@@ -20,9 +20,8 @@ from collections.abc import Callable, Iterable, Sequence
 import itertools
 from typing import Any, TypeVar
 
-from illuminator_ros.gimbal.manager import GimbalManager, ManagerSettings
+from illuminator_ros.gimbal.manager import GimbalManager, ManagerEvent, ManagerSettings
 from illuminator_ros.gimbal.manager_control import ControlSettings
-from illuminator_ros.gimbal.manager_events import ManagerEvent
 from illuminator_ros.gimbal.manager_state import ManagerState
 from illuminator_ros.gimbal.messages import (
     GimbalDeviceInformation,

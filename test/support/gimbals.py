@@ -23,6 +23,7 @@ from typing import Any, TypeVar
 
 from illuminator_ros.gimbal import messages as gm
 from illuminator_ros.gimbal.client import GimbalClient
+from illuminator_ros.gimbal.commands import NEUTRAL, RETRACT, YAW_LOCKS
 from illuminator_ros.gimbal.events import GimbalEvent, GimbalKey
 from illuminator_ros.gimbal.gimbal import Gimbal, GimbalSettings
 from illuminator_ros.mavlink import messages as mav
@@ -30,7 +31,7 @@ from illuminator_ros.mavlink.command_sender import CommandSender
 from illuminator_ros.mavlink.component import Component, Endpoint
 from illuminator_ros.mavlink.dialect import entry_names, mavlink
 from illuminator_ros.mavlink.link import Link
-from illuminator_ros.payload.confirmed_command import Result
+from illuminator_ros.payload.confirmed_command import Done, Result
 from illuminator_ros.payload.messages import GeoPoint, GimbalDeviceAttitudeStatus
 from support.live_link import EndpointLink
 
@@ -292,5 +293,21 @@ def keys(rig: Rig) -> Sequence[GimbalKey]:
 def in_control(**fields: Any) -> Rig:
     """Return a client that controls a gimbal; ``fields`` are those of its settings."""
     rig = Rig(FakeManager(primary=OURS), **fields).run(4.0)
-    assert rig.gimbal.in_control
+    assert rig.gimbal.reports.in_control
     return rig
+
+
+def set_neutral(gimbal: Gimbal, now: float, done: Done) -> None:
+    gimbal.set_flag(NEUTRAL, now, done)
+
+
+def retract(gimbal: Gimbal, now: float, done: Done) -> None:
+    gimbal.set_flag(RETRACT, now, done)
+
+
+def clear_roi(gimbal: Gimbal, now: float, done: Done) -> None:
+    gimbal.set_roi(None, now, done)
+
+
+def set_yaw_lock(gimbal: Gimbal, lock: bool, now: float, done: Done) -> None:
+    gimbal.set_flag(YAW_LOCKS[lock], now, done)

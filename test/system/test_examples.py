@@ -118,7 +118,7 @@ def test_the_search_looks_in_each_direction_with_the_light_on_and_releases_the_g
 
 
 def points_to(gimbal: SimulatedManager, down: float, left: float) -> bool:
-    _, pitch, yaw = map(math.degrees, gimbal.mount.motion.angles)
+    _, pitch, yaw = map(math.degrees, gimbal.motion.angles)
     return abs(pitch + down) < 2.5 and abs(yaw + left) < 2.5
 
 

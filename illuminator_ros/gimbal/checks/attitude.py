@@ -36,10 +36,10 @@ from .session import (
     STEP,
     TOLERANCE,
 )
-from ..axes import AT_LIMIT
+from ..axes import CONDITIONS
 from ...checks.component_requirements import check_command_int, none_of, uptime
 from ...checks.outcomes import Failed, Skipped
-from ...checks.requirement import AnyRequirement, Requirement, requirement
+from ...checks.requirement import AnyRequirement, Check, Requirement, requirement
 from ...checks.session import Transaction
 from ...checks.specifications import COMMAND, MESSAGES, Specification
 from ...mavlink.dialect import flag_names, mavlink, short_names
@@ -59,27 +59,20 @@ FAR_FROM_LIMIT = 45.0
 # The most turns of yaw in one direction that a range may permit: a cable limits a gimbal without
 # slip rings.
 MAX_TURNS = 10
-# Flags that are set in normal operation.
-NO_FAILURES = (sum(AT_LIMIT) | mavlink.GIMBAL_DEVICE_ERROR_FLAGS_CALIBRATION_RUNNING
-               | mavlink.GIMBAL_DEVICE_ERROR_FLAGS_NO_MANAGER)
 FRAMES = (mavlink.GIMBAL_DEVICE_FLAGS_YAW_IN_EARTH_FRAME
           | mavlink.GIMBAL_DEVICE_FLAGS_YAW_IN_VEHICLE_FRAME)
 # The flags from which the frame of the yaw follows.
 FRAME_FLAGS = FRAMES | mavlink.GIMBAL_DEVICE_FLAGS_YAW_LOCK
 
-T = TypeVar('T', bound=GimbalSession)
+T = TypeVar('T', bound=GimbalSession, contravariant=True)
 # Sends a setpoint; returns the transaction if the setpoint is a command.
 Send: TypeAlias = Callable[[T, Pose], Awaitable[Transaction | None]]
 
 moves = partial(requirement, needs_consent=True)
 
 
-def reaches(
-    name: str, title: str, specification: Specification, section: str, send: Send[T],
-    yaw: float = STEP,
-) -> Requirement[T]:
-    """Return the requirement that a gimbal turns to a commanded attitude, and then back."""
-    @moves(name, title, specification, section)
+def reaches(send: Send[T], yaw: float = STEP) -> Check[T]:
+    """Return the check that a gimbal turns to a commanded attitude, and then back."""
     async def check(gimbal: T) -> str:
         await gimbal.begin()
         for angles in ((-2 * STEP, yaw), (-STEP, 0.0)):
@@ -91,11 +84,8 @@ def reaches(
     return check
 
 
-def ignores(
-    name: str, title: str, specification: Specification, section: str, cause: str, send: Send[T],
-) -> Requirement[T]:
-    """Return the requirement that a gimbal keeps its attitude after a call of ``send``."""
-    @moves(name, title, specification, section)
+def ignores(cause: str, send: Send[T]) -> Check[T]:
+    """Return the check that a gimbal keeps its attitude after a call of ``send``."""
     async def check(gimbal: T) -> None:
         before = await gimbal.begin()
         one = await send(gimbal, await gimbal.target(-2 * STEP, STEP))
@@ -106,19 +96,17 @@ def ignores(
 
 
 def turns(
-    name: str, title: str, specification: Specification, section: str,
     send: Callable[[T, float], Awaitable[Transaction | None]], speed: float, *,
     seconds: float = 1.0, slowest: float = 0.25, fastest: float = 3.0,
-) -> Requirement[T]:
+) -> Check[T]:
     """
-    Return the requirement that a gimbal turns down, or up, for some time when a speed is sent.
+    Return the check that a gimbal turns down, or up, for some time when a speed is sent.
 
     :param speed: deg/s.
     :param slowest: the lowest accepted speed, as a multiple of ``speed``.
     :param fastest: the highest accepted speed, likewise; infinite where the specification does
         not limit it.
     """
-    @moves(name, title, specification, section)
     async def check(gimbal: T) -> str:
         before = await gimbal.begin()
         direction = await gimbal.free_direction(before, 2 * speed * seconds)
@@ -285,7 +273,7 @@ STATUSES = (
              'GIMBAL_DEVICE_ERROR_FLAGS')
 async def failures_at_rest(gimbal: GimbalSession) -> None:
     """Read the flags, except those of normal operation."""
-    seen = {one.failure_flags & ~NO_FAILURES for _, one in gimbal.idle(AttitudeStatus)}
+    seen = {one.failure_flags & ~CONDITIONS for _, one in gimbal.idle(AttitudeStatus)}
     if names := [name for flag, name in short_names('GIMBAL_DEVICE_ERROR_FLAGS').items()
                  if any(one & flag for one in seen)]:
         raise Failed(', '.join(names))
@@ -377,12 +365,12 @@ def _position(flag: int, capability: int) -> Requirement[GimbalSession]:
 
 
 MOTION: tuple[AnyRequirement, ...] = (
-    ignores('hold', 'keeps its attitude when attitude and rates are unset', MESSAGES,
-            'GIMBAL_DEVICE_SET_ATTITUDE', 'a setpoint of NaN',
-            lambda gimbal, pose: gimbal.point(None)),
-    turns('rate', 'turns at a rate', MESSAGES, 'GIMBAL_DEVICE_SET_ATTITUDE',
-          lambda gimbal, speed: gimbal.point(None, rates=(NAN, speed, NAN)), RATE,
-          seconds=1.5, slowest=1 / 3, fastest=2.0),
+    moves('hold', 'keeps its attitude when attitude and rates are unset', MESSAGES,
+          'GIMBAL_DEVICE_SET_ATTITUDE')(
+        ignores('a setpoint of NaN', lambda gimbal, pose: gimbal.point(None))),
+    moves('rate', 'turns at a rate', MESSAGES, 'GIMBAL_DEVICE_SET_ATTITUDE')(turns(
+        lambda gimbal, speed: gimbal.point(None, rates=(NAN, speed, NAN)), RATE, seconds=1.5,
+        slowest=1 / 3, fastest=2.0)),
     stop, within_range, limit_flags,
     _position(mavlink.GIMBAL_DEVICE_FLAGS_NEUTRAL, mavlink.GIMBAL_DEVICE_CAP_FLAGS_HAS_NEUTRAL),
     _position(mavlink.GIMBAL_DEVICE_FLAGS_RETRACT, mavlink.GIMBAL_DEVICE_CAP_FLAGS_HAS_RETRACT))

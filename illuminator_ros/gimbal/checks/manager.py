@@ -39,7 +39,8 @@ from .session import (
     TOLERANCE,
 )
 from .. import messages as gimbal
-from ..messages import NO_COMPONENT, NON_MAVLINK_IDS
+from ..commands import Control
+from ..messages import NON_MAVLINK_IDS
 from ...checks import component_requirements as component
 from ...checks.outcomes import fail_if, Failed, Skipped
 from ...checks.requirement import PayloadChecks, Requirement, requirement
@@ -70,15 +71,7 @@ VEHICLE = (474_000_000, 85_000_000, 500_000)
 HEADING = 15.0
 PLACE = (47.401, 8.5, 470.0)
 AT_PLACE = (-15.1, -HEADING)
-# The components with primary and with secondary control.
-ControlPair = tuple[Address, Address]
 SetpointMessage = gimbal.GimbalManagerSetPitchyaw | gimbal.GimbalManagerSetManualControl
-
-
-def control_text(control: ControlPair) -> str:
-    """Return the components in control, for people."""
-    return ', '.join(f'{name} {one if any(one) else "none"}'
-                     for name, one in zip(('primary', 'secondary'), control, strict=True))
 
 
 class ManagerSession(GimbalSession):
@@ -96,7 +89,7 @@ class ManagerSession(GimbalSession):
     def __init__(self, conditions: Conditions) -> None:
         super().__init__(conditions)
         self.vehicle: Address | None = None
-        self._control_before: ControlPair | None = None
+        self._before_control = Control()
 
     def is_device(self, message: Message) -> bool:
         """See :class:`Session`."""
@@ -121,40 +114,38 @@ class ManagerSession(GimbalSession):
 
     # Control
 
-    async def control(self) -> ControlPair:
+    async def control(self) -> Control:
         """Return the players in control; raise Skipped if the manager does not report them."""
-        status = await self.newest(MANAGER_STATUS, 'who has control')
-        return (Address(status.primary_control_sysid, status.primary_control_compid),
-                Address(status.secondary_control_sysid, status.secondary_control_compid))
+        return Control.of(await self.newest(MANAGER_STATUS, 'who has control'))
 
     async def configure(self, *values: float, source: Address | None = None) -> Transaction:
         """Send MAV_CMD_DO_GIMBAL_MANAGER_CONFIGURE with four values."""
         return await self.command(CONFIGURE, *values, 0.0, 0.0, self.device_id, source=source)
 
-    async def take(self, primary: Address, secondary: Address = NO_COMPONENT) -> None:
+    async def take(self, primary: Address, secondary: Address | None = None) -> None:
         """Give control to two players; raise Failed if the manager refuses or does not show it."""
-        one = await self.configure(*primary, *secondary)
-        await self.leads_to(one, lambda control: control == (primary, secondary))
+        wanted = Control(primary, secondary)
+        await self.leads_to(await self.configure(*wanted.params()), lambda one: one == wanted)
 
-    async def leads_to(self, one: Transaction, wanted: Callable[[ControlPair], bool]) -> None:
+    async def leads_to(self, one: Transaction, wanted: Callable[[Control], bool]) -> None:
         """Raise Failed if a command is refused or does not lead to the wanted control."""
         end = self.now + SHOWN_TIMEOUT
         while not wanted(control := await self.control()) and self.now < end:
             await self.pause(0.1)
         if not one.accepted or not wanted(control):
-            raise one.failure(f'{one.answer}, and then {control_text(control)}')
+            raise one.failure(f'{one.answer}, and then {control}')
 
     async def prepare(self) -> None:
         """Take primary control; the second player releases any control that it has."""
-        if self.other in await self.control():
+        if (await self.control()).includes(self.other):
             await self.configure(*RELEASE, source=self.other)
         own = self.address
-        if (await self.control())[0] != own:
-            one = await self.configure(*own, *NO_COMPONENT)
+        if (await self.control()).primary != own:
+            one = await self.configure(*Control(own).params())
             await self.pause(0.3)
-            holder = (await self.control())[0]
+            holder = (await self.control()).primary
             # The holder must consent (GM-17), or any component may take control.
-            if not one.accepted and holder not in (own, self.other, NO_COMPONENT):
+            if not one.accepted and holder not in (own, self.other, None):
                 raise Skipped(f'{one.answer}: {holder} keeps primary control')
 
     async def pause(self, seconds: float) -> None:
@@ -200,27 +191,21 @@ class ManagerSession(GimbalSession):
 
     # Restoring
 
-    async def save(self) -> bool:
+    async def save(self) -> str | None:
         """See :class:`Session`."""
         try:
-            self._control_before = await self.control()
+            self._before_control = await self.control()
         except Skipped:
-            return False
-        return await super().save()
-
-    @property
-    def saved(self) -> str:
-        """See :class:`Session`."""
-        assert self._control_before is not None
-        return f'{super().saved}, control: {control_text(self._control_before)}'
+            return None
+        pose = await super().save()
+        return pose and f'{pose}, control: {self._before_control}'
 
     async def restore(self) -> list[str]:
         """See :class:`Session`."""
-        differing, before = await super().restore(), self._control_before
-        assert before is not None
+        differing, before = await super().restore(), self._before_control
         try:
             if await self.control() != before:
-                await self.configure(*before[0], *before[1])
+                await self.configure(*before.params())
             is_back = await self.control() == before
         except Skipped:
             is_back = False
@@ -260,7 +245,7 @@ async def attitude_stream(manager: ManagerSession) -> str:
 async def take(manager: ManagerSession) -> str:
     """Take primary control."""
     await manager.take(manager.address)
-    return control_text(await manager.control())
+    return str(await manager.control())
 
 
 @moves('release', 'ends the control of a component that releases it', MESSAGES, CONFIGURE_COMMAND)
@@ -268,7 +253,7 @@ async def release(manager: ManagerSession) -> None:
     """Send -3, which releases control."""
     await manager.prepare()
     one = await manager.configure(*RELEASE)
-    await manager.leads_to(one, lambda control: control[0] == NO_COMPONENT)
+    await manager.leads_to(one, lambda control: control.primary is None)
 
 
 @moves('release-others', 'keeps the control of a component when another one releases', MESSAGES,
@@ -284,7 +269,7 @@ async def release_others(manager: ManagerSession) -> None:
             one = await manager.configure(*RELEASE, source=source)
             await manager.pause(0.5)
             if (control := await manager.control()) != before:
-                raise one.failure(f'from {source}: {control_text(control)}')
+                raise one.failure(f'from {source}: {control}')
 
 
 @moves('secondary', 'gives secondary control, and shows it', MESSAGES, CONFIGURE_COMMAND)
@@ -320,11 +305,11 @@ async def configure_values(manager: ManagerSession) -> None:
 async def one_player(manager: ManagerSession) -> str:
     """Let the second player take control; the player without control must not move the gimbal."""
     before, other = await manager.begin(), manager.other
-    one = await manager.configure(*other, *NO_COMPONENT, source=other)
+    one = await manager.configure(*Control(other).params(), source=other)
     await manager.pause(0.5)
-    holder = (await manager.control())[0]
+    holder = (await manager.control()).primary
     if one.accepted is not (holder == other):
-        raise one.failure(f'{one.answer}, and then primary {holder}')
+        raise one.failure(f'{one.answer}, and then primary {holder or "none"}')
     loser = manager.address if holder == other else other
     await manager.point(await manager.target(-2 * STEP, STEP), source=loser)
     await manager.stays(before, f'primary {holder}, a setpoint of {loser}')
@@ -388,8 +373,9 @@ async def other_target(manager: ManagerSession) -> None:
     before, other = await manager.begin(), manager.components.free_component(200)
     pose = await manager.target(-2 * STEP, STEP)
     await manager.point(pose, target=other)
-    one = await manager.send_to_other(
-        other, PITCHYAW, pose.pitch, pose.yaw, NAN, NAN, FORWARD, 0.0, manager.device_id)
+    one = await manager.command(
+        PITCHYAW, pose.pitch, pose.yaw, NAN, NAN, FORWARD, 0.0, manager.device_id, target=other,
+        is_foreign=True)
     await manager.stays(before, f'setpoints for {other}')
     if one.acks:
         raise one.failure(f'answered a command for {other}: {one.answer}')
@@ -438,40 +424,44 @@ OWN: tuple[Requirement[ManagerSession], ...] = (
     *attitude.information(INFORMATION), same_device, attitude_stream,
     attitude.command_int(INFORMATION),
     take, release, unchanged, release_others, secondary, configure_values, one_player,
-    reaches('set-attitude', 'turns to an attitude (GIMBAL_MANAGER_SET_ATTITUDE)', GIMBAL,
-            'Controlling Gimbal Angle and/or Angular Rate using MAVLink', ManagerSession.point),
+    moves('set-attitude', 'turns to an attitude (GIMBAL_MANAGER_SET_ATTITUDE)', GIMBAL,
+          'Controlling Gimbal Angle and/or Angular Rate using MAVLink')(
+        reaches(ManagerSession.point)),
     *attitude.MOTION,
-    reaches('angles-with-rates', 'turns to angles at rates (GIMBAL_MANAGER_SET_ATTITUDE)',
-            MESSAGES, PITCHYAW_COMMAND,
-            lambda manager, pose: manager.point(pose, rates=(3 * RATE, 3 * RATE, 3 * RATE))),
-    reaches('set-pitchyaw', 'turns to angles (GIMBAL_MANAGER_SET_PITCHYAW)', MESSAGES,
-            'GIMBAL_MANAGER_SET_PITCHYAW', ManagerSession.set_pitchyaw),
-    reaches('pitchyaw', f'turns to angles ({PITCHYAW_COMMAND})', MESSAGES, PITCHYAW_COMMAND,
-            lambda manager, pose: manager.pitchyaw(pose.pitch, pose.yaw)),
+    moves('angles-with-rates', 'turns to angles at rates (GIMBAL_MANAGER_SET_ATTITUDE)',
+          MESSAGES, PITCHYAW_COMMAND)(
+        reaches(lambda manager, pose: manager.point(pose, rates=(3 * RATE,) * 3))),
+    moves('set-pitchyaw', 'turns to angles (GIMBAL_MANAGER_SET_PITCHYAW)', MESSAGES,
+          'GIMBAL_MANAGER_SET_PITCHYAW')(reaches(ManagerSession.set_pitchyaw)),
+    moves('pitchyaw', f'turns to angles ({PITCHYAW_COMMAND})', MESSAGES, PITCHYAW_COMMAND)(
+        reaches(lambda manager, pose: manager.pitchyaw(pose.pitch, pose.yaw))),
     # A manager that reads this low rate as rad/s is detected and does no harm.
-    turns('pitchyaw-rate', f'turns at rates in deg/s ({PITCHYAW_COMMAND})', MESSAGES,
-          PITCHYAW_COMMAND,
-          lambda manager, speed: manager.pitchyaw(pitch_rate=speed, yaw_rate=0.0), 2.0),
-    reaches('one-axis', f'changes one angle and keeps the other ({PITCHYAW_COMMAND})', MESSAGES,
-            PITCHYAW_COMMAND, lambda manager, pose: manager.pitchyaw(pose.pitch), yaw=0.0),
+    moves('pitchyaw-rate', f'turns at rates in deg/s ({PITCHYAW_COMMAND})', MESSAGES,
+          PITCHYAW_COMMAND)(turns(
+              lambda manager, speed: manager.pitchyaw(pitch_rate=speed, yaw_rate=0.0), 2.0)),
+    moves('one-axis', f'changes one angle and keeps the other ({PITCHYAW_COMMAND})', MESSAGES,
+          PITCHYAW_COMMAND)(reaches(lambda manager, pose: manager.pitchyaw(pose.pitch), 0.0)),
     # A fifth of the full rate.
-    turns('manual', 'turns by manual control (GIMBAL_MANAGER_SET_MANUAL_CONTROL)', GIMBAL,
-          'Manual Gimbal Control using MAVLink', lambda manager, speed: manager.send_angles(
-              gimbal.GimbalManagerSetManualControl, pitch_rate=speed / 10, yaw_rate=0.0), 2.0,
-          fastest=math.inf),
+    moves('manual', 'turns by manual control (GIMBAL_MANAGER_SET_MANUAL_CONTROL)', GIMBAL,
+          'Manual Gimbal Control using MAVLink')(turns(
+              lambda manager, speed: manager.send_angles(
+                  gimbal.GimbalManagerSetManualControl, pitch_rate=speed / 10, yaw_rate=0.0),
+              2.0, fastest=math.inf)),
     earth_frame, flags_shown, roi,
-    ignores('no-control-command', f'rejects {PITCHYAW_COMMAND} of a component without control '
-            '(GM-19)', GIMBAL, STARTING, 'a command of the second player',
-            lambda manager, pose: manager.pitchyaw(
-                pose.pitch, pose.yaw, source=manager.other)),
-    ignores('no-control-messages', 'ignores setpoint messages of a component without control '
-            '(GM-19)', GIMBAL, STARTING, 'setpoints of the second player', _send_messages),
-    ignores('no-control-roi', 'rejects a region of interest of a component without control '
-            '(GM-11)', GIMBAL, STARTING, 'a command of the second player', _clear_roi),
-    ignores('other-device', 'ignores setpoints and commands for other gimbal devices (GM-28)',
-            GIMBAL, ADDRESSING, 'setpoints for another gimbal device', _point_other_device),
-    reaches('all-devices', 'treats gimbal device 0 as all of its gimbals (GM-28)', GIMBAL,
-            ADDRESSING, lambda manager, pose: manager.point(pose, device_id=0)),
+    moves('no-control-command', f'rejects {PITCHYAW_COMMAND} of a component without control '
+          '(GM-19)', GIMBAL, STARTING)(
+        ignores('a command of the second player', lambda manager, pose: manager.pitchyaw(
+            pose.pitch, pose.yaw, source=manager.other))),
+    moves('no-control-messages', 'ignores setpoint messages of a component without control '
+          '(GM-19)', GIMBAL, STARTING)(
+        ignores('setpoints of the second player', _send_messages)),
+    moves('no-control-roi', 'rejects a region of interest of a component without control '
+          '(GM-11)', GIMBAL, STARTING)(ignores('a command of the second player', _clear_roi)),
+    moves('other-device', 'ignores setpoints and commands for other gimbal devices (GM-28)',
+          GIMBAL, ADDRESSING)(
+        ignores('setpoints for another gimbal device', _point_other_device)),
+    moves('all-devices', 'treats gimbal device 0 as all of its gimbals (GM-28)', GIMBAL,
+          ADDRESSING)(reaches(lambda manager, pose: manager.point(pose, device_id=0))),
     other_target, *attitude.STATUSES,
 )
 REQUIREMENTS = component.with_common(OWN, MANAGER_STATUS, INFORMATION)

@@ -349,17 +349,12 @@ class GimbalSession(Session):
 
     # Restoring
 
-    async def save(self) -> bool:
+    async def save(self) -> str | None:
         """See :class:`Session`."""
         try:
             self._before = await self.pose()
         except Skipped:
-            return False
-        return True
-
-    @property
-    def saved(self) -> str:
-        """See :class:`Session`."""
+            return None
         return str(self._before)
 
     def danger_of(self, message: Message) -> str:

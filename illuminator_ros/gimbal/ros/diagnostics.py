@@ -20,7 +20,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import fields
 import math
 
-from ..axes import other_signs
+from ..axes import CONDITIONS, other_signs
 from ..commands import Control
 from ..events import DeviceIdentity, GimbalKey, GimbalSnapshot
 from ...mavlink.command_sender import format_seconds
@@ -58,13 +58,7 @@ DEVICE_VALUES = {
     **dict.fromkeys((field.name for field in fields(DeviceIdentity)),
                     'GIMBAL_DEVICE_INFORMATION'),
 }
-# Error flags that do not indicate a defect of the gimbal.
 _ERRORS = 'GIMBAL_DEVICE_ERROR_FLAGS'
-_CONDITIONS = (mavlink.GIMBAL_DEVICE_ERROR_FLAGS_AT_ROLL_LIMIT
-               | mavlink.GIMBAL_DEVICE_ERROR_FLAGS_AT_PITCH_LIMIT
-               | mavlink.GIMBAL_DEVICE_ERROR_FLAGS_AT_YAW_LIMIT
-               | mavlink.GIMBAL_DEVICE_ERROR_FLAGS_CALIBRATION_RUNNING
-               | mavlink.GIMBAL_DEVICE_ERROR_FLAGS_NO_MANAGER)
 
 
 def why_no_gimbal(
@@ -128,7 +122,7 @@ def device_findings(
     if gimbal.unreachable:
         return [(diagnostics.ERROR, gimbal.unreachable)]
     findings: list[diagnostics.Finding] = [
-        (diagnostics.WARN if flag & _CONDITIONS else diagnostics.ERROR, name)
+        (diagnostics.WARN if flag & CONDITIONS else diagnostics.ERROR, name)
         for flag, name in _single(gimbal.errors)]
     if others := gimbal.managers[1:]:
         findings.append((
@@ -159,8 +153,13 @@ def controller(control: Control | None) -> str:
     return 'unknown' if control is None else str(control)
 
 
+def _ago(at: float, now: float) -> float | None:
+    return now - at if math.isfinite(at) else None
+
+
 def _values(gimbal: GimbalSnapshot, now: float) -> dict[str, diagnostics.Value]:
-    values: dict[str, diagnostics.Value] = {
+    attitude, capabilities = gimbal.attitude, gimbal.capabilities
+    return {
         'address': str(gimbal.key.address),
         'gimbal_device_id': gimbal.key.device_id,
         'manager': str(gimbal.managers[0]),
@@ -174,27 +173,18 @@ def _values(gimbal: GimbalSnapshot, now: float) -> dict[str, diagnostics.Value]:
         'flags': ', '.join(flag_names('GIMBAL_DEVICE_FLAGS', gimbal.flags)),
         'accepts_yaw_in_earth_frame': bool(
             gimbal.flags & mavlink.GIMBAL_DEVICE_FLAGS_ACCEPTS_YAW_IN_EARTH_FRAME),
-    }
-    values |= holder_values(gimbal.holder, gimbal.held_since, now)
-    if math.isfinite(gimbal.attitude_at):
-        values['attitude_s_ago'] = now - gimbal.attitude_at
-    if math.isfinite(gimbal.status_at):
-        values['status_s_ago'] = now - gimbal.status_at
-    if gimbal.attitude is not None:
-        values['yaw_frame'] = gimbal.attitude.frame.value
+        **holder_values(gimbal.holder, gimbal.held_since, now),
+        'attitude_s_ago': _ago(gimbal.attitude_at, now),
+        'status_s_ago': _ago(gimbal.status_at, now),
+        'yaw_frame': attitude.frame.value if attitude else None,
         # Adding 0 turns a negative zero into 0.
-        values |= {f'{axis}_rad': angle + 0.0 for axis, angle in zip(
-            AXES, gimbal.attitude.rotation.euler(), strict=True)}
-        values['vehicle_heading_rad'] = gimbal.attitude.heading
-    if gimbal.capabilities is not None:
-        values['capabilities'] = ', '.join(flag_names('GIMBAL_DEVICE_CAP_FLAGS',
-                                                      gimbal.capabilities))
-    if gimbal.ranges is not None:
+        **({f'{axis}_rad': angle + 0.0 for axis, angle in zip(
+            AXES, attitude.rotation.euler(), strict=True)} if attitude else {}),
+        'vehicle_heading_rad': attitude.heading if attitude else None,
+        'capabilities': None if capabilities is None else ', '.join(
+            flag_names('GIMBAL_DEVICE_CAP_FLAGS', capabilities)),
         # With the signs of ROS: pitch down and yaw left are positive.
-        ranges = [other_signs(*one) for one in zip(AXES, gimbal.ranges, strict=True)]
-        values |= {f'{axis}_{end}_rad': value for axis, range_ in zip(AXES, ranges, strict=True)
-                   for end, value in zip(('min', 'max'), range_, strict=True)
-                   if math.isfinite(value)}
-    if gimbal.identity is not None:
-        values |= vars(gimbal.identity)
-    return values
+        **{f'{axis}_{end}_rad': value if math.isfinite(value) else None
+           for axis, range_ in zip(AXES, gimbal.ranges or (), strict=False)
+           for end, value in zip(('min', 'max'), other_signs(axis, range_), strict=True)},
+        **(vars(gimbal.identity) if gimbal.identity else {})}

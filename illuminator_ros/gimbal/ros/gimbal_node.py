@@ -30,7 +30,7 @@ from . import conversions
 from .diagnostics import controller, reports, why_no_gimbal
 from .. import events
 from ..client import GimbalClient
-from ..commands import Control
+from ..commands import Control, NEUTRAL, RETRACT, YAW_LOCKS
 from ..gimbal import Gimbal
 from ...mavlink.dialect import flag_names, mavlink
 from ...payload.command_sources import DEFAULT
@@ -71,14 +71,14 @@ REQUESTS: dict[Interface, Callable[[Gimbal, Any, float, Done], None]] = {
     Interface('release_control', Trigger, 'stop, and release all control that this node has'):
         lambda gimbal, _, *asked: gimbal.release_control(*asked),
     Interface('neutral', Trigger, 'turn to the neutral position'):
-        lambda gimbal, _, *asked: gimbal.set_neutral(*asked),
+        lambda gimbal, _, *asked: gimbal.set_flag(NEUTRAL, *asked),
     Interface('retract', Trigger, 'turn to the retracted position'):
-        lambda gimbal, _, *asked: gimbal.retract(*asked),
+        lambda gimbal, _, *asked: gimbal.set_flag(RETRACT, *asked),
     Interface('clear_roi', Trigger, 'no longer point at a place'):
-        lambda gimbal, _, *asked: gimbal.clear_roi(*asked),
+        lambda gimbal, _, *asked: gimbal.set_roi(None, *asked),
     Interface('set_yaw_lock', SetBool, 'stop, and hold yaw against the earth or let it follow the '
               'vehicle; refused where the gimbal lacks it'):
-        lambda gimbal, message, *asked: gimbal.set_yaw_lock(message.data, *asked),
+        lambda gimbal, message, *asked: gimbal.set_flag(YAW_LOCKS[message.data], *asked),
 }
 CMD_ATTITUDE = Interface(
     'cmd/attitude', QuaternionStamped,
@@ -165,7 +165,8 @@ class GimbalNode:
 
     def _heard(self, now: float) -> dict[events.GimbalKey, str]:
         """Return the announced gimbals, each with the reason why it is not connected."""
-        return {key: gimbal.unreachable(now) for key, gimbal in self._client.gimbals.items()}
+        return {key: gimbal.reports.unreachable(now)
+                for key, gimbal in self._client.gimbals.items()}
 
     def _gimbal(self) -> Gimbal | None:
         return self._client.gimbals.get(self.key) if self.key else None
@@ -248,8 +249,8 @@ class GimbalNode:
             return
         # All sources need control, so no source must claim the gimbal for it.
         is_call = service.name not in ('take_control', 'release_control')
-        refusal = gimbal.begin_call(DEFAULT, now) if is_call else (
-            gimbal.refusal(DEFAULT) if service.name == 'release_control' else '')
+        refusal = gimbal.claim(DEFAULT, now, is_call=True) if is_call else (
+            gimbal.sources.refusal(DEFAULT) if service.name == 'release_control' else '')
 
         def done(result: Result, now: float) -> None:
             if is_call:

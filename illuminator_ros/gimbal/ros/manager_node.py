@@ -16,7 +16,6 @@
 
 from __future__ import annotations
 
-import functools
 import logging
 import math
 
@@ -27,20 +26,26 @@ from std_msgs.msg import Header
 
 from .conversions import Frames, read_place
 from .gimbals import GIMBAL_PARAMETERS, Gimbals, settings
-from .. import manager_events
 from ..axes import other_signs, Range
-from ..manager import GimbalManager, ManagerSettings
+from ..manager import (
+    AddressShared,
+    GimbalManager,
+    ManagerEvent,
+    ManagerSettings,
+    RequestRefused,
+)
 from ..manager_control import ControlSettings, Role, RoleHolderChanged
 from ..manager_state import ManagerState, StateChanged
 from ..manager_with_client import ManagerWithClient
+from ..setpoint_mixer import AnglesClipped, RateStopped, ReferenceLost, SetpointSent
 from ...mavlink.command_sender import CommandSender
-from ...mavlink.messages import Address, time_boot_ms
+from ...mavlink.messages import Address
 from ...payload.arbitration import Cause, Policy
-from ...payload.messages import GeoPoint, GimbalDeviceAttitudeStatus
-from ...payload.mount_attitude import AXES, from_mavlink, to_mavlink, YawFrame
+from ...payload.messages import GeoPoint
+from ...payload.mount_attitude import AXES, from_mavlink
 from ...payload.rotation import enu_ned, ned_frd, Quaternion, Vector
 from ...ros.conversions import quaternion_message, read_orientation, read_quaternion, read_vector
-from ...ros.diagnostics import ERROR, Finding, LinkDiagnostics, Report, Value, WARN
+from ...ros.diagnostics import ERROR, Finding, Report, Value, WARN
 from ...ros.diagnostics_publisher import DiagnosticsSource, MakeReports
 from ...ros.node import AnyCommandTopic, CommandTopic, Interface, NodeInterface
 from ...ros.parameters import by_name, ParameterError, ParameterSpec, Values
@@ -144,7 +149,6 @@ class ManagerNode(ServedPayload):
     """
 
     def __init__(self, both: ManagerWithClient, host: Host) -> None:
-        self._both = both
         self._manager = manager = both.manager
         self._host = host
         self._log = host.log
@@ -166,76 +170,60 @@ class ManagerNode(ServedPayload):
         topics: list[AnyCommandTopic] = [
             CommandTopic(IMU, self._take_imu, _read_imu),
             CommandTopic(ODOMETRY, self._take_odometry, _read_odometry),
-            CommandTopic(FIX, self._take_place,
+            CommandTopic(FIX, self._manager.vehicle.position.set,
                          lambda message: _read_fix(message, separation))]
         if not self._manager.tracker.has_mavlink:
             topics.append(CommandTopic(
-                DEVICE_ATTITUDE, self._take_attitude, self._frames.read_attitude))
+                DEVICE_ATTITUDE, self._manager.take_attitude, self._frames.read_attitude))
         return topics
 
     # The vehicle and the device
 
     def _take_imu(self, value: tuple[Quaternion, float], now: float) -> None:
-        self._manager.vehicle.set_attitude(*value, now)
+        self._manager.vehicle.attitude.set(value, now)
         self._manager.vehicle_changed(now)
 
-    def _take_odometry(self, value: tuple[Quaternion, float, Vector], now: float) -> None:
-        attitude, yaw_rate, velocity = value
+    def _take_odometry(
+        self, value: tuple[tuple[Quaternion, float], Vector], now: float,
+    ) -> None:
+        attitude, velocity = value
         self._manager.vehicle.set_velocity(velocity, now)
-        self._take_imu((attitude, yaw_rate), now)
-
-    def _take_place(self, place: GeoPoint, now: float) -> None:
-        self._manager.vehicle.set_position(place, now)
-
-    def _take_attitude(self, value: tuple[Quaternion, YawFrame], now: float) -> None:
-        rotation, frame = value
-        heading = self._manager.vehicle.heading(now)
-        self._both.take_attitude(GimbalDeviceAttitudeStatus(
-            0, 0, time_boot_ms(now), int(frame.flag), to_mavlink(rotation, frame),
-            math.nan, math.nan, math.nan, 0, math.nan if heading is None else heading, math.nan),
-            now)
+        self._take_imu(attitude, now)
 
     # Events
 
-    def _take(self, event: manager_events.ManagerEvent) -> None:
-        if isinstance(event, manager_events.SetpointSent):
-            self._publish(event)
-        elif isinstance(event, StateChanged):
-            self._state_changed(event)
-        elif isinstance(event, RoleHolderChanged):
-            self._log.info(_control_text(event, self._manager.settings.control.lease), 'control')
-        elif isinstance(event, manager_events.RequestRefused):
-            self._log.warning(f'a request of {event.player} is refused: {event.reason}',
-                              'refused')
-        elif isinstance(event, manager_events.AnglesClipped):
-            for one in event.clipped:
-                self._log.warning(
-                    f'the setpoint is clipped: {one.axis} {one.requested:.3f} rad in MAVLink is '
-                    f'beyond the limit {one.limit:.3f} rad', f'clipped {one.axis}')
-        elif isinstance(event, manager_events.AddressShared):
-            self._log.error(f'{event.player} has control, and two different senders use that '
-                            'address: require signing, or give one another address', 'shared')
-        elif isinstance(event, manager_events.ReferenceLost):
-            self._log.warning(f'the {event.unknown} of the vehicle is unknown: the gimbal does '
-                              'not follow its setpoint', f'lost {event.unknown}')
-        elif isinstance(event, manager_events.RateStopped):
-            self._rate_stopped(event)
-
-    def _publish(self, event: manager_events.SetpointSent) -> None:
-        setpoint = event.setpoint
-        # A setpoint without an attitude is the neutral position: level and ahead.
-        attitude = from_mavlink(setpoint.attitude or Quaternion(), setpoint.frame)
-        header = Header(stamp=self._clock.now().to_msg(),
-                        frame_id=self._frames.name(setpoint.frame))
-        self._interface.publish(DEVICE_SETPOINT.name, quaternion_message(header, attitude))
-
-    def _rate_stopped(self, event: manager_events.RateStopped) -> None:
-        if not event.stands:
-            self._log.warning(self._may_turn(), 'stop')
-        elif self._report is not None:
-            self._report('device', logging.INFO, f'{self._device()} stands')
-        else:
-            self._log.info(f'{self._device()} stands', 'stop')
+    def _take(self, event: ManagerEvent) -> None:
+        log = self._log
+        match event:
+            case SetpointSent(setpoint):
+                # A setpoint without an attitude is the neutral position: level and ahead.
+                attitude = from_mavlink(setpoint.attitude or Quaternion(), setpoint.frame)
+                header = Header(stamp=self._clock.now().to_msg(),
+                                frame_id=self._frames.name(setpoint.frame))
+                self._interface.publish(DEVICE_SETPOINT.name, quaternion_message(header, attitude))
+            case StateChanged():
+                self._state_changed(event)
+            case RoleHolderChanged():
+                log.info(_control_text(event, self._manager.settings.control.lease), 'control')
+            case RequestRefused(player, reason):
+                log.warning(f'a request of {player} is refused: {reason}', 'refused')
+            case AnglesClipped(clipped):
+                for axis, requested, limit in clipped:
+                    log.warning(f'the setpoint is clipped: {axis} {requested:.3f} rad in MAVLink '
+                                f'is beyond the limit {limit:.3f} rad', f'clipped {axis}')
+            case AddressShared(player):
+                log.error(f'{player} has control, and two different senders use that address: '
+                          'require signing, or give one another address', 'shared')
+            case ReferenceLost(unknown):
+                log.warning(f'the {unknown} of the vehicle is unknown: the gimbal does not follow '
+                            'its setpoint', f'lost {unknown}')
+            case RateStopped(stands):
+                if not stands:
+                    log.warning(self._may_turn(), 'stop')
+                elif self._report is not None:
+                    self._report('device', logging.INFO, f'{self._device()} stands')
+                else:
+                    log.info(f'{self._device()} stands', 'stop')
 
     def _device(self) -> str:
         tracker = self._manager.tracker
@@ -263,7 +251,7 @@ class ManagerNode(ServedPayload):
 
     def shut_down(self, now: float, report: ShutdownReport) -> None:
         """See :meth:`ServedPayload.shut_down`: wait until a gimbal that turned stands."""
-        if self._manager.is_stopping:
+        if self._manager.setpoints.rate_stop.is_running:
             self._report = report
             report('device', None, self._may_turn())
         self._gimbals.shut_down(now, report)
@@ -273,8 +261,9 @@ class ManagerNode(ServedPayload):
     def _take_snapshot(self, now: float) -> MakeReports:
         holder = self._manager.control.holder(Role.PRIMARY)
         peers = self._host.link.lines.peer_count_of(holder, now) if holder else 0
-        return functools.partial(_reports, findings=findings(self._manager, peers), values=_values(
-            self._manager, now))
+        found, values = findings(self._manager, peers), _values(self._manager, now)
+        return lambda link: [Report('manager', f'manager {values["gimbal_device_id"]}', found,
+                                    'active', lambda: values)]
 
 
 def findings(manager: GimbalManager, peers: int) -> list[Finding]:
@@ -292,13 +281,6 @@ def findings(manager: GimbalManager, peers: int) -> list[Finding]:
         found.append((WARN, f'{manager.control.holder(Role.PRIMARY)} has control and is heard '
                             f'over {peers} peers: another sender may use its address'))
     return found
-
-
-def _reports(
-    link: LinkDiagnostics, *, findings: list[Finding], values: dict[str, Value],
-) -> list[Report]:
-    return [Report('manager', f'manager {values["gimbal_device_id"]}', findings, 'active',
-                   lambda: values)]
 
 
 def _values(manager: GimbalManager, now: float) -> dict[str, Value]:
@@ -329,12 +311,12 @@ def _read_imu(message: Imu) -> tuple[Quaternion, float]:
         message.angular_velocity.z, VEHICLE_RATE_LIMIT)
 
 
-def _read_odometry(message: Odometry) -> tuple[Quaternion, float, Vector]:
+def _read_odometry(message: Odometry) -> tuple[tuple[Quaternion, float], Vector]:
     """Return attitude, yaw rate and velocity, NED and FRD; the twist is in the child frame."""
     attitude = read_quaternion(message.pose.pose.orientation).normalized()
     twist = message.twist.twist
     x, y, z = (_within(value, VEHICLE_SPEED_LIMIT) for value in read_vector(twist.linear))
-    return (ned_frd(attitude), -_within(twist.angular.z, VEHICLE_RATE_LIMIT),
+    return ((ned_frd(attitude), -_within(twist.angular.z, VEHICLE_RATE_LIMIT)),
             enu_ned(attitude.rotate((x, y, z))))
 
 

@@ -77,11 +77,10 @@ def nudge(device: Device, typed: str, axis: str, step: float) -> Request | str:
 
 def point(device: Device, typed: str) -> Request | str:
     """Point at a place."""
-    try:
-        latitude, longitude, altitude = map(float, typed.replace(',', ' ').split())
-    except ValueError:
+    if not (found := shared.numbers(typed, 3)):
         return f'{typed!r} is not latitude, longitude and altitude'
-    if not (abs(latitude) <= 90 and abs(longitude) <= 180 and math.isfinite(altitude)):
+    latitude, longitude, altitude = found
+    if not (abs(latitude) <= 90 and abs(longitude) <= 180):
         return f'{typed!r} is not a place'
     return _refusal(device) or Request(
         f'point at {typed}', f'{device.prefix}cmd/roi', NavSatFix,

@@ -57,7 +57,7 @@ async def other_target(light: LightSession) -> None:
               Address(light.components.free_system(), light.device.component or 200))
     failures = []
     for other in others:
-        one = await light.send_to_other(other, ON_OFF, 1)
+        one = await light.command(ON_OFF, 1, target=other, is_foreign=True)
         if await light.enabled():
             failures.append(one.failure(f'switched on by a command for {other}'))
             await light.baseline()

@@ -247,16 +247,10 @@ class LightSession(Session):
 
     # Restoring
 
-    async def save(self) -> bool:
+    async def save(self) -> str | None:
         """See :class:`Session`."""
         self._before = await self.status()
-        return self._before is not None
-
-    @property
-    def saved(self) -> str:
-        """See :class:`Session`."""
-        assert self._before is not None
-        return status_text(self._before)
+        return None if self._before is None else status_text(self._before)
 
     async def restore(self) -> list[str]:
         """See :class:`Session`."""
