@@ -171,10 +171,6 @@ def _serve(
 ) -> int:
     import gc
 
-    # All objects of the start stay, so that the search for garbage among them finds nothing: it
-    # would take a tenth of the start.
-    gc.disable()
-
     import rclpy
 
     from ..ros.payload_node import PayloadNode
@@ -200,9 +196,8 @@ def _serve(
             bridge = Bridge(node, arguments, executable.payloads, executable.payload, url)
         except ParameterError as error:
             raise Refusal(f'parameter {error}') from None
-    # A collection that visits these objects would only delay answers.
+    # The existing objects stay: a garbage collection that visits them would only delay answers.
     gc.freeze()
-    gc.enable()
     termination.calls(bridge.end, bridge.report_late)
     bridge.run()
     rclpy.try_shutdown()
