@@ -49,13 +49,12 @@ _frame_log = logging.getLogger('illuminator_ros')
 
 
 class LineUser(ABC):
-    """
-    The user of a line, which the line calls in the thread that waits with the selector.
+    """The user of a line, which the line calls in the thread that waits with the selector."""
 
-    :ivar is_behind: whether it has not taken all received frames yet: no more must be read.
-    """
-
-    is_behind = False
+    @property
+    @abstractmethod
+    def is_behind(self) -> bool:
+        """Whether it has not taken all received frames yet: no more must be read."""
 
     @abstractmethod
     def opened(self, now: float) -> None:

@@ -213,16 +213,20 @@ class Lines(LineUser):
         self._heard_at = now
         if self._duplicates is not None:
             self._faults.call(self._forward, line, peer, frames, now)
+        was_behind = self.is_behind
         self._received += [(line, one) for one in frames if one.message_id in self._classes]
-        if not self.is_behind:
+        if not was_behind:
             self._take_received(now)
+
+    @property
+    def is_behind(self) -> bool:
+        """See :meth:`LineUser.is_behind`."""
+        return bool(self._received)
 
     def _take_received(self, now: float) -> None:
         """Take received messages while the turn of the thread lasts, others in its next turn."""
-        self.is_behind = False
         while self._received:
             if self._defer(self._take_received):
-                self.is_behind = True
                 return
             self._take_frame(self._received.popleft()[1], now)
 
