@@ -111,20 +111,17 @@ class Report(NamedTuple):
     def message(self, node: str) -> DiagnosticStatus:
         """Return the message of a node, given its name with its namespace."""
         worst_first = sorted(self.findings, key=lambda finding: finding[0], reverse=True)
+        values = []
+        for key, value in {**self.values(), 'node': node}.items():
+            if value is not None:
+                text = f'{value:.6g}' if isinstance(value, float) else str(value)
+                values.append(KeyValue(
+                    key=key, value=text.lower() if isinstance(value, bool) else text))
         # The name leaves out the namespace.
-        values = {**self.values(), 'node': node}
         return DiagnosticStatus(
             level=self.level, name=f'{node.rpartition("/")[2]}: {self.name}',
             hardware_id=self.hardware_id,
-            message='; '.join(text for _, text in worst_first) or self.fine,
-            values=[KeyValue(key=key, value=_text(value)) for key, value in values.items()
-                    if value is not None])
-
-
-def _text(value: Value) -> str:
-    if isinstance(value, bool):
-        return str(value).lower()
-    return f'{value:.6g}' if isinstance(value, float) else str(value)
+            message='; '.join(text for _, text in worst_first) or self.fine, values=values)
 
 
 def _known(value: Value) -> Value:
