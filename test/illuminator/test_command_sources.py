@@ -101,6 +101,20 @@ def test_a_request_of_a_lower_source_is_refused_and_not_sent() -> None:
     assert (len(shared.pair.commands(ON_OFF)), shared.pair.commands(CONFIGURE)) == (sent, [])
 
 
+def test_a_request_after_a_stop_finds_the_silent_source_gone_and_reports_that() -> None:
+    shared = Shared()
+    shared.enable('safety', True)
+    shared.pair.run(1.0)
+    shared.pair.now += TIMEOUT
+
+    shared.enable('autonomy', False)
+    shared.pair.run(1.0)
+
+    holders = [event.change.after for event in shared.pair.recorder.others
+               if isinstance(event, DeviceHeld)]
+    assert (holders, shared.light.fields['enable']) == (['safety', None, 'autonomy'], 0)
+
+
 @pytest.mark.parametrize('ask', [
     lambda shared: shared.call('default', True), lambda shared: shared.call('default', False),
     lambda shared: shared.pair.ask_configure(brightness=30.0)], ids=['on', 'off', 'set'])
