@@ -380,7 +380,12 @@ class LightConfiguration:
             self.brightness_is_switch = status.brightness == 0.0
         was_busy, late = self.changes.command is not None, self.changes.unconfirmed(now)
         self.changes.reported(status, now)
-        self._compare(status, now, None if was_busy else (can_follow, late, switched_at))
+        if self.agreed or status.complete:
+            reported = status.configuration(self.agreed or NOTHING)
+            if not was_busy:
+                self._compare(status, reported, now, late=late, can_follow=can_follow,
+                              switched_at=switched_at)
+            self._keep_limits(reported, now)
 
     def restarted(self, status: Status, now: float) -> None:
         """Take the first status after a restart: the configuration may be lost."""
@@ -396,37 +401,34 @@ class LightConfiguration:
             self._required.drop(self._required.with_reason(Reason.LIMIT))
         self._limited_at = -math.inf
         self.changes.restarted(status, now)
-        self._compare(status, now, None if under_way else (True, None, -math.inf))
+        if self.agreed or status.complete:
+            reported = status.configuration(self.agreed or NOTHING)
+            if under_way is None:
+                self._compare(status, reported, now, late=None, can_follow=True,
+                              switched_at=-math.inf)
+            self._keep_limits(reported, now)
 
     def _compare(
-        self, status: Status, now: float,
-        unchanged: tuple[bool, Change[Status] | None, float] | None,
+        self, status: Status, reported: Configuration, now: float, *,
+        late: Change[Status] | None, can_follow: bool, switched_at: float,
     ) -> None:
         """
-        Compare a status with what was agreed, with what is required, and with the limits.
+        Compare a status that no command under way has caused with what was agreed and is required.
 
-        :param unchanged: if no command was under way: whether the parameters follow the status,
-            the change of ours that may have a late effect, and when we switched the light, s.
+        :param late: the change of ours that may have a late effect, None if there is none.
         """
-        if self.agreed is None and not status.complete:
-            return
-        reported = status.configuration(self.agreed or NOTHING)
-        if unchanged is not None:
-            can_follow, late, switched_at = unchanged
-            _, goal, instead = self._failure
-            # It was applied late, or another sender has replaced it.
-            if goal is not None and instead is not None and (
-                    not _differ(goal, status) or _differ(instead.configuration(NOTHING), status)):
-                self._failure = NO_FAILURE
-            if self.agreed is None:
-                self._adopt(reported, events.ChangeCause.FIRST_STATUS)
-                self._required.retries.due = min(self._required.retries.due, now)
-            if self._required.fields:
-                self._drop_shown(status, reported)
-            if can_follow and reported != self.agreed:
-                self._follow(status, reported, now, late=late, switched_at=switched_at)
-        if self.exceeded.excess or self._limits != SafetyLimits():
-            self._keep_limits(reported, now)
+        _, goal, instead = self._failure
+        # It was applied late, or another sender has replaced it.
+        if goal is not None and instead is not None and (
+                not _differ(goal, status) or _differ(instead.configuration(NOTHING), status)):
+            self._failure = NO_FAILURE
+        if self.agreed is None:
+            self._adopt(reported, events.ChangeCause.FIRST_STATUS)
+            self._required.retries.due = min(self._required.retries.due, now)
+        if self._required.fields:
+            self._drop_shown(status, reported)
+        if can_follow and reported != self.agreed:
+            self._follow(status, reported, now, late=late, switched_at=switched_at)
 
     def _drop_shown(self, status: Status, reported: Configuration) -> None:
         """Drop the required values that a status shows; overrides are sent once nevertheless."""
@@ -479,6 +481,8 @@ class LightConfiguration:
 
     def _keep_limits(self, reported: Configuration, now: float) -> None:
         """Bring a light that exceeds a limit back within it."""
+        if self._limits == SafetyLimits() and not self.exceeded.excess:
+            return
         excess = self._limits.excess(reported)
         is_again = bool(excess) and (
             self.exceeded.is_again if self.exceeded.excess
