@@ -65,7 +65,7 @@ class Light:
     # Reception
 
     def heard(self, now: float) -> None:
-        """Take a heartbeat, or anything else that shows that the light is alive."""
+        """Take a heartbeat, or a status, which shows that the light is alive."""
         if self.liveness.hear(now):
             self._due = None
             self._queries.begin(now)
@@ -103,7 +103,6 @@ class Light:
 
     def take_identity(self, identity: Identity, now: float) -> None:
         """Take a COMPONENT_INFORMATION_BASIC."""
-        self.heard(now)
         self._due = None
         self._queries.take_identity(identity, now)
         self._emit(events.LightIdentified(self.address, identity))

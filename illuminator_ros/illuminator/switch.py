@@ -82,9 +82,9 @@ class Switch:
         self._silence_due = math.inf
         # When an automatic OFF may follow one that the light has shown.
         self._off_due = -math.inf
-        # The state and the failure that were reported last.
+        # The state that was reported last, and whether a failure of the OFF under way was.
         self._told: bool | None = None
-        self._told_failure = ''
+        self._has_told_failure = False
         # Heat has switched it off, and it has not been on since.
         self._is_off_by_heat = False
 
@@ -125,20 +125,18 @@ class Switch:
     def _want(self, desired: Desired[Status], now: float, caller: Caller | None = None) -> None:
         if desired.insists and self._report is None:
             self._emit(events.AutomaticSwitch(self._target.address, False, desired.reason))
-        self._told_failure = ''
+        self._has_told_failure = False
         self.changes.want(desired, now, caller)
 
     def _tell_failure(self, failure: str, now: float) -> None:
-        """Report why an automatic OFF is not confirmed: once, or each reason at the end."""
-        if not failure or failure == self._told_failure:
-            return
-        if self._report is not None:
+        """Report why an automatic OFF is not confirmed: once, or the newest reason at the end."""
+        if failure and self._report is not None:
             self._report(Result(False, failure), now)
-        elif not self._told_failure:
+        elif failure and not self._has_told_failure:
             assert self.changes.desired is not None
+            self._has_told_failure = True
             self._emit(events.AutomaticSwitch(
                 self._target.address, False, self.changes.desired.reason, failure))
-        self._told_failure = failure
 
     # Requests
 
