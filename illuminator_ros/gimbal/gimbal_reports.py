@@ -185,7 +185,7 @@ class GimbalReports:
     :param interval: between attitudes of the device; 0 for its own.
     :param emit: takes the events.
     :ivar manager: the manager in use: the first that is heard, until it is lost.
-    :ivar managers: all that have announced the gimbal, by address.
+    :ivar managers: each that has announced the gimbal, by address.
     :ivar control: the components in control, None if they are not known; likewise the last known
         ones, ``last_control``.
     :ivar control_since: when ``control`` changed last.

@@ -284,55 +284,53 @@ class SimulatedManager(SimulatedMount):
         """See :meth:`SimulatedDevice.execute`."""
         if command.command not in self.changes:
             return None
+        try:
+            is_allowed, effect = self._consequence(source, command, now)
+        except (ValueError, OverflowError) as error:
+            return simulated.CommandReply(
+                error.result if isinstance(error, Refused) else mavlink.MAV_RESULT_DENIED)
+        return simulated.CommandReply(
+            mavlink.MAV_RESULT_ACCEPTED if is_allowed else mavlink.MAV_RESULT_DENIED, effect)
+
+    def _consequence(
+        self, source: Address, command: AnyCommand, now: float,
+    ) -> tuple[bool, simulated.Effect]:
+        """Return whether the sender of a command has the control that it needs, and its effect."""
         params = params_of(command)
         *first, flags, _, _ = params
         if not self._is_for_device(params[DEVICE_ID_PARAM[command.command]]):
-            return simulated.CommandReply(mavlink.MAV_RESULT_DENIED)
+            raise Refused('another device')
         if command.command == mavlink.MAV_CMD_DO_GIMBAL_MANAGER_PITCHYAW:
-            return self._pitchyaw(source, first, flags, now)
+            return self._may_control(source), partial(
+                self._obey, source, self._pitchyaw(first, flags), now)
         if command.command == mavlink.MAV_CMD_DO_GIMBAL_MANAGER_CONFIGURE:
-            return self._configure(source, first)
-        effect: simulated.Effect = partial(self._clear_roi, now)
-        if command.command == mavlink.MAV_CMD_DO_SET_ROI_LOCATION:
-            try:
-                place, is_relative = read_roi(command)
-            except Refused as refused:
-                return simulated.CommandReply(refused.result)
-            above = self.properties.position.altitude if is_relative else 0.0
-            effect = partial(
-                self._set_roi, place._replace(altitude=place.altitude + above), now)
-        allowed = not self.behaviour.enforces_roi or source == self.primary
-        return simulated.CommandReply(
-            mavlink.MAV_RESULT_ACCEPTED if allowed else mavlink.MAV_RESULT_DENIED, effect)
+            return True, self._configure(source, first)
+        is_allowed = not self.behaviour.enforces_roi or source == self.primary
+        if command.command == mavlink.MAV_CMD_DO_SET_ROI_NONE:
+            return is_allowed, partial(self._clear_roi, now)
+        place, is_relative = read_roi(command)
+        above = self.properties.position.altitude if is_relative else 0.0
+        return is_allowed, partial(
+            self._set_roi, place._replace(altitude=place.altitude + above), now)
 
-    def _pitchyaw(
-        self, source: Address, values: Sequence[float], flags: float, now: float,
-    ) -> simulated.CommandReply:
+    def _pitchyaw(self, values: Sequence[float], flags: float) -> Setpoint:
         pitch, yaw, *rates = map(math.radians, values)
         pitch_rate, yaw_rate = rates if self.behaviour.rates_in_degrees else values[2:]
-        try:
-            # int() of NaN raises ValueError, and of infinity OverflowError.
-            setpoint = Setpoint.from_pitch_yaw(
-                self._flags(int(flags)), pitch, yaw, pitch_rate, yaw_rate)
-        except (ValueError, OverflowError):
-            return simulated.CommandReply(mavlink.MAV_RESULT_DENIED)
+        # int() of NaN raises ValueError, and of infinity OverflowError.
+        setpoint = Setpoint.from_pitch_yaw(
+            self._flags(int(flags)), pitch, yaw, pitch_rate, yaw_rate)
         if self._lacks_an_axis(setpoint):
             assert self.behaviour.partial_angles is not None
-            return simulated.CommandReply(self.behaviour.partial_angles)
-        return simulated.CommandReply(
-            mavlink.MAV_RESULT_ACCEPTED if self._may_control(source)
-            else mavlink.MAV_RESULT_DENIED, partial(self._obey, source, setpoint, now))
+            raise Refused('an axis is lacking', self.behaviour.partial_angles)
+        return setpoint
 
-    def _configure(
-        self, source: Address, values: Sequence[float],
-    ) -> simulated.CommandReply:
+    def _configure(self, source: Address, values: Sequence[float]) -> simulated.Effect:
         behaviour = self.behaviour
         if not all(value % 1 == 0 and -3 <= value <= 255 for value in values):
-            return simulated.CommandReply(behaviour.invalid_configure)
-        primary = self._resolved(self.primary, values[:2], source)
+            raise Refused('there is no such component', behaviour.invalid_configure)
         secondary = self._resolved(self.secondary, values[2:], source)
-        return simulated.CommandReply(mavlink.MAV_RESULT_ACCEPTED, partial(
-            self._give_control, primary, secondary if behaviour.has_secondary else NO_COMPONENT))
+        return partial(self._give_control, self._resolved(self.primary, values[:2], source),
+                       secondary if behaviour.has_secondary else NO_COMPONENT)
 
     def _resolved(
         self, current: Address, values: Sequence[float], source: Address,

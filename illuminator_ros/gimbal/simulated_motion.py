@@ -62,10 +62,7 @@ def _span(text: str) -> Range:
 def _capabilities(names: str) -> int:
     known = {name.lower(): flag
              for flag, name in short_names('GIMBAL_DEVICE_CAP_FLAGS').items()}
-    result = 0
-    for name in names.split(','):
-        result |= known[one_of(known)(name.strip().lower())]
-    return result
+    return sum({known[one_of(known)(name.strip().lower())] for name in names.split(',')})
 
 
 @dataclass(frozen=True)

@@ -162,7 +162,7 @@ class SimulatedDevice(ABC):
         self.behaviour = behaviour
 
     def restart(self, now: float) -> None:  # noqa: B027 - optional
-        """Return to the state after a power cycle, if it differs."""
+        """Return to the state after a power cycle; the constructor calls it, too."""
 
     def set_clock(self, unix_time: float, now: float) -> None:  # noqa: B027 - optional
         """Take the time of day (s, UTC), as from a GPS receiver of its own."""

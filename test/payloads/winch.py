@@ -74,7 +74,6 @@ class Winch:
     def __init__(self, address: Address, commands: CommandSender) -> None:
         self.liveness = Liveness(timeout=3.0)
         self.was_commanded = False
-        self._line_length = 0.0
         self._length: Property[WinchStatus] = Property(
             Target(address, commands, 'winch', WinchStatus.id, WinchStatus.msgname))
 
@@ -84,7 +83,6 @@ class Winch:
 
     def take_status(self, status: WinchStatus, now: float) -> None:
         self.liveness.hear(now)
-        self._line_length = status.line_length
         self._length.reported(status, now)
         self._answer(now)
 
@@ -98,8 +96,8 @@ class Winch:
         if self._length.desired is not None:
             done(Result(False, 'a release is under way'), now)
         else:
-            change = release(length, self._line_length + length)
-            self._length.want(Desired(change), now, Caller(done, now))
+            out = self._length.newest.line_length if self._length.newest else 0.0
+            self._length.want(Desired(release(length, out + length)), now, Caller(done, now))
 
     def _answer(self, now: float) -> None:
         while self._length.outcomes:

@@ -175,34 +175,30 @@ class GimbalNode:
 
     def take(self, event: events.GimbalEvent) -> None:
         """Publish an event of the gimbal."""
-        if isinstance(event, events.AttitudeReceived):
-            self._publish_attitude(event)
-            return
-        name = f'gimbal {event.key}'
+        name, warn = f'gimbal {event.key}', self._log.warning
+        match event:
+            case events.AttitudeReceived():
+                self._publish_attitude(event)
+                return
+            case events.ControlChanged(before=before, after=after):
+                if after is not None and event.was_lost:
+                    reason = (f'lost: {after.primary} has taken primary control' if after.primary
+                              else 'ended: no component has primary control')
+                    warn(f'control of {name} {reason}; setpoints have stopped, ~/take_control '
+                         'takes it back', 'control')
+                elif after is not None and after != before:
+                    self._log.info(f'control of {name}: {after}', 'control')
+                self._publish_control(after, event.ours)
+            case events.SecondManager(manager=manager, other=other):
+                warn(f'manager {other} announces {name} too: only {manager} is used, but both may '
+                     'move it; disable one', 'manager')
+            case events.ManagerChanged(before=before, after=after):
+                warn(f'{name} is used through manager {after} from now on: {before} is lost',
+                     'manager')
+            case events.AutomaticTakeFailed(message=message):
+                warn(f'auto_take_control: {message}', 'control')
         publish_event(event, 'gimbal', self._log, self._interface)
-        if isinstance(event, events.ControlChanged):
-            self._control_changed(name, event)
-        elif isinstance(event, events.SecondManager):
-            self._log.warning(
-                f'manager {event.other} announces {name} too: only {event.manager} is used, but '
-                'both may move it; disable one', 'manager')
-        elif isinstance(event, events.ManagerChanged):
-            self._log.warning(f'{name} is used through manager {event.after} from now on: '
-                              f'{event.before} is lost', 'manager')
-        elif isinstance(event, events.AutomaticTakeFailed):
-            self._log.warning(f'auto_take_control: {event.message}', 'control')
         self._host.check_diagnostics()
-
-    def _control_changed(self, name: str, event: events.ControlChanged) -> None:
-        after = event.after
-        if after is not None and event.was_lost:
-            reason = (f'lost: {after.primary} has taken primary control' if after.primary else
-                      'ended: no component has primary control')
-            self._log.warning(f'control of {name} {reason}; setpoints have stopped, '
-                              '~/take_control takes it back', 'control')
-        elif after is not None and after != event.before:
-            self._log.info(f'control of {name}: {after}', 'control')
-        self._publish_control(event.after, event.ours)
 
     def _publish_control(self, control: Control | None, ours: bool) -> None:
         self._interface.publish('in_control', ours)
