@@ -161,7 +161,6 @@ def test_the_search_releases_the_gimbal_of_a_light_that_refuses_to_go_off_and_sa
 
 @pytest.mark.parametrize(('name', 'changes', 'text'), [
     ('searchlight', {'LIGHT': "'/lamp'"}, '/lamp/enable: no such service'),
-    ('search_pattern', {'LIGHT, GIMBAL': "'/lamp', '/gimbal'"}, '/lamp/enable: no such service'),
     ('search_pattern', {'LIGHT, GIMBAL': "'/illuminator', 'mount'"},
      '/mount/take_control: no such service'),
     ('survey', {'CAMERA, FIX': "'/camera', '/gps/fix'"}, '/camera/capture: no such service'),
