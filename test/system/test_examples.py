@@ -224,5 +224,5 @@ def test_the_survey_takes_an_image_each_10_m_and_lists_it_and_repeats_one_that_f
             eventually(lambda: len(rows()) == count)  # noqa: B023
         places = [math.radians(float(row['latitude_deg']) - 47.0) * EARTH_RADIUS
                   for row in rows()]
-        # The camera may not yet have the position that has caused the image.
-        assert places == pytest.approx([0.0, 10.5, 21.5], abs=1.2)
+        # The camera may not yet have the position that has caused an image, nor any for the first.
+        assert places[1:] == pytest.approx([10.5, 21.5], abs=1.2)
