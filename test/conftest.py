@@ -30,5 +30,6 @@ LONG = {f'test_{name}.py' for name in (
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     """Begin with long files: at the end, one would run alone; then mix those of all folders."""
-    items.sort(key=lambda item: (item.path.parent.name not in ('lint', 'system'),
-                                 item.path.name not in LONG, item.path.name))
+    items.sort(key=lambda item: (
+        item.path.name not in LONG, item.path.parent.name not in ('lint', 'system'),
+        item.path.name))

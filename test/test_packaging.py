@@ -202,7 +202,7 @@ def test_tools_of_the_wheel_that_need_no_ros_work_in_a_clean_venv(clean: Path) -
         simulator.wait_for('1/243')
         checks = Program(
             str(clean / 'illuminator-conformance'), f'udpout://127.0.0.1:{port}', '--yes',
-            '--only', 'heartbeat-type', '--only', 'on', '--only', 'off')
+            '--only', 'on', '--only', 'off')
         assert checks.wait() == 0, checks.log
         assert 'PASS' in checks.log
     finally:

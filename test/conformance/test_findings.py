@@ -201,9 +201,8 @@ def test_a_fault_fails_exactly_its_requirements(kind: str, fault: str) -> None:
 
 @pytest.mark.parametrize(('kind', 'fault'), [
     (kind, fault) for kind, faults in RANDOM.items() for fault in faults])
-@pytest.mark.parametrize('seed', range(2))
-def test_a_random_fault_fails_its_requirement(kind: str, fault: str, seed: int) -> None:
-    assert RANDOM[kind][fault] in run(kind, fault, seed=seed).failed
+def test_a_random_fault_fails_its_requirement(kind: str, fault: str) -> None:
+    assert RANDOM[kind][fault] in run(kind, fault, seed=1).failed
 
 
 @pytest.mark.parametrize(('kind', 'profile'), [

@@ -541,34 +541,6 @@ def test_gm_8_place_without_an_answer_is_not_sent_again_after_a_later_setpoint_o
     assert [(one.success, one.superseded) for one in rig.results[:2]] == [(False, True)] * 2
 
 
-def test_of_requests_for_a_pose_that_overlap_the_last_one_decides() -> None:
-    rig = in_control()
-    rig.managers[0].applies = False
-    set_neutral(rig.gimbal, rig.now, rig.done)
-    rig.run(0.1)
-    retract(rig.gimbal, rig.now, rig.done)
-    rig.run(0.1)
-    rig.managers[0].flags |= mavlink.GIMBAL_DEVICE_FLAGS_RETRACT
-
-    rig.run(3.0)
-
-    assert [(one.success, one.message.partition(':')[0]) for one in rig.results] == [
-        (False, 'superseded by retracted'),
-        (True, 'retracted, confirmed by GIMBAL_DEVICE_ATTITUDE_STATUS')]
-
-
-def test_of_places_in_a_stream_the_newest_is_sent_once_the_one_before_is_acknowledged() -> None:
-    rig = in_control()
-    for number in range(5):
-        rig.gimbal.set_roi(
-            GeoPoint(47.0 + number, 8.5, 0.0), rig.now, rig.done, is_stream=True)
-    rig.run(1.0)
-
-    assert [one.x for one in rig.messages(mav.CommandInt)] == [470000000, 510000000]
-    assert [(one.success, one.superseded) for one in rig.results] == [(False, True)] * 3 + [
-        (True, False)] * 2
-
-
 @pytest.mark.parametrize(('ask', 'command', 'wish'), [
     (retract, mavlink.MAV_CMD_DO_GIMBAL_MANAGER_PITCHYAW, 'retract'),
     (set_roi, mavlink.MAV_CMD_DO_SET_ROI_LOCATION, 'point at 47, 8.5, 500 m'),

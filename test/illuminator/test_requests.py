@@ -33,7 +33,6 @@ from illuminator_ros.payload.confirmed_command import (
     PROGRESS_LIMIT,
     Result,
 )
-from illuminator_ros.payload.device_property import MAX_CALLERS
 from illuminator_ros.payload.identity import Identity
 import pytest
 from support.back_to_back import BRIDGE, Pair
@@ -104,25 +103,6 @@ def test_the_answer_to_a_switch_says_what_the_light_did(
     assert tries == len(faked.commands(ON_OFF))
     assert seconds == pytest.approx(answer.seconds, abs=0.01)
     assert answer.seconds <= 2.8
-
-
-def test_a_switch_succeeds_as_not_confirmed_where_the_light_never_sends_a_status() -> None:
-    fake = FakeLight()
-    change(fake, **NO_STATUS)
-    result = Pair(fake).settle().enable(True)
-    assert result.success
-    assert result.message.startswith('on, accepted, not confirmed (the light sends no '
-                                     'ILLUMINATOR_STATUS): MAV_RESULT_ACCEPTED (1 try, ')
-
-
-@pytest.mark.parametrize(('apply_after', 'seconds'), [(0.0, 0.004), (0.6, 0.608)])
-def test_a_light_that_sends_no_status_by_itself_is_asked_until_it_shows_the_change(
-    fake: FakeLight, faked: Pair, apply_after: float, seconds: float,
-) -> None:
-    change(fake, stream=0.0, apply_after=apply_after)
-    answer = faked.ask_enable(True)
-    assert faked.wait_for(answer).success
-    assert answer.seconds == pytest.approx(seconds, abs=0.02)
 
 
 def test_switches_that_follow_each_other_within_a_millisecond_are_confirmed_at_once() -> None:
@@ -201,20 +181,6 @@ def test_after_a_stop_of_the_process_a_request_that_may_be_old_is_refused_but_no
 
 
 # Several requests
-
-def test_a_newer_request_supersedes_an_older_one_and_equal_ones_share_its_outcome(
-    pair: Pair,
-) -> None:
-    answers = [pair.ask_enable(on) for on in (True, False, True, True, False, False)]
-    pair.run(5.0)
-    assert [answer.result.superseded for answer in answers] == [True] * 4 + [False] * 2
-    assert [answer.result.message for answer in answers[:4]] == [
-        'superseded by off', 'superseded by on', 'superseded by off', 'superseded by off']
-    assert [answer.result.success for answer in answers[4:]] == [True, True]
-    sent = [bool(m.param1) for m in pair.commands(ON_OFF)]
-    assert sent[:4] == [True, False, True, False]
-    assert set(sent[4:]) == {False}
-
 
 def test_an_off_that_replaces_an_on_is_sent_at_once_and_confirmed_after_the_fence(
     fake: FakeLight, faked: Pair,
@@ -304,21 +270,6 @@ def test_switches_and_configurations_do_not_wait_for_each_other(
         assert all(faked.wait_for(quick).success for quick in answers.values())
         assert not slow.results
         faked.run(5.0)
-
-
-def test_a_flood_of_equal_requests_is_bounded_and_each_is_answered_once(
-    fake: FakeLight, faked: Pair,
-) -> None:
-    fake.results[ON_OFF] = DENIED
-    answers = [faked.ask_enable(True) for _ in range(MAX_CALLERS + 3)]
-    assert [answer for answer in answers if answer.results] == answers[MAX_CALLERS:]
-    assert answers[-1].result.message == '32 requests are waiting for light 1/243 already'
-    streamed = [faked.ask_enable(True, is_stream=True) for _ in range(10)]
-    assert all(answer.result.superseded for answer in streamed[:-1])
-    faked.run(10.0)
-    assert {len(answer.results) for answer in (*answers, *streamed)} == {1}
-    # One command for the first, and one for those that asked while it was under way.
-    assert {m.confirmation for m in faked.commands(ON_OFF)} >= {0}
 
 
 def test_requests_fail_with_the_link_and_are_not_sent_later(fake: FakeLight, faked: Pair) -> None:

@@ -26,13 +26,11 @@ from illuminator_ros.illuminator.events import (
     LightSwitched,
     StatusReceived,
 )
-from illuminator_ros.illuminator.messages import STATUS_ID
 from illuminator_ros.illuminator.model import Mode
 from illuminator_ros.mavlink.dialect import mavlink
-from illuminator_ros.mavlink.messages import CommandAck
-from illuminator_ros.payload.confirmed_command import CONFIRMATION_TIMEOUT, FENCE
+from illuminator_ros.payload.confirmed_command import FENCE
 import pytest
-from support.back_to_back import BRIDGE, Pair
+from support.back_to_back import Pair
 from support.fake_light import FakeLight
 
 ON_OFF, CONFIGURE = mavlink.MAV_CMD_ILLUMINATOR_ON_OFF, mavlink.MAV_CMD_DO_ILLUMINATOR_CONFIGURE
@@ -67,32 +65,6 @@ def test_a_status_that_comes_late_neither_confirms_nor_restarts(
     fake.send(old)
     assert not faked.wait_for(answer).success
     assert faked.light.restarts == 0
-
-
-@pytest.mark.parametrize('late', [
-    [CommandAck(ON_OFF, mavlink.MAV_RESULT_ACCEPTED, 0, 0, *BRIDGE)],
-    [CommandAck(ON_OFF, mavlink.MAV_RESULT_DENIED, 0, 0, *BRIDGE)]], ids=['accepted', 'denied'])
-@pytest.mark.parametrize('applies', [True, False])
-def test_what_comes_within_the_fence_neither_confirms_nor_refuses(
-    fake: FakeLight, faked: Pair, late: list[CommandAck], applies: bool,
-) -> None:
-    # An ON is not acknowledged; its acknowledgement, and a status from before it was executed,
-    # come while an OFF is under way, which the light gets only after the fence.
-    fake.results[ON_OFF] = None
-    assert not faked.enable(True).success
-    shows_off = fake.status(faked.now)
-    fake.fields['enable'] = 1
-    fake.stream = 0.0
-    fake.answers.clear()
-    answer = faked.ask_enable(False)
-    for message in (*late, shows_off):
-        fake.send(message)
-    faked.run(FENCE - CONFIRMATION_TIMEOUT - 0.1)
-    assert not answer.results
-    fake.results.clear()
-    fake.answers.add(STATUS_ID)
-    fake.applies = applies
-    assert faked.wait_for(answer).success is applies
 
 
 @pytest.mark.parametrize('fields', [

@@ -46,6 +46,7 @@ def test_light_on_a_further_link_serves_ros_and_a_ground_station_on_the_first_li
           socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as ground):
         arrays = own_ros.subscribe(DiagnosticArray, '/diagnostics', STREAM)
         connected = own_ros.subscribe(Bool, '/illuminator/connected')
+        CLOCK.forward(1.0)
         array = arrays.wait(levels(link=WARN, link_2=ERROR))
         assert array.status[-1].hardware_id == url
         with running_simulator(f'tcp-l://127.0.0.1:{far}', '--status-interval', '0.1'):

@@ -49,9 +49,10 @@ def main(module: str) -> None:
     import_module('illuminator_ros.cli.termination').LIMIT = PATIENCE  # type: ignore[attr-defined]
     if hasattr(place, 'OFF_LIMIT'):
         place.OFF_LIMIT = PATIENCE / 5
-    # By the clock of this machine.
-    if hasattr(place, 'GRAPH_INTERVAL'):
-        place.GRAPH_INTERVAL = 0.5
+    # Timers of rclpy, which use the clock of this machine.
+    for name, seconds in (('TICK', 0.2), ('GRAPH_INTERVAL', 0.5)):
+        if hasattr(place, name):
+            setattr(place, name, seconds)
     run_module(module, run_name='__main__')
 
 
