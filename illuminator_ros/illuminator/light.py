@@ -59,8 +59,8 @@ class Light:
         self._order = StatusOrder()
         self._changing = ChangingStates()
         self._measures_temperature = False
-        # The deadline, and the versions of the commands and requests that it is from.
-        self._due: tuple[int, int, float] | None = None
+        # The deadline, and the version of the commands and requests that it is from.
+        self._due: tuple[int, float] | None = None
 
     # Reception
 
@@ -212,12 +212,12 @@ class Light:
     def next_deadline(self) -> float:
         """Return when :meth:`poll` has something to do, or earlier."""
         # Kept, since each turn of the link asks all lights.
-        versions = self._commands.version, self.control.version
-        if self._due is None or self._due[:2] != versions:
-            due = min(self.control.next_deadline(), self._queries.next_deadline(
-                self._silent_since), self._changing.until, self.liveness.silent_at)
-            self._due = *versions, due
-        return self._due[2]
+        version = self._commands.version + self.control.version
+        if self._due is None or self._due[0] != version:
+            self._due = version, min(
+                self.control.next_deadline(), self._queries.next_deadline(self._silent_since),
+                self._changing.until, self.liveness.silent_at)
+        return self._due[1]
 
     @property
     def _silent_since(self) -> float:

@@ -171,6 +171,8 @@ class Discovery(Generic[K, D]):
         due = math.inf
         for devices in (self.devices, self.candidates):
             for device in devices.values():
-                due = min(due, device.next_deadline(), math.inf if device.was_commanded else
-                          device.lost_at + FORGET_AFTER)
+                due = min(due, device.next_deadline())
+                lost_at = device.lost_at
+                if lost_at < math.inf and not device.was_commanded:
+                    due = min(due, lost_at + FORGET_AFTER)
         return due
