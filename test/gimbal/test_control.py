@@ -192,16 +192,22 @@ def test_gm_16_of_requests_for_control_that_overlap_the_last_one_decides(
     assert rig.gimbal.reports.in_control is (asks[1] is Gimbal.take_control)
 
 
-def test_gm_18_a_request_ends_with_the_manager_that_got_it() -> None:
+def test_gm_18_a_request_ends_with_the_manager_that_got_it_and_the_next_goes_to_the_other_one(
+        ) -> None:
     rig = Rig(FakeManager(answers=False), FakeManager(OTHER, device_alive=False)).run(4.0)
     used = rig.gimbal.snapshot(rig.now).managers[0]
-    first = next(one for one in rig.managers if one.address == used)
-    first.answers, first.alive = False, False
+    first, second = sorted(rig.managers, key=lambda one: one.address != used)
+    first.answers, first.alive, second.answers = False, False, True
     rig.run(2.0)
     rig.gimbal.take_control(rig.now, rig.done)
     rig.run(1.5)
 
     assert [one.message for one in rig.results] == ['the manager was lost']
+
+    rig.gimbal.take_control(rig.now, rig.done)
+    rig.run(1.0)
+    assert rig.results[-1].success
+    assert (first.primary, second.primary) == (mav.Address(0, 0), OURS)
 
 
 def test_a_request_that_waits_for_another_ends_with_the_link() -> None:
