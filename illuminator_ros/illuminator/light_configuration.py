@@ -204,8 +204,10 @@ class LightConfiguration:
             return
         if desired.reason == _SETPOINT:
             self._setpoint = None
+            status = self.changes.newest
             if (self.agreed is not None and self.agreed.brightness == setpoint
-                    and self.changes.unconfirmed(now) is None):
+                    and self.changes.unconfirmed(now) is None
+                    and not (status is not None and _differ(self.agreed, status))):
                 return
         else:
             self._required.is_tried = True
@@ -267,8 +269,14 @@ class LightConfiguration:
                 note = ('strobe_duty_cycle was 0 %, at which the light does not strobe, and was '
                         f'set to {DEFAULT_DUTY_CYCLE:g} %')
             # Under external sync a light may report the period of the signal, which it denies.
-            period = self.strobe_range.nearest(base.strobe_period)
-            goal = replace(base, **{'strobe_period': period, **values})
+            base = replace(base, strobe_period=self.strobe_range.nearest(base.strobe_period))
+            status = self.changes.newest
+            if 'brightness' not in names and (
+                    status is not None and status.is_dark
+                    or self._is_off_pending and self.brightness_is_switch):
+                # A brightness that is not asked for would switch the light on.
+                base = replace(base, brightness=0.0)
+            goal = replace(base, **values)
         # Each command is made here, so the limits apply to every command.
         limited = self._limits.clipped(goal, self.strobe_range)
         ordered = [name for name in FIELDS
@@ -289,6 +297,10 @@ class LightConfiguration:
                       for name, value in changes.items()}
             for name, value in values.items():
                 self._limits.check(name, value)
+            if (self._is_off_pending and self.brightness_is_switch is None
+                    and 'brightness' not in values):
+                raise InvalidValue('an OFF is under way, which the brightness in this command '
+                                   'may undo; repeat it')
             change = self._change(values)
         except InvalidValue as error:
             self._not_sent(str(error), '', caller)

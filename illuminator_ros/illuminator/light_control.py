@@ -16,7 +16,6 @@
 
 from __future__ import annotations
 
-from collections import deque
 from collections.abc import Callable
 from dataclasses import dataclass
 import math
@@ -81,9 +80,7 @@ class LightControl:
         self, target: Target, liveness: Liveness, settings: LightSettings,
         emit: Callable[[events.LightEvent], None],
     ) -> None:
-        # What has happened to the switch, which callers are told first.
-        self._switched: deque[events.LightEvent] = deque()
-        self.switch = Switch(target, self._switched.append, settings.off_after_silence)
+        self.switch = Switch(target, emit, settings.off_after_silence)
         self.configuration = LightConfiguration(
             target, emit, limits=settings.limits, restores=settings.restore_configuration)
         self.sources = LightSources(settings.sources)
@@ -142,8 +139,8 @@ class LightControl:
         self.update(now)
 
     def _prepare_off(self, now: float) -> None:
-        """End what an OFF must not be followed by, where the brightness is the switch."""
-        if self.configuration.brightness_is_switch:
+        """End what an OFF must not be followed by, where the brightness may be the switch."""
+        if self.configuration.brightness_is_switch is not False:
             self.configuration.cancel('superseded by off', now)
             self.switch.changes.fence_until(self.configuration.changes.fence)
 
@@ -282,7 +279,7 @@ class LightControl:
             is_known_off = (self._liveness.connected and self.switch.enabled is False
                             and not self.may_be_on(now))
             if self._settings.off_on_release and not is_known_off:
-                self.switch.require_off(f'on_release: {change.before} no longer holds it')
+                self.switch.require_off(f'on_release: {change.before} no longer holds it', now)
         elif change.cause is not Cause.CLAIM:
             self._end_requests(f'held by {change.after}', now)
             self._send_remembered(change.after, now)
@@ -295,10 +292,14 @@ class LightControl:
         """Send the values that the new holder of the light has requested before."""
         self._forget_silenced(now)
         desired = self.sources.desired
-        if not self._liveness.connected or self._commands.refusal:
+        reason = f'{source}, which holds the light now'
+        if self._commands.refusal or not self._liveness.connected:
+            if desired.enabled is False:
+                # It is sent when the light is heard again.
+                self.switch.require_off(reason, now)
             return
-        caller = Caller(_reported_failure(self._emit, self._address, source), now, source, True,
-                        f'{source}, which holds the light now')
+        caller = Caller(
+            _reported_failure(self._emit, self._address, source), now, source, True, reason)
         if desired.enabled is False:
             self._prepare_off(now)
             self.switch.ask(False, now, caller)
@@ -325,11 +326,9 @@ class LightControl:
             if self._liveness.connected:
                 # First the configuration, so that an ON finds it.
                 configuration.update(now, is_off_pending=switch.is_pending(OFF))
-                if configuration.brightness_is_switch and switch.is_off_due(now):
+                if switch.is_off_due(now):
                     self._prepare_off(now)
                 switch.update(now)
-            while self._switched:
-                self._emit(self._switched.popleft())
             has_outcomes = bool(switch.changes.outcomes or configuration.changes.outcomes)
 
     def _finish(self, outcome: Outcome[Status], now: float) -> None:
@@ -348,6 +347,9 @@ class LightControl:
                 self._forget_silenced(now)
                 self.switch.silence.requested_at = now
                 self.sources.remember(caller.source, _wish(outcome))
+            elif (holder := self.sources.holder) and self.sources.desired.enabled is False:
+                # It may have been refused while this call was under way.
+                self._send_remembered(holder, now)
         if not self.sources.are_calling:
             self.switch.silence.called_at = -math.inf
         answer(outcome.callers, result, now)

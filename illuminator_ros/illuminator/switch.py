@@ -38,7 +38,7 @@ class Silence:
 
     :param limit: after which a light that is on is switched off; 0 for never.
     :param requested_at: the last request that counts, or the ON of another sender.
-    :param called_at: when the newest call under way was made; -inf if there is none.
+    :param called_at: when the first of the calls under way was made; -inf if there is none.
     """
 
     limit: float
@@ -95,8 +95,9 @@ class Switch:
         if self._report is not None:
             is_due = self.enabled or not self._is_finally_off
             return Desired(OFF, 'the end', insists=True, is_last=True) if is_due else None
-        if self.silence.limit and now >= self.silence.ends_at and self.may_be_on(now):
-            return Desired(OFF, 'off_after_silence: no request for '
+        if (self.silence.limit and now >= self.silence.ends_at and self.may_be_on(now)
+                and not self.is_pending(OFF)):
+            return Desired(OFF, 'off_after_silence: no request has succeeded for '
                            f'{format_seconds(self.silence.limit)}', insists=True)
         return self.changes.desired or self._required
 
@@ -144,9 +145,11 @@ class Switch:
         """Switch the light on or off; the light must be connected."""
         self._want(Desired(SWITCHES[on]), now, caller)
 
-    def require_off(self, reason: str) -> None:
-        """Switch the light off until it shows that, or a request switches it on."""
+    def require_off(self, reason: str, now: float) -> None:
+        """Switch the light off until it shows that, or a later request switches it on."""
         self._required = Desired(OFF, reason, insists=True)
+        if self.is_pending(ON):
+            self.cancel(reason, now, superseded=True)
 
     def cancel(self, message: str, now: float, *, superseded: bool = False) -> None:
         """End the command under way; an automatic OFF is sent again by the next update."""
@@ -241,7 +244,7 @@ class Switch:
             self.enabled = on
             self._required = None
             self._is_finally_off = not on
-            self._off_due = now + UNCONFIRMED.first if not on else -math.inf
+            self._off_due = now + UNCONFIRMED.first if desired.insists else -math.inf
             detail = next((one.detail for one in outcome.callers if one.detail), '')
             self._tell(detail or desired.reason or events.A_REQUEST)
             if self._report is not None and not on:

@@ -33,14 +33,12 @@ from typing import NamedTuple, TypeVar
 from . import messages
 from .dialect import mavlink
 from .messages import Address, Message
-from .retries import COMMAND, REJECTED
+from .retries import CLOSING, COMMAND, REJECTED
 
 # s between two reports of progress. The specification does not define it; MAVSDK also uses 3 s.
 PROGRESS_TIMEOUT = 3.0
 # s after a stop of the process in which requests may have waited as long.
 OLD_REQUEST_TIME = 1.0
-# s between the tries of a command while the process ends, which has less than a second.
-CLOSING_TIMEOUT = 0.1
 # The most targets whose last round trip, or missing answer, is kept.
 MAX_TARGETS = 128
 # COMMAND_INT: x and y are degrees * 1e7 in the global frames and metres * 1e4 in the local ones.
@@ -449,7 +447,7 @@ class CommandSender:
     def _wait(self, resends: int) -> float:
         """Return the wait for an acknowledgement after so many resends, s."""
         if self._may_send is not None:
-            return min(self.timeout, CLOSING_TIMEOUT)
+            return min(self.timeout, CLOSING.first)
         return COMMAND._replace(first=self.timeout).wait(max(resends, 0) + 1)
 
     def poll(self, now: float) -> None:

@@ -84,6 +84,7 @@ STATUS = RetryPolicy('the request for a status, after one that does not show the
 UNCONFIRMED = RetryPolicy('an automatic OFF that no status shows, and a command that may be '
                           'confused with an earlier one', 0.25, 0.25, 10)
 STILL_UNCONFIRMED = RetryPolicy('an automatic OFF after these', 2.0, 2.0)
+CLOSING = RetryPolicy('a command while the process ends, which has less than a second', 0.1, 0.1)
 REQUIRED = RetryPolicy('a restored configuration, overrides and limits', 2.0, 60.0)
 MESSAGE = RetryPolicy('a message that a light acknowledges and does not send', 0.5, 0.5, 3)
 GIMBAL_MESSAGE = RetryPolicy('a message of a gimbal or its manager', 1.0, 60.0)
@@ -94,5 +95,5 @@ CONNECTION = RetryPolicy('the opening of a link, with half of the wait at random
 RESOURCE = RetryPolicy('a node or a thread for which the system has no room', 0.5, 0.5)
 
 # In the order of the table in doc/links.md.
-POLICIES = (CONNECTION, COMMAND, REJECTED, STATUS, UNCONFIRMED, STILL_UNCONFIRMED, REQUIRED,
-            MESSAGE, GIMBAL_MESSAGE, DEVICE_INFORMATION, ZERO_RATE, PING, RESOURCE)
+POLICIES = (CONNECTION, COMMAND, REJECTED, STATUS, UNCONFIRMED, STILL_UNCONFIRMED, CLOSING,
+            REQUIRED, MESSAGE, GIMBAL_MESSAGE, DEVICE_INFORMATION, ZERO_RATE, PING, RESOURCE)

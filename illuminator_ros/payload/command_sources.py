@@ -99,10 +99,24 @@ class Sources(Arbiter[str]):
     def end_call(
         self, source: str, now: float, *, success: bool,
     ) -> HolderChanged[str] | None:
-        """Note that a call has ended: it claims the device if it has succeeded."""
-        if source in self._calling:
-            self._calling.remove(source)
+        """
+        Note that a call has ended: it claims the device if it has succeeded.
+
+        It does not if its source has released the device meanwhile.
+        """
+        if source not in self._calling:
+            return None
+        self._calling.remove(source)
         return self.claim(source, now) if success else None
+
+    def release(self, source: str, now: float) -> HolderChanged[str] | None:
+        """See :meth:`Arbiter.release`; the calls of the source claim the device no more."""
+        was_calling = source in self._calling
+        self._calling = [one for one in self._calling if one != source]
+        change = super().release(source, now)
+        if was_calling and self.holder is None:
+            change = HolderChanged(source, None, Cause.RELEASE)
+        return change
 
     def refusal(self, source: str) -> str:
         """Return why a source may not command the device, '' if it may."""

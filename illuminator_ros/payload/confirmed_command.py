@@ -45,7 +45,7 @@ from ..mavlink.command_sender import (
 )
 from ..mavlink.dialect import MAV_RESULT_COMMAND_UNSUPPORTED_MAV_FRAME, mavlink
 from ..mavlink.messages import Address, result_name
-from ..mavlink.retries import Retries, STATUS, STILL_UNCONFIRMED, UNCONFIRMED
+from ..mavlink.retries import CLOSING, Retries, STATUS, STILL_UNCONFIRMED, UNCONFIRMED
 
 # s from the acknowledgement, or the last try, or the end of the fence, to the status that shows
 # the change.
@@ -251,7 +251,9 @@ class ConfirmedCommand(Generic[S]):
         self._repeat_due = math.inf
         if is_repeated:
             is_slow = insists and tried >= UNCONFIRMED.tries
-            self._repeat_due = now + (STILL_UNCONFIRMED if is_slow else UNCONFIRMED).first
+            policy = (CLOSING if self._desired.is_last else
+                      STILL_UNCONFIRMED if is_slow else UNCONFIRMED)
+            self._repeat_due = now + policy.first
             if is_fenced:
                 self._repeat_due = min(self._repeat_due, self._fence)
         elif is_fenced:

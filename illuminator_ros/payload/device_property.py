@@ -84,7 +84,8 @@ class Outcome(Generic[S]):
 def answer(callers: Iterable[Caller], result: Result, now: float) -> None:
     """Answer callers, even if one of them raises an exception."""
     with contextlib.ExitStack() as answers:
-        for caller in callers:
+        # The stack calls the last one first.
+        for caller in reversed([*callers]):
             answers.callback(caller.done, result, now)
 
 
@@ -101,7 +102,6 @@ class Property(Generic[S]):
     :ivar outcomes: of the values that have ended, for the owner to take.
     :ivar newest: the newest status, None before the first.
     :ivar newest_at: when it came, s.
-    :ivar sent_at: when a command was sent last, s.
     :ivar fence: until then the frames of a command that was not acknowledged may be under way, s.
     """
 
@@ -110,9 +110,11 @@ class Property(Generic[S]):
         self.command: ConfirmedCommand[S] | None = None
         self.outcomes: deque[Outcome[S]] = deque()
         self.newest: S | None = None
-        self.newest_at = self.sent_at = self.fence = -math.inf
+        self.newest_at = self.fence = -math.inf
         self._target = target
         self._gap: float | None = None
+        # When the last command began, and when one that has ended was sent last, s.
+        self._began_at = self._sent_at = -math.inf
         self._callers: list[Caller] = []
         self._next_callers: list[Caller] = []
         self._unconfirmed: Change[S] | None = None
@@ -124,15 +126,15 @@ class Property(Generic[S]):
         before = self.desired
         if before is not None and before.equals(desired):
             if caller is not None:
-                self._join(caller, now)
+                self._join(caller)
             return
         if before is not None:
             self.cancel(desired.reason or f'superseded by {desired.change.goal}', now,
                         superseded=True)
         self._start(desired, [caller] if caller else [], now)
 
-    def _join(self, caller: Caller, now: float) -> None:
-        """Keep a caller for the next command of the same value."""
+    def _join(self, caller: Caller) -> None:
+        """Keep a caller for the next command of the same value, unless this one has just begun."""
         assert self.desired is not None
         if caller.is_stream:
             older = tuple(one for one in self._next_callers if one.is_stream)
@@ -144,13 +146,16 @@ class Property(Generic[S]):
                 False, f'{MAX_CALLERS} requests are waiting for {self._target.kind} '
                 f'{self._target.address} already'), None, (caller,)))
             return
-        self._next_callers.append(caller)
+        if caller.asked_at > self._began_at or caller.is_stream:
+            self._next_callers.append(caller)
+        else:
+            self._callers.append(caller)
 
     def _start(self, desired: Desired[S], callers: list[Caller], now: float) -> None:
         asked_at = callers[0].asked_at if callers else now
         if self._under_way:
             self._under_way = {value: end for value, end in self._under_way.items() if now < end}
-        self.desired, self._callers, self.sent_at = desired, callers, now
+        self.desired, self._callers, self._began_at = desired, callers, now
         self.command = ConfirmedCommand(
             self._target, desired, now, asked_at=asked_at, fence=self.fence,
             is_sole_cause=self._is_sole_cause(desired),
@@ -177,7 +182,7 @@ class Property(Generic[S]):
 
     def note_sent(self, change: Change[S], now: float) -> None:
         """Note that a change was sent without a command that awaits its effect."""
-        self._unconfirmed, self.sent_at = change, now
+        self._unconfirmed, self._sent_at = change, now
         self.fence_until(now + FENCE)
 
     def cancel(self, message: str, now: float, *, superseded: bool = False) -> None:
@@ -223,6 +228,7 @@ class Property(Generic[S]):
         assert command is not None and desired is not None
         callers, waiting = self._callers, self._next_callers
         self.command, self.desired, self._callers, self._next_callers = None, None, [], []
+        self._sent_at = command.last_sent
         is_settled = result.success or result.refused
         self._unconfirmed = None if is_settled else desired.change
         # A superseded command may have got the acknowledgement of an earlier command.
@@ -237,6 +243,11 @@ class Property(Generic[S]):
         self.outcomes.append(Outcome(desired, result, status, tuple(callers)))
 
     # Known facts
+
+    @property
+    def sent_at(self) -> float:
+        """Return when a command was sent last, s."""
+        return self._sent_at if self.command is None else self.command.last_sent
 
     def expects(self, status: S) -> bool:
         """Return whether a status shows the change that is under way."""

@@ -112,7 +112,8 @@ def test_an_on_under_way_ends_at_the_silence_with_an_off(
     silent_at = pair.now + silence
     pair.run(5.0)
 
-    assert answer.result.message == f'off_after_silence: no request for {silence * 1000:.0f} ms'
+    assert answer.result.message == (
+        f'off_after_silence: no request has succeeded for {silence * 1000:.0f} ms')
     sent = [command.param1 for command in pair.commands(ON_OFF, since=silent_at)]
     assert set(sent) == {0.0}
 
@@ -219,6 +220,18 @@ def test_an_on_that_takes_effect_after_it_has_failed_does_not_count_as_a_request
     pair.run(0.2)
 
     assert light.fields['enable'] == 0
+
+
+def test_an_off_under_way_when_the_silence_ends_is_answered_as_it_ends() -> None:
+    light = FakeLight(enable=1)
+    pair = Pair(light, settings=LightSettings(off_after_silence=1.0)).settle()
+    assert pair.enable(True).success
+    light.results[ON_OFF] = None
+    answer = pair.ask_enable(False)
+    pair.run(1.5)
+    light.results.clear()
+
+    assert pair.wait_for(answer).success
 
 
 @pytest.mark.parametrize('latency', [0.002, 0.15])
@@ -426,3 +439,47 @@ def test_a_light_with_a_brightness_while_off_is_configured_while_offs_are_repeat
         pair.run(0.1)
 
     assert light.fields['brightness'] == (50.0 if case == 'restarted' else 60.0)
+
+
+def dark(**fields: float) -> tuple[FakeLight, Pair]:
+    """Return a light whose brightness is its switch, which has been seen off."""
+    light = FakeLight(enable=0, brightness=0.0)
+    light.brightness_is_switch = True
+    pair = Pair(light).settle()
+    assert pair.configure(brightness=60.0, **fields).success
+    return light, pair
+
+
+def test_what_is_restored_does_not_switch_a_light_on_where_brightness_is_the_switch() -> None:
+    light, pair = dark(strobe_period=1.0, strobe_duty_cycle=50.0)
+    pair.run(3.0)
+    light.restart(pair.now, enable=0, brightness=0.0)
+    pair.run(5.0)
+
+    assert (light.fields['enable'], light.fields['strobe_period']) == (0, 1.0)
+
+
+def test_a_set_of_another_field_does_not_undo_an_off_where_brightness_is_the_switch() -> None:
+    light, pair = dark()
+    off, configured = pair.ask_enable(False), pair.ask_configure(strobe_period=1.0)
+
+    assert pair.wait_for(off).success
+    assert pair.wait_for(configured).success
+    assert (light.fields['enable'], light.fields['strobe_period']) == (0, 1.0)
+
+
+def test_while_a_light_that_was_never_seen_off_goes_off_nothing_sets_its_brightness() -> None:
+    light = FakeLight(enable=1, brightness=60.0)
+    light.brightness_is_switch = True
+    pair = Pair(light).settle()
+    light.results[CONFIGURE] = None
+    brightness = pair.ask_configure(brightness=50.0)
+    pair.run(0.1)
+    light.results.clear()
+    off, other = pair.ask_enable(False), pair.ask_configure(strobe_period=1.0)
+    pair.run(3.0)
+
+    assert brightness.result.message == 'superseded by off'
+    assert other.result.message.startswith('an OFF is under way')
+    assert off.result.success
+    assert light.fields['enable'] == 0

@@ -328,6 +328,65 @@ def test_a_light_that_may_go_on_after_its_release_goes_off_where_release_is_off(
     assert 0.0 in shared.sent(ON_OFF, released_at)
 
 
+@pytest.mark.parametrize('is_stream', [True, False])
+@pytest.mark.parametrize('end', [
+    lambda shared: shared.release('operator'), lambda shared: shared.pair.run(TIMEOUT)],
+    ids=['release', 'source_timeout'])
+def test_an_on_under_way_ends_with_the_hold_of_its_source_where_release_is_off(
+    end: Callable[[Shared], None], is_stream: bool,
+) -> None:
+    shared = Shared(off_on_release=True)
+    shared.pair.settle()
+    shared.light.results[ON_OFF] = None
+    shared.enable('operator', False)
+    answer = shared.enable('operator', True, is_stream=is_stream)
+    end(shared)
+    shared.light.results.clear()
+    shared.pair.run(4.0)
+
+    assert not answer.result.success
+    assert (shared.light.fields['enable'], shared.holder) == (0, '')
+
+
+def test_a_call_whose_source_releases_the_light_meanwhile_claims_it_no_more() -> None:
+    shared = Shared()
+    shared.pair.settle()
+    answer = shared.call('operator', True)
+    shared.release('operator')
+    shared.pair.run(1.0)
+
+    assert answer.result.success
+    assert shared.holder == ''
+    assert shared.pair.wait_for(shared.call('autonomy', False)).success
+
+
+def test_an_off_that_a_call_under_way_refuses_is_sent_when_the_call_has_failed() -> None:
+    shared = Shared(light=FakeLight(enable=1))
+    shared.pair.settle()
+    shared.light.results[CONFIGURE] = mavlink.MAV_RESULT_DENIED
+    configured = shared.pair.ask_configure(brightness=30.0)
+    off = shared.enable('autonomy', False)
+    shared.pair.run(1.0)
+
+    assert (configured.result.success, off.result.message) == (False, 'held by default')
+    assert (shared.light.fields['enable'], shared.holder) == (0, 'autonomy')
+
+
+def test_an_off_of_the_next_source_is_sent_when_the_light_is_heard_again() -> None:
+    shared = Shared(timeout=4.0)
+    shared.pair.settle()
+    assert shared.pair.wait_for(shared.enable('safety', True)).success
+    shared.pair.run(2.0)
+    shared.enable('autonomy', False)
+    shared.pair.close()
+    shared.pair.run(3.0)
+    assert shared.holder == 'autonomy'
+    shared.pair.open()
+    shared.pair.run(1.0)
+
+    assert shared.light.fields['enable'] == 0
+
+
 def test_a_request_replaces_the_off_of_a_release_that_is_not_confirmed() -> None:
     shared = Shared(off_on_release=True)
     shared.pair.settle()

@@ -168,6 +168,17 @@ def test_a_closed_bridge_sends_no_change_but_off_where_that_is_asked_for(
     assert pair.recorder.failed_setpoints == []
 
 
+def test_the_off_at_the_end_is_sent_at_once_though_the_light_has_just_shown_off(
+    ending: Ending,
+) -> None:
+    pair = ending.pair
+    assert pair.enable(False).success
+    pair.ask_enable(True)
+    ending.begin()
+
+    assert ending.changes() == [(ON_OFF, 0.0)]
+
+
 @pytest.mark.parametrize('is_switch', [False, True])
 def test_an_on_that_the_off_overtakes_on_the_way_is_followed_by_another_off(
     ending: Ending, light: FakeLight, is_switch: bool,

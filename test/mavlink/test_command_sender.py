@@ -21,7 +21,6 @@ import math
 from typing import Any
 
 from illuminator_ros.mavlink.command_sender import (
-    CLOSING_TIMEOUT,
     Command,
     CommandPosition,
     CommandResult,
@@ -34,6 +33,7 @@ from illuminator_ros.mavlink.command_sender import (
 )
 from illuminator_ros.mavlink.dialect import mavlink
 from illuminator_ros.mavlink.messages import Address, CommandInt, CommandLong, heartbeat, Message
+from illuminator_ros.mavlink.retries import CLOSING
 import pytest
 from support.command_rig import DELAY, LIGHT, OURS, Rig
 
@@ -247,7 +247,7 @@ def test_closed_sender_ends_all_commands_and_sends_no_others_than_those_of_the_e
     rig.run(2.05)
     # It is repeated for as long as the process lasts.
     assert [at - 1000.0 for at, _ in last.frames] == pytest.approx(
-        [CLOSING_TIMEOUT * number for number in range(21)])
+        [CLOSING.first * number for number in range(21)])
     assert [run.outcomes for run in (request, off, last)] == [[]] * 3
 
 

@@ -156,7 +156,7 @@ SINGLE, REPEATED = ({'change': Level(5, is_idempotent=False)},
     (HIDES, {'fence': 0.6, 'is_sole_cause': True}, True, ACCEPTS, FENCED, 0.62, ()),
     (OBEYS, {'is_sole_cause': True}, True, NOT_ACKNOWLEDGED, SILENT, 1.77, ()),
     # At the end of the process a status counts after three tries, also within the fence.
-    ({}, {'fence': FENCE, 'is_last': True, 'insists': True}, True, SHOWN, [0.0, 0.25, 0.5], 0.52,
+    ({}, {'fence': FENCE, 'is_last': True, 'insists': True}, True, SHOWN, [0.0, 0.1, 0.2], 0.22,
      ()),
     ({}, {'is_last': True, 'insists': True}, True, SHOWN, ONCE, 0.02, ()),
     # A command that insists does without an acknowledgement after three tries, and is also sent

@@ -21,12 +21,14 @@ test_confirmed_command.py has the evidence for one command.
 from __future__ import annotations
 
 from collections.abc import Sequence
+import functools
 import math
 from typing import Any
 
 from hypothesis import given, strategies
 from illuminator_ros.payload.confirmed_command import Desired, FENCE, Result
 from illuminator_ros.payload.device_property import (
+    answer,
     Caller,
     LATE_TIME,
     MAX_CALLERS,
@@ -144,6 +146,31 @@ def test_callers_are_bounded_and_of_a_stream_the_newest_waits() -> None:
     assert {len(answer) for answer in (*answers, *stream)} == {1}
     assert stream[-1][0].success
     assert len(bench.tries) == 2
+
+
+def test_callers_who_ask_at_one_time_share_a_command_and_are_answered_in_that_order() -> None:
+    bench, order = PropertyBench(executes=[]).report(), list[int]()
+    for number in range(3):
+        bench.property.want(Desired(Level(3), limit=0.9), bench.now, Caller(
+            functools.partial(lambda number, result, now: order.append(number), number),
+            bench.now))
+    bench.run(1.0)
+    (outcome,) = bench.property.outcomes
+    answer(outcome.callers, outcome.result, bench.now)
+
+    assert order == [0, 1, 2]
+    assert bench.tries == [0.0]
+
+
+def test_the_time_of_the_last_try_is_kept_when_the_command_ends() -> None:
+    bench = PropertyBench(0, *[None] * 9).report()
+    bench.want(3)
+    bench.run(1.8)
+    assert bench.property.sent_at == 1.75
+    bench.run(4.0)
+
+    assert not bench.property.command
+    assert bench.property.sent_at == 1.75
 
 
 def test_the_limit_counts_from_the_request() -> None:
