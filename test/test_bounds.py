@@ -278,7 +278,7 @@ ROWS = {
         signed_streams, {**LINK, 'Signing.streams': MAX_STREAMS}, {**SENT, **STAMPS, **LIGHTS}),
     'own frames': Row(own_frames, {'LoopbackFilter.sent': frame_writer.MAX_FRAMES, **STAMPS}),
     'requests to a light': Row(requests, {
-        'Property.next_callers': MAX_CALLERS - 1, 'LightSources.calling': MAX_CALLERS}),
+        'Property.callers': MAX_CALLERS, 'LightSources.calling': MAX_CALLERS}),
     'forwarded frames': Row(
         functools.partial(forwarded, MAX_FRAMES + COUNT, heartbeat(44)),
         {'DuplicateFilter.arrivals': MAX_FRAMES, 'RoutingTable.routes': MAX_ROUTES,

@@ -70,7 +70,7 @@ class Light:
             self._due = None
             self._queries.begin(now)
             self._emit(DeviceConnected(self.address))
-            self.control.set_desired({}, now)
+            self.control.require({}, now)
 
     def announce(self, now: float) -> None:
         """Note that it has proved to be a light."""

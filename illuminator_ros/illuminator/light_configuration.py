@@ -116,7 +116,7 @@ class LightConfiguration:
     :ivar exceeded: how the light exceeds the limits.
     :ivar brightness_is_switch: whether a brightness above 0 switches the light on, as in ArduSub:
         it reports 0 while it is off; None if unknown.
-    :ivar changes: the property of the light; :meth:`take` takes its outcomes.
+    :ivar property: that of the light; :meth:`take` takes its outcomes.
     """
 
     def __init__(
@@ -126,9 +126,9 @@ class LightConfiguration:
         self.agreed: Configuration | None = None
         self.exceeded = events.LimitExceeded(target.address, (), '')
         self.brightness_is_switch: bool | None = None
-        self.changes: Property[Status] = Property(target)
+        self.property: Property[Status] = Property(target)
         self._emit = emit
-        self._commands = target.commands
+        self._target = target
         self._limits = limits
         self._restores = restores
         self._required = Required({})
@@ -163,11 +163,11 @@ class LightConfiguration:
     @property
     def _sendable(self) -> Collection[str]:
         """Return the fields that may be sent now though no request asks for them."""
-        if self._commands.refusal or (
+        if self._target.commands.refusal or (
                 self._is_off_pending and self.brightness_is_switch is not False):
             # The process ends, or the configuration may undo an OFF.
             return ()
-        status = self.changes.newest
+        status = self.property.newest
         return FIELDS if status is None or not status.is_dark else [
             name for name in FIELDS if name != 'brightness']
 
@@ -183,7 +183,7 @@ class LightConfiguration:
         :param is_off_pending: whether an OFF is under way, which a brightness may undo.
         """
         self._is_off_pending, self._due = is_off_pending, math.inf
-        if self.changes.desired is not None:
+        if self.property.desired is not None:
             return
         if self._required.fields:
             self._check_required()
@@ -204,9 +204,9 @@ class LightConfiguration:
             return
         if desired.reason == _SETPOINT:
             self._setpoint = None
-            status = self.changes.newest
+            status = self.property.newest
             if (self.agreed is not None and self.agreed.brightness == setpoint
-                    and self.changes.unconfirmed(now) is None
+                    and self.property.unconfirmed(now) is None
                     and not (status is not None and _differ(self.agreed, status))):
                 return
         else:
@@ -214,7 +214,7 @@ class LightConfiguration:
             if self._required.with_reason(Reason.LIMIT):
                 self._limited_at = now
         self._due = math.inf
-        self.changes.want(desired, now)
+        self.property.want(desired, now)
 
     def _check_required(self) -> None:
         """Drop required values that are outside the range that the light reports."""
@@ -224,7 +224,7 @@ class LightConfiguration:
             except InvalidValue as error:
                 self._required.drop([name])
                 self._restored(False, str(error))
-                if self.agreed is not None and (status := self.changes.newest) is not None:
+                if self.agreed is not None and (status := self.property.newest) is not None:
                     # Other fields are sent with the value that the light has.
                     kept = getattr(status.configuration(self.agreed), name)
                     self._adopt(replace(self.agreed, **{name: kept}), events.ChangeCause.LIGHT)
@@ -233,14 +233,14 @@ class LightConfiguration:
         """Note that the light must not get a value."""
         if reason == _SETPOINT:
             self._setpoint = None
-        self.changes.outcomes.append(Outcome(
+        self.property.outcomes.append(Outcome(
             Desired(NOTHING_CHANGED, reason), Result(False, message, permanent=not reason), None,
             callers))
 
     @property
     def _under_way(self) -> Configure | None:
         """Return the change that is under way, None if there is none."""
-        desired = self.changes.desired
+        desired = self.property.desired
         return (desired.change if desired is not None and isinstance(desired.change, Configure)
                 else None)
 
@@ -270,7 +270,7 @@ class LightConfiguration:
                         f'set to {DEFAULT_DUTY_CYCLE:g} %')
             # Under external sync a light may report the period of the signal, which it denies.
             base = replace(base, strobe_period=self.strobe_range.nearest(base.strobe_period))
-            status = self.changes.newest
+            status = self.property.newest
             if 'brightness' not in names and (
                     status is not None and status.is_dark
                     or self._is_off_pending and self.brightness_is_switch):
@@ -305,7 +305,7 @@ class LightConfiguration:
         except InvalidValue as error:
             self._not_sent(str(error), '', caller)
         else:
-            self.changes.want(Desired(change, limit=CONFIGURE_LIMIT), now, caller)
+            self.property.want(Desired(change, limit=CONFIGURE_LIMIT), now, caller)
 
     def set_brightness(self, brightness: float) -> None:
         """Take a setpoint of a stream, %, checked; the next update sends it."""
@@ -313,7 +313,7 @@ class LightConfiguration:
             self._limits.check('brightness', brightness)
         except InvalidValue as error:
             brightness = self._limits.max_brightness
-            self._emit(events.SetpointClipped(self.exceeded.key, str(error)))
+            self._emit(events.SetpointClipped(self._target.address, str(error)))
         self._setpoint = brightness
 
     def require(self, values: Changes, now: float) -> None:
@@ -326,19 +326,19 @@ class LightConfiguration:
         due = now if self.agreed else now + FIRST_STATUS_TIMEOUT
         self._required = self._required.merged(values, Reason.OVERRIDE, due)
 
-    def cancel(self, message: str, now: float, *, superseded: bool = True) -> None:
+    def cancel(self, message: str, now: float, *, superseded: bool) -> None:
         """End all requests; required values stay."""
         if self._setpoint is not None and not superseded:
-            self._emit(events.SetpointFailed(self.exceeded.key, message))
+            self._emit(events.SetpointFailed(self._target.address, message))
         self._setpoint = None
-        self.changes.cancel(message, now, superseded=superseded)
+        self.property.cancel(message, now, superseded=superseded)
 
     def change_limits(self, limits: SafetyLimits, now: float) -> None:
         """Replace the limits, and bring a light that exceeds them back within them."""
         # The next update sends what they demand.
         self._limits, self._limited_at, self._due = limits, -math.inf, -math.inf
         self._required.drop(self._required.with_reason(Reason.LIMIT))
-        desired = self.changes.desired
+        desired = self.property.desired
         if desired is not None and (under_way := self._under_way):
             goal = under_way.configuration
             limited = limits.clipped(goal, self.strobe_range)
@@ -346,10 +346,10 @@ class LightConfiguration:
                 # A resend would exceed the limits. The newest setpoint is sent as the limit.
                 if desired.reason == _SETPOINT and self._setpoint is None:
                     self._setpoint = limited.brightness
-                self.changes.cancel(
+                self.property.cancel(
                     ', '.join(limits.excess(goal)) or 'a limit was changed', now,
                     superseded=bool(desired.reason))
-        status = self.changes.newest
+        status = self.property.newest
         if status is not None and (self.agreed or status.complete):
             self._keep_limits(status.configuration(self.agreed or NOTHING), now)
 
@@ -358,7 +358,7 @@ class LightConfiguration:
     @property
     def strobe_range(self) -> StrobeRange:
         """Return the strobe periods that the light reports to be possible."""
-        status = self.changes.newest
+        status = self.property.newest
         return status.strobe_range if status is not None else StrobeRange()
 
     @property
@@ -369,7 +369,7 @@ class LightConfiguration:
     def may_switch(self, now: float) -> bool:
         """Return whether a command of ours may have switched the light by its brightness."""
         return bool(self.brightness_is_switch) and (
-            self.changes.command is not None or now <= self.changes.sent_at + IMPLIED_TIME)
+            self.property.command is not None or now <= self.property.sent_at + IMPLIED_TIME)
 
     def excess(self, status: Status) -> tuple[str, ...]:
         """Describe how a status exceeds the limits."""
@@ -390,8 +390,8 @@ class LightConfiguration:
         """
         if status.enabled is False and status.brightness is not None:
             self.brightness_is_switch = status.brightness == 0.0
-        was_busy, late = self.changes.command is not None, self.changes.unconfirmed(now)
-        self.changes.reported(status, now)
+        was_busy, late = self.property.command is not None, self.property.unconfirmed(now)
+        self.property.reported(status, now)
         if self.agreed or status.complete:
             reported = status.configuration(self.agreed or NOTHING)
             if not was_busy:
@@ -412,7 +412,7 @@ class LightConfiguration:
             # The light has other values now.
             self._required.drop(self._required.with_reason(Reason.LIMIT))
         self._limited_at = -math.inf
-        self.changes.restarted(status, now)
+        self.property.restarted(status, now)
         if self.agreed or status.complete:
             reported = status.configuration(self.agreed or NOTHING)
             if under_way is None:
@@ -476,7 +476,7 @@ class LightConfiguration:
             if late is not None and late.shown_by(status):
                 cause = events.ChangeCause.LATE_EFFECT
             elif now <= IMPLIED_TIME + max(
-                    switched_at, -math.inf if late else self.changes.sent_at):
+                    switched_at, -math.inf if late else self.property.sent_at):
                 cause = events.ChangeCause.REQUEST
         self._adopt(replace(self.agreed, **{name: getattr(reported, name) for name in names}),
                     cause)
@@ -489,7 +489,8 @@ class LightConfiguration:
         names = [name for name in FIELDS
                  if old is None or getattr(old, name) != getattr(configuration, name)]
         if names:
-            self._emit(events.ConfigurationChanged(self.exceeded.key, configuration, names, cause))
+            self._emit(events.ConfigurationChanged(
+                self._target.address, configuration, names, cause))
 
     def _keep_limits(self, reported: Configuration, now: float) -> None:
         """Bring a light that exceeds a limit back within it."""
@@ -500,7 +501,7 @@ class LightConfiguration:
             self.exceeded.is_again if self.exceeded.excess
             else now < self._limited_at + LIMIT_INTERVAL)
         exceeded = events.LimitExceeded(
-            self.exceeded.key, excess, self._limits.impossible(self.strobe_range), is_again)
+            self._target.address, excess, self._limits.impossible(self.strobe_range), is_again)
         if exceeded != self.exceeded:
             self.exceeded = exceeded
             self._emit(exceeded)
@@ -508,7 +509,7 @@ class LightConfiguration:
         beyond, known = reported.differences(limited), self._required.with_reason(Reason.LIMIT)
         self._required.drop([name for name in known if name not in beyond])
         values = {name: getattr(limited, name) for name in beyond if name not in known}
-        if excess and values and self.changes.command is None:
+        if excess and values and self.property.command is None:
             self._required = self._required.merged(
                 values, Reason.LIMIT, max(now, self._limited_at + LIMIT_INTERVAL))
 
@@ -524,11 +525,11 @@ class LightConfiguration:
                 name for name, (value, _) in [*self._required.fields.items()]
                 if name in change.names or value == getattr(change.configuration, name)])
         elif result.contradicted:
-            self._failure = result.message, change.configuration, self.changes.newest
+            self._failure = result.message, change.configuration, self.property.newest
         if desired.reason == _REQUIRED and not result.superseded:
             self._required_ended(result, now)
         elif desired.reason == _SETPOINT and not (result.success or result.superseded):
-            self._emit(events.SetpointFailed(self.exceeded.key, result.message))
+            self._emit(events.SetpointFailed(self._target.address, result.message))
 
     def _accepted(self, goal: Configuration, status: Status | None) -> None:
         """
@@ -562,13 +563,13 @@ class LightConfiguration:
             required.failure = result.message
 
     def _restored(self, success: bool, message: str, *, is_final: bool = True) -> None:
-        self._emit(events.ConfigurationRestored(self.exceeded.key, success, message, is_final))
+        self._emit(events.ConfigurationRestored(self._target.address, success, message, is_final))
 
     # Time
 
     def next_deadline(self) -> float:
-        """Return when ``changes.poll`` or :meth:`update` has something to do."""
-        return min(self.changes.next_deadline(), self._due)
+        """Return when ``property.poll`` or :meth:`update` has something to do."""
+        return min(self.property.next_deadline(), self._due)
 
 
 def _differ(configuration: Configuration, status: Status) -> bool:

@@ -141,8 +141,8 @@ class LightControl:
     def _prepare_off(self, now: float) -> None:
         """End what an OFF must not be followed by, where the brightness may be the switch."""
         if self.configuration.brightness_is_switch is not False:
-            self.configuration.cancel('superseded by off', now)
-            self.switch.changes.fence_until(self.configuration.changes.fence)
+            self.configuration.cancel('superseded by off', now, superseded=True)
+            self.switch.property.fence_until(self.configuration.property.fence)
 
     def configure(self, changes: Changes, now: float, done: Done) -> None:
         """
@@ -175,7 +175,7 @@ class LightControl:
             self.configuration.set_brightness(brightness)
         self.update(now)
 
-    def set_desired(self, values: Changes, now: float) -> None:
+    def require(self, values: Changes, now: float) -> None:
         """
         Send values, and what is required already, once the light has reported its configuration.
 
@@ -206,7 +206,7 @@ class LightControl:
             sources.forget_switch(source)
         sent = is_off and not held and self._send_unheard_off()
         if sent:
-            self.switch.changes.note_sent(OFF, now)
+            self.switch.property.note_sent(OFF, now)
         if refusal := late or held or self.unreachable(now):
             refusal += '; an OFF was sent once' if sent else ''
             caller.done(Result(False, refusal), now)
@@ -247,7 +247,7 @@ class LightControl:
 
     def _end_requests(self, message: str, now: float) -> None:
         self.switch.cancel(message, now, superseded=True)
-        self.configuration.cancel(message, now)
+        self.configuration.cancel(message, now, superseded=True)
 
     def is_held_by_other(self, source: str) -> bool:
         """Return whether another source holds the light, so that a request is not sent."""
@@ -319,8 +319,8 @@ class LightControl:
         has_outcomes = True
         while has_outcomes:
             for part in parts:
-                while part.changes.outcomes:
-                    outcome = part.changes.outcomes.popleft()
+                while part.property.outcomes:
+                    outcome = part.property.outcomes.popleft()
                     part.take(outcome, now)
                     self._finish(outcome, now)
             if self._liveness.connected:
@@ -329,7 +329,7 @@ class LightControl:
                 if switch.is_off_due(now):
                     self._prepare_off(now)
                 switch.update(now)
-            has_outcomes = bool(switch.changes.outcomes or configuration.changes.outcomes)
+            has_outcomes = bool(switch.property.outcomes or configuration.property.outcomes)
 
     def _finish(self, outcome: Outcome[Status], now: float) -> None:
         """Take the end of a value: a call that has succeeded counts from now on."""
@@ -360,7 +360,7 @@ class LightControl:
         """Answer all requests, and make no change any more but :meth:`switch_off_finally`."""
         self.sources = LightSources(None)
         self.switch.close(self._commands.refusal, now)
-        self.configuration.cancel(self._commands.refusal, now)
+        self.configuration.cancel(self._commands.refusal, now, superseded=True)
         self.update(now)
 
     def switch_off_finally(self, now: float, report: Done) -> None:
@@ -381,11 +381,11 @@ class LightControl:
 
     def expects(self, status: Status) -> bool:
         """Return whether a status shows what a command under way changes."""
-        return self.switch.changes.expects(status) or self.configuration.changes.expects(status)
+        return self.switch.property.expects(status) or self.configuration.property.expects(status)
 
     def may_cause(self, now: float) -> bool:
         """Return whether a command of ours may have caused what a status shows."""
-        switch, configuration = self.switch.changes, self.configuration.changes
+        switch, configuration = self.switch.property, self.configuration.property
         return switch.command is not None or configuration.command is not None or (
             now <= max(switch.sent_at, configuration.sent_at) + IMPLIED_TIME)
 
@@ -396,7 +396,7 @@ class LightControl:
         :param is_followed: whether changes of others are followed and reported.
         """
         self._forget_silenced(now)
-        switched_at = self.switch.changes.sent_at
+        switched_at = self.switch.property.sent_at
         self.switch.reported(status, now, may_be_ours=self.configuration.may_switch(now),
                              is_told=is_followed)
         self.configuration.reported(
@@ -420,8 +420,8 @@ class LightControl:
     def poll(self, now: float) -> None:
         """Do what is due."""
         self._take_holder(self.sources.poll(now), now)
-        self.switch.changes.poll(now)
-        self.configuration.changes.poll(now)
+        self.switch.property.poll(now)
+        self.configuration.property.poll(now)
         self.update(now)
 
     def next_deadline(self) -> float:

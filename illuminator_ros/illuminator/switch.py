@@ -63,7 +63,7 @@ class Switch:
     :ivar enabled: as reported, None if unknown; while heat keeps the light off, as before, since
         it may light up once it has cooled down.
     :ivar silence: of all who may request something.
-    :ivar changes: the property of the light; :meth:`take` takes its outcomes.
+    :ivar property: that of the light; :meth:`take` takes its outcomes.
     """
 
     def __init__(
@@ -73,7 +73,7 @@ class Switch:
         self._target = target
         self._emit = emit
         self.silence = Silence(off_after_silence)
-        self.changes: Property[Status] = Property(target)
+        self.property: Property[Status] = Property(target)
         # The OFF of a release, until the light shows it.
         self._required: Desired[Status] | None = None
         # Takes the results of the OFF at the end of the process.
@@ -99,7 +99,7 @@ class Switch:
                 and not self.is_pending(OFF)):
             return Desired(OFF, 'off_after_silence: no request has succeeded for '
                            f'{format_seconds(self.silence.limit)}', insists=True)
-        return self.changes.desired or self._required
+        return self.property.desired or self._required
 
     def is_off_due(self, now: float) -> bool:
         """Return whether an OFF is desired that is not under way."""
@@ -109,7 +109,7 @@ class Switch:
     def update(self, now: float) -> None:
         """Send what the goal asks for; the light must be connected."""
         desired = self.goal(now)
-        under_way = self.changes.desired
+        under_way = self.property.desired
         if desired is not None and desired.insists and under_way is None and now < self._off_due:
             # Two lights with one address end an OFF and need the next at the speed of the line.
             self._silence_due = self._off_due
@@ -117,7 +117,7 @@ class Switch:
         if desired is not None and desired is not under_way and not (
                 under_way and under_way.equals(desired)):
             self._want(desired, now)
-        command, under_way = self.changes.command, self.changes.desired
+        command, under_way = self.property.command, self.property.desired
         if command is not None and under_way is not None and under_way.insists:
             self._tell_failure(command.failure(), now)
         waits = self.silence.limit and self.may_be_on(now) and not self.is_pending(OFF)
@@ -127,17 +127,17 @@ class Switch:
         if desired.insists and self._report is None:
             self._emit(events.AutomaticSwitch(self._target.address, False, desired.reason))
         self._has_told_failure = False
-        self.changes.want(desired, now, caller)
+        self.property.want(desired, now, caller)
 
     def _tell_failure(self, failure: str, now: float) -> None:
         """Report why an automatic OFF is not confirmed: once, or the newest reason at the end."""
         if failure and self._report is not None:
             self._report(Result(False, failure), now)
         elif failure and not self._has_told_failure:
-            assert self.changes.desired is not None
+            assert self.property.desired is not None
             self._has_told_failure = True
             self._emit(events.AutomaticSwitch(
-                self._target.address, False, self.changes.desired.reason, failure))
+                self._target.address, False, self.property.desired.reason, failure))
 
     # Requests
 
@@ -153,7 +153,7 @@ class Switch:
 
     def cancel(self, message: str, now: float, *, superseded: bool = False) -> None:
         """End the command under way; an automatic OFF is sent again by the next update."""
-        self.changes.cancel(message, now, superseded=superseded)
+        self.property.cancel(message, now, superseded=superseded)
 
     def close(self, message: str, now: float) -> None:
         """End everything that is desired, since the process ends."""
@@ -163,21 +163,21 @@ class Switch:
     def switch_off_finally(self, now: float, report: Done) -> None:
         """See :meth:`.light_control.LightControl.switch_off_finally`."""
         self._report, self._is_finally_off = report, False
-        report(Result(False, 'sent, not confirmed' if now < self.changes.fence else ''), now)
+        report(Result(False, 'sent, not confirmed' if now < self.property.fence else ''), now)
 
     # Known facts
 
     def is_pending(self, change: OnOff) -> bool:
         """Return whether a change is under way."""
-        desired = self.changes.desired
+        desired = self.property.desired
         return desired is not None and desired.change == change
 
     def may_be_on(self, now: float) -> bool:
         """Return whether the light is on, or may go on by an ON of ours."""
         return bool(
             self.enabled or self.is_pending(ON)
-            or self.changes.unconfirmed(now) == ON
-            and (self.enabled is None or now < self.changes.fence))
+            or self.property.unconfirmed(now) == ON
+            and (self.enabled is None or now < self.property.fence))
 
     @property
     def off_at(self) -> float:
@@ -197,7 +197,7 @@ class Switch:
         """
         before, was_off_by_heat = self.enabled, self._is_off_by_heat
         self._take_enabled(status)
-        is_busy, origin = self.changes.command is not None, ''
+        is_busy, origin = self.property.command is not None, ''
         if self.enabled is not before or self.enabled is not self._told:
             origin = (events.LATE_EFFECT if self._is_late(now) else
                       events.A_REQUEST if may_be_ours else events.OTHER_SENDER)
@@ -207,8 +207,8 @@ class Switch:
                 before is None or not before and origin == events.OTHER_SENDER):
             # Another sender has switched it on, or it was on when it was found.
             self.silence.requested_at = now
-        self.changes.reported(status, now)
-        if origin and not (self.changes.outcomes or self.changes.command is not None):
+        self.property.reported(status, now)
+        if origin and not (self.property.outcomes or self.property.command is not None):
             shows_switch = not (status.is_dimmed or status.mode is Mode.EXTERNAL_SYNC)
             self._tell(origin if is_told and shows_switch and self._told is not None else '')
 
@@ -221,7 +221,7 @@ class Switch:
     def _is_late(self, now: float) -> bool:
         """Return whether a command of ours that ended unconfirmed asked for this state."""
         return self.enabled is not None and (
-            self.changes.unconfirmed(now) == SWITCHES[self.enabled])
+            self.property.unconfirmed(now) == SWITCHES[self.enabled])
 
     def _tell(self, origin: str) -> None:
         """Report a state that differs from the last reported state."""
@@ -235,7 +235,7 @@ class Switch:
         self.enabled, self._is_off_by_heat = None, False
         self._take_enabled(status)
         self._tell('')
-        self.changes.restarted(status, now)
+        self.property.restarted(status, now)
 
     def take(self, outcome: Outcome[Status], now: float) -> None:
         """Take the end of a value."""
@@ -258,5 +258,5 @@ class Switch:
     # Time
 
     def next_deadline(self) -> float:
-        """Return when ``changes.poll`` or :meth:`update` has something to do."""
-        return min(self.changes.next_deadline(), self._silence_due)
+        """Return when ``property.poll`` or :meth:`update` has something to do."""
+        return min(self.property.next_deadline(), self._silence_due)

@@ -306,7 +306,8 @@ class ConfirmedCommand(Generic[S]):
             # Within the fence it may be the answer to an earlier command. It counts where no call
             # waits for the result: one lost answer would otherwise slow down a stream for ever.
             is_fenced = now < self._fence
-            self._acknowledged += not (is_fenced and self._is_awaited)
+            if not (is_fenced and self._is_awaited):
+                self._acknowledged += 1
             if is_fenced or self._answer is not None and not self._desired.insists:
                 return
             if self._answer is None:
@@ -328,12 +329,12 @@ class ConfirmedCommand(Generic[S]):
 
     def _counts(self, now: float) -> bool:
         """Return whether a status that comes now was sent after the command, as far as known."""
-        sending = self._sending
+        sending, desired = self._sending, self._desired
         if now < self._fence:
-            return self._desired.is_last and sending.tries >= ENOUGH_TRIES
-        if sending.result is not None or self._answer is not None:
-            return True
-        return sending.tries >= ENOUGH_TRIES if self._desired.insists else sending.is_last_try
+            return desired.is_last and sending.tries >= ENOUGH_TRIES
+        is_answered = sending.result is not None or self._answer is not None
+        return is_answered or (
+            sending.tries >= ENOUGH_TRIES if desired.insists else sending.is_last_try)
 
     def reported(self, status: S, gap: float, now: float) -> Result | None:
         """

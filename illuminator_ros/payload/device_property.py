@@ -171,10 +171,11 @@ class Property(Generic[S]):
         """
         if desired.limit > FENCE:
             return False
-        others = self._under_way.keys() - {desired.value}
-        is_new = len(others) == len(self._under_way) < MAX_VALUES or not others
-        return (is_new and self.newest is not None
-                and desired.change.shown_by(self.newest) is False)
+        under_way = self._under_way
+        has_others = bool(under_way.keys() - {desired.value})
+        if has_others and (desired.value in under_way or len(under_way) == MAX_VALUES):
+            return False
+        return self.newest is not None and desired.change.shown_by(self.newest) is False
 
     def fence_until(self, fence: float) -> None:
         """Count nothing before a time: other commands that may set the property are under way."""

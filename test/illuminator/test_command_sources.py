@@ -412,7 +412,7 @@ def test_values_that_wait_when_a_light_is_released_do_not_switch_it_on_later() -
     pair.run(1.0)
     pair.wait_for(shared.enable('operator', False))
     light.results[CONFIGURE] = None
-    pair.light.control.set_desired({'brightness': 20.0}, pair.now)
+    pair.light.control.require({'brightness': 20.0}, pair.now)
     # The second try of the values was sent 2.4 s ago, and the third one is due in 0.3 s.
     pair.run(4.4)
     shared.release('operator')

@@ -415,7 +415,7 @@ def test_a_setpoint_waits_for_a_set_and_does_not_end_it(fake: FakeLight, faked: 
 
 def test_a_stream_does_not_keep_overrides_from_being_sent(fake: FakeLight, faked: Pair) -> None:
     fake.results[CONFIGURE] = [None, None, None, ACCEPTED]
-    faked.light.control.set_desired({'strobe_period': 2.0}, faked.now)
+    faked.light.control.require({'strobe_period': 2.0}, faked.now)
     publish(faked, *[value % 100 / 1.0 for value in range(400)], rate=50)
     assert fake.fields['strobe_period'] == 2.0
 
@@ -425,7 +425,7 @@ def test_a_stream_does_not_keep_overrides_from_being_sent(fake: FakeLight, faked
 def overriding(fake: FakeLight, settings: LightSettings | None = None, **values: Any) -> Pair:
     """Return a pair whose light must be configured as soon as it is found."""
     return Pair(fake, settings=settings,
-                on_light=lambda light: light.control.set_desired(values, START))
+                on_light=lambda light: light.control.require(values, START))
 
 
 def successes(pair: Pair) -> list[bool]:
@@ -492,7 +492,7 @@ def test_overrides_and_a_restored_configuration_reach_a_light_that_answers_too_l
     fake: FakeLight, latency: float,
 ) -> None:
     pair = Pair(fake, there=Faults(latency=latency),
-                on_light=lambda light: light.control.set_desired({'brightness': 30.0}, START))
+                on_light=lambda light: light.control.require({'brightness': 30.0}, START))
     for _ in range(2):
         at = pair.now
         fake.restart(at)

@@ -160,7 +160,7 @@ def test_a_closed_bridge_sends_no_change_but_off_where_that_is_asked_for(
     later = [pair.ask_enable(True), pair.ask_enable(False), pair.ask_configure(brightness=30.0),
              pair.ask_refresh()]
     pair.light.control.set_brightness(40.0, pair.now)
-    pair.light.control.set_desired({'brightness': 50.0}, pair.now)
+    pair.light.control.require({'brightness': 50.0}, pair.now)
     pair.run(LIMIT)
 
     assert {answer.result.message for answer in under_way + later} == {ENDING}

@@ -63,7 +63,7 @@ def test_limits_hold_for_each_frame_on_the_wire(
         elif way == 'stream':
             pair.light.control.set_brightness(brightness, pair.now)
         elif way == 'override':
-            pair.light.control.set_desired(
+            pair.light.control.require(
                 {'brightness': brightness, 'strobe_period': strobe_period}, pair.now)
         elif way == 'restart':
             pair.device.restart(pair.now)

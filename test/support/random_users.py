@@ -94,7 +94,7 @@ class RandomUsers:
 
     def desire(self) -> None:
         if light := self.light():
-            light.control.set_desired({'strobe_duty_cycle': 30.0}, self.pair.now)
+            light.control.require({'strobe_duty_cycle': 30.0}, self.pair.now)
 
     def release(self) -> None:
         if light := self.light():

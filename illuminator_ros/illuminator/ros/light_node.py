@@ -131,7 +131,7 @@ class LightNode:
             for event in light.snapshot(now).events():
                 self.take(event)
             if self._overrides:
-                light.control.set_desired(self._overrides, now)
+                light.control.require(self._overrides, now)
 
     def release(self) -> None:
         """Serve no light: it was forgotten."""
