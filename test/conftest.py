@@ -25,7 +25,8 @@ settings.register_profile(
 settings.load_profile('steady')
 # Files that take longer than 10 s.
 LONG = {f'test_{name}.py' for name in (
-    'app', 'conformance', 'findings', 'gimbal_node', 'manager_node', 'mavsdk', 'rededge', 'tf')}
+    'app', 'conformance', 'findings', 'gimbal_node', 'manager_node', 'mavsdk', 'packaging',
+    'rededge')}
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:

@@ -35,7 +35,7 @@ from support.frames import Codec
 MAX_HOPS = 200
 
 
-class FakeSelector(selectors.DefaultSelector):
+class FakeSelector(selectors.BaseSelector):
     """Registers anything, and finds nothing."""
 
     def __init__(self) -> None:
@@ -50,6 +50,9 @@ class FakeSelector(selectors.DefaultSelector):
 
     def get_map(self) -> Any:
         return self.keys
+
+    def select(self, timeout: float | None = None) -> list[tuple[selectors.SelectorKey, int]]:
+        return []
 
 
 class Port(Channel):

@@ -29,6 +29,7 @@ from illuminator_ros.mavlink.messages import Address
 from illuminator_ros.mavlink.signing import Signing
 from illuminator_ros.mavlink.transport.udp import UdpChannel
 from illuminator_ros.mavlink.url import HostPort, UdpUrl
+from support.network import FakeSelector
 
 Datagram = tuple[bytes, Any]
 URL = UdpUrl(HostPort('127.0.0.1', 0))
@@ -55,26 +56,16 @@ class _Socket:
         pass
 
 
-class _Selector(selectors.BaseSelector):
+class _Selector(FakeSelector):
     """Finds data in the inbox, and lets time pass if it is empty."""
 
     def __init__(self, link: SimulatedLink) -> None:
+        super().__init__()
         self._link = link
-        self._keys: dict[Any, selectors.SelectorKey] = {}
-
-    def register(self, fileobj: Any, events: int, data: Any = None) -> selectors.SelectorKey:
-        self._keys[fileobj] = selectors.SelectorKey(fileobj, -1, events, data)
-        return self._keys[fileobj]
-
-    def unregister(self, fileobj: Any) -> selectors.SelectorKey:
-        return self._keys.pop(fileobj)
-
-    def get_map(self) -> Any:
-        return self._keys
 
     def select(self, timeout: float | None = None) -> list[tuple[selectors.SelectorKey, int]]:
         link = self._link
-        key = self._keys.get(link.socket)
+        key = self.keys.get(link.socket)
         ready = [(key, selectors.EVENT_READ)] if key and link.socket.inbox else []
         while link.meanwhile:
             link.meanwhile.popleft()()

@@ -192,13 +192,20 @@ class Line:
 
     def turn(self) -> None:
         """Do what a link's thread does in one turn, at both ends."""
-        for end, wire in ((self.far, self.near.wire), (self.near, self.far.wire)):
-            for data in wire.receive(self.now):
-                end.take(data, self.now)
+        self._deliver()
         for end in (self.far, self.near):
             if self.now >= end.endpoint.next_deadline():
                 end.endpoint.poll(self.now)
             end.flush(self.now)
+        self._deliver()
+
+    def _deliver(self) -> None:
+        """Deliver what has arrived, also the answers to it."""
+        ways = (self.far, self.near.wire), (self.near, self.far.wire)
+        while any(wire.next_arrival() <= self.now for _, wire in ways):
+            for end, wire in ways:
+                for data in wire.receive(self.now):
+                    end.take(data, self.now)
 
     def run(self, seconds: float) -> None:
         """Let time pass."""
