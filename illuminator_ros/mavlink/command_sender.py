@@ -82,15 +82,19 @@ class CommandPosition:
     z: float
 
     def __post_init__(self) -> None:
-        for value in self.scaled:
-            if not -0x80000000 <= value <= INT32_UNSET:
+        for value in self.x, self.y:
+            # NaN is not above it.
+            if abs(value) * self._scale > INT32_UNSET:
                 raise ValueError(f'a position of {self.x:g}, {self.y:g} does not fit COMMAND_INT')
+
+    @property
+    def _scale(self) -> float:
+        return DEGREE_SCALE if self.frame in GLOBAL_FRAMES else METRE_SCALE
 
     @property
     def scaled(self) -> tuple[int, int]:
         """Return x and y as COMMAND_INT carries them."""
-        scale = DEGREE_SCALE if self.frame in GLOBAL_FRAMES else METRE_SCALE
-        return _int32(self.x * scale), _int32(self.y * scale)
+        return _int32(self.x * self._scale), _int32(self.y * self._scale)
 
 
 # A kind of commands: see :attr:`Command.key`.

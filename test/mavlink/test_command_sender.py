@@ -295,8 +295,9 @@ def test_message_has_unset_params_and_position_as_the_command_says(
 
 
 def test_position_timeout_and_retries_out_of_range_are_refused() -> None:
-    with pytest.raises(ValueError, match='position of 300, 0'):
-        CommandPosition(0, 300.0, 0.0, 0.0)
+    for x, y in ((300.0, 0.0), (math.nan, -300.0), (math.inf, 0.0), (0.0, -math.inf)):
+        with pytest.raises(ValueError, match=f'position of {x:g}, {y:g} does'):
+            CommandPosition(0, x, y, 0.0)
     for timeout in (0.0, -0.5, math.nan, math.inf):
         with pytest.raises(ValueError, match='timeout'):
             CommandSender(OURS, timeout)
