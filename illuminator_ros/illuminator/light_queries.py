@@ -45,6 +45,10 @@ class MessageQuery:
     """
     Requests one message until it has come, or the light does not send it. Times are s.
 
+    A COMMAND_ACK of MAV_CMD_REQUEST_MESSAGE does not name the message: it may be that of a request
+    for another one, such as each try of a change has. So none ends the requests; that of the last
+    one explains why the message has not come.
+
     :ivar first_asked: the time of the first request, infinity before it.
     :ivar failure: why the light did not send the message, '' if it did or an answer is awaited.
     :ivar retries: of a message that is awaited; it is due a while after an acknowledgement. None
@@ -56,6 +60,8 @@ class MessageQuery:
         self.failure = ''
         self.retries: Retries | None = None
         self._target = target
+        # Why the last request was refused, '' if it was accepted.
+        self._refusal = ''
         self._request = request_message(target.address, message_id)
         self._waiting: list[Callable[[str, float], None]] = []
 
@@ -81,9 +87,12 @@ class MessageQuery:
         # A newer request has replaced a cancelled one.
         if self.retries is None or result.status is CommandStatus.CANCELLED:
             return
-        if result.accepted:
+        is_answered = result.status is CommandStatus.ANSWERED
+        if is_answered and result.result != mavlink.MAV_RESULT_TEMPORARILY_REJECTED:
+            self._refusal = '' if result.accepted else result.describe_failure()
             self.retries.note_try(now)
         else:
+            # It was sent as often as a command may be.
             self.finish(result.describe_failure(), now)
 
     def finish(self, failure: str, now: float) -> None:
@@ -99,7 +108,7 @@ class MessageQuery:
             return
         assert self.retries is not None
         if self.retries.is_spent:
-            self.finish('acknowledged, but not sent', now)
+            self.finish(self._refusal or 'acknowledged, but not sent', now)
         else:
             self._send(self.retries, now)
 

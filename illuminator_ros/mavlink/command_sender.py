@@ -120,7 +120,8 @@ class Command(NamedTuple):
     @property
     def key(self) -> CommandKind:
         """Return the kind: a command replaces another one of its kind."""
-        # As in MAVSDK: requests for two messages do not exclude each other.
+        # As in MAVSDK: requests for two messages do not exclude each other. Either may
+        # get the acknowledgement of the other, or of a follow-up: the message is the answer.
         is_request = self.command == mavlink.MAV_CMD_REQUEST_MESSAGE and self.params
         return self.target, self.command, self.params[0] if is_request else 0.0
 
