@@ -134,7 +134,6 @@ class LightQueries:
         # s of silence after which the light is asked for a status, so that its answer arrives
         # within the heartbeat timeout.
         self._longest_silence = min(STATUS_TIMEOUT, heartbeat_timeout / 1.2)
-        self._status_request = request_message(target.address, STATUS_ID)
         self._is_announced = False
         self._asked_at = -math.inf
         self._due = math.inf
@@ -152,10 +151,7 @@ class LightQueries:
             self._request_interval_and_identity(now)
         self._due = now + STATUS_TIMEOUT
         # A request that was sent to the silent light would be resent only later.
-        if self._status.retries:
-            self._status.ask_again(now)
-        else:
-            self._target.commands.start(self._status_request, now)
+        self._status.ask_again(now)
 
     def announce(self, now: float, *, is_heard: bool) -> None:
         """Note that the light has proved that it is one."""
@@ -172,8 +168,7 @@ class LightQueries:
 
     def request_status(self, now: float) -> None:
         """Request a status, unless such a request is under way."""
-        if not self._target.commands.is_sending(self._status_request):
-            self._target.commands.start(self._status_request, now)
+        self._status.ask(now)
 
     def end(self) -> None:
         """Request no status: the light is lost."""

@@ -392,10 +392,6 @@ class CommandSender:
             self._transmit(sending, now)
         return sending
 
-    def is_sending(self, command: Command) -> bool:
-        """Return whether a command of the kind of another one has not ended."""
-        return command.key in self._pending
-
     def cancel(self, sending: Transmission, now: float) -> None:
         """End a command with CANCELLED, if it has not ended."""
         self._end(sending, CommandStatus.CANCELLED, now)
