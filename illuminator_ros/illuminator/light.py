@@ -55,26 +55,25 @@ class Light:
         self._emit = emit
         target = Target(address, commands, 'light', STATUS_ID, STATUS)
         self.control = LightControl(target, self.liveness, settings, emit)
-        self._queries = LightQueries(target, settings.status_interval, settings.heartbeat_timeout)
+        self._queries = LightQueries(
+            target, self.liveness, settings.status_interval, settings.heartbeat_timeout)
         self._order = StatusOrder()
         self._changing = ChangingStates()
         self._measures_temperature = False
         # The deadline, and the version of the commands and requests that it is from.
-        self._due: tuple[int, float] | None = None
+        self._due = -1, math.inf
 
     # Reception
 
     def heard(self, now: float) -> None:
         """Take a heartbeat, or a status, which shows that the light is alive."""
         if self.liveness.hear(now):
-            self._due = None
             self._queries.begin(now)
             self._emit(DeviceConnected(self.address))
             self.control.require({}, now)
 
     def announce(self, now: float) -> None:
         """Note that it has proved to be a light."""
-        self._due = None
         self._queries.announce(now, is_heard=self.connected)
 
     def take_status(self, status: Status, now: float) -> None:
@@ -83,7 +82,6 @@ class Light:
         order = self._order.take(status, now, self.control.expects)
         if order is Order.LATE:
             return
-        self._due = None
         # Lights that do not measure send 0 (ArduSub), and a sensor rarely reads exactly 0.
         self._measures_temperature |= bool(status.temperature)
         if order is Order.RESTARTED:
@@ -103,14 +101,12 @@ class Light:
 
     def take_identity(self, identity: Identity, now: float) -> None:
         """Take a COMPONENT_INFORMATION_BASIC."""
-        self._due = None
         self._queries.take_identity(identity, now)
         self._emit(events.LightIdentified(self.address, identity))
 
     def lose(self, reason: str, now: float) -> None:
         """Note that the light is not heard any more."""
         if self.liveness.lose(now):
-            self._due = None
             self._order.lost()
             self._changing = ChangingStates()
             self._queries.end()
@@ -178,7 +174,6 @@ class Light:
 
     def refresh(self, now: float, done: Done) -> None:
         """Ask for identity and status again; ``done`` is called once with the result."""
-        self._due = None
         closed = self._commands.refusal
         if refusal := closed or self.control.unreachable(now):
             done(Result(False, refusal, superseded=bool(closed)), now)
@@ -187,12 +182,10 @@ class Light:
 
     def request_status(self, now: float) -> None:
         """Ask for a status, unless such a request is under way."""
-        self._due = None
         self._queries.request_status(now)
 
     def close(self, now: float) -> None:
         """Answer all requests, since the process ends."""
-        self._due = None
         self._queries.close(self._commands.refusal, now)
         self.control.close(now)
 
@@ -200,26 +193,20 @@ class Light:
 
     def poll(self, now: float) -> None:
         """Do what is due."""
-        self._due = None
         if now >= self.liveness.silent_at:
             self.lose(self.liveness.silence(now), now)
         if now >= self._changing.until:
             self._changing = ChangingStates()
             self._emit(events.StatesChanging(self.address, False))
-        self._queries.poll(now, self._silent_since)
+        self._queries.poll(now)
         self.control.poll(now)
 
     def next_deadline(self) -> float:
         """Return when :meth:`poll` has something to do, or earlier."""
         # Kept, since each turn of the link asks all lights.
         version = self._commands.version + self.control.version
-        if self._due is None or self._due[0] != version:
+        if self._due[0] != version:
             self._due = version, min(
-                self.control.next_deadline(), self._queries.next_deadline(self._silent_since),
+                self.control.next_deadline(), self._queries.next_deadline(),
                 self._changing.until, self.liveness.silent_at)
         return self._due[1]
-
-    @property
-    def _silent_since(self) -> float:
-        """When it was last heard, s; infinity while it is lost."""
-        return self.liveness.heard_at if self.liveness.connected else math.inf

@@ -33,6 +33,7 @@ from ..mavlink.messages import ComponentInformationBasic
 from ..mavlink.retries import MESSAGE, Retries
 from ..payload.confirmed_command import Done, Result, Target
 from ..payload.identity import Identity
+from ..payload.liveness import Liveness
 
 # s without a status after which the light is asked for one, and between the requests.
 STATUS_TIMEOUT = 2.5
@@ -45,17 +46,24 @@ class MessageQuery:
     """
     Requests one message until it has come, or the light does not send it. Times are s.
 
+    A COMMAND_ACK of MAV_CMD_REQUEST_MESSAGE does not name the message: it may be that of a request
+    for another one, such as each try of a change has. So none ends the requests; that of the last
+    one explains why the message has not come.
+
     :ivar first_asked: the time of the first request, infinity before it.
     :ivar failure: why the light did not send the message, '' if it did or an answer is awaited.
-    :ivar retries: of a message that is awaited; it is due a while after an acknowledgement. None
-        while none is awaited.
+    :ivar is_awaited: whether the message has been asked for and has not come yet.
+    :ivar retries: of the requests; the next is due a while after an acknowledgement.
     """
 
     def __init__(self, target: Target, message_id: int) -> None:
         self.first_asked = math.inf
         self.failure = ''
-        self.retries: Retries | None = None
+        self.is_awaited = False
+        self.retries = Retries(MESSAGE, math.inf)
         self._target = target
+        # Why the last request was refused, '' if it was accepted.
+        self._refusal = ''
         self._request = request_message(target.address, message_id)
         self._waiting: list[Callable[[str, float], None]] = []
 
@@ -63,69 +71,70 @@ class MessageQuery:
         """Ask; ``done`` is called with '' once the message has come, else with the failure."""
         if done is not None:
             self._waiting.append(done)
-        if self.retries is None:
-            self.first_asked = min(self.first_asked, now)
-            self._send(Retries(MESSAGE), now)
+        if not self.is_awaited:
+            self.ask_again(now)
 
     def ask_again(self, now: float) -> None:
         """Ask at once, though an answer may still be awaited."""
-        self.retries = None
-        self.ask(now)
+        self.is_awaited, self.retries = True, Retries(MESSAGE)
+        self.first_asked = min(self.first_asked, now)
+        self._send(now)
 
-    def _send(self, retries: Retries, now: float) -> None:
-        self.retries = retries
-        retries.stop()
+    def _send(self, now: float) -> None:
+        self.retries.stop()
         self._target.commands.start(self._request, now, self._answered)
 
     def _answered(self, result: CommandResult, now: float) -> None:
         # A newer request has replaced a cancelled one.
-        if self.retries is None or result.status is CommandStatus.CANCELLED:
+        if not self.is_awaited or result.status is CommandStatus.CANCELLED:
             return
-        if result.accepted:
+        is_answered = result.status is CommandStatus.ANSWERED
+        if is_answered and result.result != mavlink.MAV_RESULT_TEMPORARILY_REJECTED:
+            self._refusal = '' if result.accepted else result.describe_failure()
             self.retries.note_try(now)
         else:
+            # It was sent as often as a command may be.
             self.finish(result.describe_failure(), now)
 
     def finish(self, failure: str, now: float) -> None:
         """End the requests: the message has come, or will not come for the reason given."""
-        self.retries, self.failure = None, failure
+        self.is_awaited, self.failure = False, failure
+        self.retries.stop()
         waiting, self._waiting = self._waiting, []
         for done in waiting:
             done(failure, now)
 
     def poll(self, now: float) -> None:
         """Ask again for a message that does not come, or give up."""
-        if now < self.next_deadline():
+        if now < self.retries.due:
             return
-        assert self.retries is not None
         if self.retries.is_spent:
-            self.finish('acknowledged, but not sent', now)
+            self.finish(self._refusal or 'acknowledged, but not sent', now)
         else:
-            self._send(self.retries, now)
-
-    def next_deadline(self) -> float:
-        """Return when :meth:`poll` has something to do."""
-        return math.inf if self.retries is None else self.retries.due
+            self._send(now)
 
 
 class LightQueries:
     """
     Requests what a light does not send by itself. No I/O; times are s.
 
+    :param liveness: of the light.
     :param interval: s between the statuses that the light is asked for; 0 for its own.
     :param heartbeat_timeout: s of silence after which the light is lost.
     :ivar identity: None before the light has sent it.
     """
 
-    def __init__(self, target: Target, interval: float, heartbeat_timeout: float) -> None:
+    def __init__(
+        self, target: Target, liveness: Liveness, interval: float, heartbeat_timeout: float,
+    ) -> None:
         self.identity: Identity | None = None
         self._target = target
+        self._liveness = liveness
         self._interval = interval
         self._timeout = max(STATUS_TIMEOUT, 2.5 * interval)
         # s of silence after which the light is asked for a status, so that its answer arrives
         # within the heartbeat timeout.
         self._longest_silence = min(STATUS_TIMEOUT, heartbeat_timeout / 1.2)
-        self._status_request = request_message(target.address, STATUS_ID)
         self._is_announced = False
         self._asked_at = -math.inf
         self._due = math.inf
@@ -143,10 +152,7 @@ class LightQueries:
             self._request_interval_and_identity(now)
         self._due = now + STATUS_TIMEOUT
         # A request that was sent to the silent light would be resent only later.
-        if self._status.retries:
-            self._status.ask_again(now)
-        else:
-            self._target.commands.start(self._status_request, now)
+        self._status.ask_again(now)
 
     def announce(self, now: float, *, is_heard: bool) -> None:
         """Note that the light has proved that it is one."""
@@ -163,8 +169,7 @@ class LightQueries:
 
     def request_status(self, now: float) -> None:
         """Request a status, unless such a request is under way."""
-        if not self._target.commands.is_sending(self._status_request):
-            self._target.commands.start(self._status_request, now)
+        self._status.ask(now)
 
     def end(self) -> None:
         """Request no status: the light is lost."""
@@ -178,7 +183,7 @@ class LightQueries:
     def take_status(self, now: float) -> None:
         """Note that a status has come."""
         self._due = now + self._timeout
-        if self._status.retries:
+        if self._status.is_awaited:
             self._status.finish('', now)
 
     def take_identity(self, identity: Identity, now: float) -> None:
@@ -212,23 +217,20 @@ class LightQueries:
         for name, query in queries.items():
             query.ask(now, functools.partial(answered, name))
 
-    def poll(self, now: float, silent_since: float) -> None:
-        """
-        Request what is due.
-
-        :param silent_since: the time of the last message, s; infinity while the light is lost.
-        """
-        if now >= self._status_due(silent_since):
+    def poll(self, now: float) -> None:
+        """Request what is due."""
+        if now >= self._status_due:
             self._asked_at, self._due = now, now + STATUS_TIMEOUT
-            self.request_status(now)
+            self._status.ask(now)
         self._status.poll(now)
         self._identity.poll(now)
 
-    def _status_due(self, silent_since: float) -> float:
+    @property
+    def _status_due(self) -> float:
         # The light may have no heartbeat, and a status interval above the heartbeat timeout.
-        return min(self._due, max(silent_since, self._asked_at) + self._longest_silence)
+        heard_at = self._liveness.heard_at if self._liveness.connected else math.inf
+        return min(self._due, max(heard_at, self._asked_at) + self._longest_silence)
 
-    def next_deadline(self, silent_since: float) -> float:
+    def next_deadline(self) -> float:
         """Return when :meth:`poll` has something to do."""
-        return min(self._status_due(silent_since), self._status.next_deadline(),
-                   self._identity.next_deadline())
+        return min(self._status_due, self._status.retries.due, self._identity.retries.due)

@@ -80,15 +80,19 @@ class CommandPosition:
     z: float
 
     def __post_init__(self) -> None:
-        for value in self.scaled:
-            if not -0x80000000 <= value <= INT32_UNSET:
+        for value in self.x, self.y:
+            # NaN is not above it.
+            if abs(value) * self._scale > INT32_UNSET:
                 raise ValueError(f'a position of {self.x:g}, {self.y:g} does not fit COMMAND_INT')
+
+    @property
+    def _scale(self) -> float:
+        return DEGREE_SCALE if self.frame in GLOBAL_FRAMES else METRE_SCALE
 
     @property
     def scaled(self) -> tuple[int, int]:
         """Return x and y as COMMAND_INT carries them."""
-        scale = DEGREE_SCALE if self.frame in GLOBAL_FRAMES else METRE_SCALE
-        return _int32(self.x * scale), _int32(self.y * scale)
+        return _int32(self.x * self._scale), _int32(self.y * self._scale)
 
 
 # A kind of commands: see :attr:`Command.key`.
@@ -114,7 +118,8 @@ class Command(NamedTuple):
     @property
     def key(self) -> CommandKind:
         """Return the kind: a command replaces another one of its kind."""
-        # As in MAVSDK: requests for two messages do not exclude each other.
+        # As in MAVSDK: requests for two messages do not exclude each other. Either may
+        # get the acknowledgement of the other, or of a follow-up: the message is the answer.
         is_request = self.command == mavlink.MAV_CMD_REQUEST_MESSAGE and self.params
         return self.target, self.command, self.params[0] if is_request else 0.0
 
@@ -384,10 +389,6 @@ class CommandSender:
             sending.tries = sending.rejected = tried
             self._transmit(sending, now)
         return sending
-
-    def is_sending(self, command: Command) -> bool:
-        """Return whether a command of the kind of another one has not ended."""
-        return command.key in self._pending
 
     def cancel(self, sending: Transmission, now: float) -> None:
         """End a command with CANCELLED, if it has not ended."""

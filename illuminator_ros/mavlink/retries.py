@@ -86,7 +86,8 @@ UNCONFIRMED = RetryPolicy('an automatic OFF that no status shows, and a command 
 STILL_UNCONFIRMED = RetryPolicy('an automatic OFF after these', 2.0, 2.0)
 CLOSING = RetryPolicy('a command while the process ends, which has less than a second', 0.1, 0.1)
 REQUIRED = RetryPolicy('a restored configuration, overrides and limits', 2.0, 60.0)
-MESSAGE = RetryPolicy('a message that a light acknowledges and does not send', 0.5, 0.5, 3)
+MESSAGE = RetryPolicy('a message that a light acknowledges or refuses, and does not send',
+                      0.5, 0.5, 3)
 GIMBAL_MESSAGE = RetryPolicy('a message of a gimbal or its manager', 1.0, 60.0)
 DEVICE_INFORMATION = RetryPolicy('GIMBAL_DEVICE_INFORMATION, by `gimbal_manager`', 0.5, 5.0)
 ZERO_RATE = RetryPolicy('a rate of zero, until the gimbal stands', 0.1, 0.1, 10)

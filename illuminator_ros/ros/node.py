@@ -19,6 +19,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Mapping
 import contextlib
 from dataclasses import dataclass
+import functools
 import math
 import threading
 from typing import Any, Generic, NamedTuple, TypeVar
@@ -40,7 +41,8 @@ Answer = Callable[[bool, str], None]
 # Matches reliable and best-effort publishers. Messages may be lost, especially the first ones of a
 # publisher; the next one of a stream replaces them.
 COMMAND_QOS = QoSProfile(depth=10, reliability=ReliabilityPolicy.BEST_EFFORT)
-# For commands that are not repeated. Matches reliable publishers only.
+# For commands that are not repeated, and each of which is taken in its place among all requests.
+# Matches reliable publishers only.
 SWITCH_QOS = QoSProfile(depth=10, reliability=ReliabilityPolicy.RELIABLE)
 # Requests that the middleware queues while others are taken, so that each gets an answer.
 SERVICE_QOS = QoSProfile(depth=1000, reliability=ReliabilityPolicy.RELIABLE)
@@ -100,8 +102,8 @@ class CommandTopic(Generic[T]):
     """
     A topic that the node subscribes to.
 
-    :param take: called in the link's thread with a value and the time (s); of values that come
-        faster than the link takes them only the newest.
+    :param take: called in the link's thread with a value and the time (s); of the values of a
+        stream that come faster than the link takes them only the newest.
     :param read: returns the value of a message, in any thread; a ValueError is logged.
     """
 
@@ -133,8 +135,10 @@ class NodeInterface:
                             SERVICE_QOS, log)
         for command in commands:
             endpoint = command.endpoint
+            hand = (_each(link, command.take) if endpoint.qos is SWITCH_QOS
+                    else _Newest(link, command.take).offer)
             node.create_subscription(
-                endpoint.type, f'~/{endpoint.name}', _Newest(link, log, command).offer,
+                endpoint.type, f'~/{endpoint.name}', _reader(command, hand, log),
                 endpoint.qos or COMMAND_QOS)
 
     def publish(self, name: str, value: object) -> None:
@@ -178,23 +182,37 @@ def _taker(service: RequestService, calls: LinkCalls) -> Take:
     return take
 
 
-class _Newest(Generic[T]):
-    """Hands the newest value of a topic to the link."""
+def _reader(
+    command: CommandTopic[T], hand: Callable[[T], None], log: NodeLog,
+) -> Callable[[Any], None]:
+    """Return a callback that reads messages of a topic and hands their values to the link."""
+    name = command.endpoint.name
 
-    def __init__(self, link: Link, log: NodeLog, command: CommandTopic[T]) -> None:
+    def take(message: Any) -> None:
+        try:
+            value = command.read(message)
+        except ValueError as error:
+            log.warning(f'~/{name}: ignored: {error}', name)
+        else:
+            hand(value)
+
+    return take
+
+
+def _each(link: Link, take: Callable[[T, float], None]) -> Callable[[T], None]:
+    return lambda value: link.call(functools.partial(take, value))
+
+
+class _Newest(Generic[T]):
+    """Hands the newest value of a stream to the link."""
+
+    def __init__(self, link: Link, take: Callable[[T, float], None]) -> None:
         self._link = link
-        self._log = log
-        self._command = command
+        self._take = take
         self._waiting: list[T] = []
         self._lock = threading.Lock()
 
-    def offer(self, message: Any) -> None:
-        try:
-            value = self._command.read(message)
-        except ValueError as error:
-            name = self._command.endpoint.name
-            self._log.warning(f'~/{name}: ignored: {error}', name)
-            return
+    def offer(self, value: T) -> None:
         with self._lock:
             called = bool(self._waiting)
             self._waiting[:] = [value]
@@ -204,4 +222,4 @@ class _Newest(Generic[T]):
     def _deliver(self, now: float) -> None:
         with self._lock:
             value = self._waiting.pop()
-        self._command.take(value, now)
+        self._take(value, now)

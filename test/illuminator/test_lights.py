@@ -233,8 +233,9 @@ def test_the_identity_is_requested_once_and_again_after_a_loss(
 
 
 @pytest.mark.parametrize(('light', 'count', 'failure'), [
-    (Selective(mavlink.MAV_RESULT_DENIED), 1, 'refused: MAV_RESULT_DENIED'),
-    (Selective(mavlink.MAV_RESULT_UNSUPPORTED), 1, 'refused: MAV_RESULT_UNSUPPORTED'),
+    (Selective(mavlink.MAV_RESULT_DENIED), MESSAGE.tries, 'refused: MAV_RESULT_DENIED'),
+    (Selective(mavlink.MAV_RESULT_UNSUPPORTED), MESSAGE.tries,
+     'refused: MAV_RESULT_UNSUPPORTED'),
     (Selective(None), 4, 'no acknowledgement'),
     (FakeLight(), MESSAGE.tries, 'acknowledged, but not sent'),
 ])

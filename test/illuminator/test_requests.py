@@ -425,6 +425,46 @@ def test_a_refresh_ends_once_and_in_time_with_the_reason(
     assert max(answer.seconds for answer in answers) <= REFRESH_LIMIT
 
 
+class Requested(FakeLight):
+    """A light that loses requests for some messages once, and refuses those for others."""
+
+    def __init__(self) -> None:
+        super().__init__(stream=0.1)
+        self.loses: list[int] = []
+        self.refuses = 0
+
+    def receive(self, source: mav.Address, message: Any, now: float) -> None:
+        if isinstance(message, mav.CommandLong) and message.command == REQUEST:
+            if message.param1 in self.loses:
+                self.loses.remove(int(message.param1))
+                return
+            self.results[REQUEST] = (mavlink.MAV_RESULT_UNSUPPORTED
+                                     if message.param1 == self.refuses else ACCEPTED)
+        super().receive(source, message, now)
+
+
+def test_the_refusal_of_an_identity_does_not_end_the_request_for_a_status() -> None:
+    light = Requested()
+    pair = Pair(light).settle()
+    change(light, stream=0.0, loses=[STATUS_ID], refuses=mav.INFORMATION_ID)
+    result = pair.wait_for(pair.ask_refresh())
+    assert (result.success, TIMING.sub('', result.message).partition(' (')[0]) == (
+        True, 'ILLUMINATOR_STATUS: received, '
+        'COMPONENT_INFORMATION_BASIC: refused: MAV_RESULT_UNSUPPORTED')
+
+
+def test_the_refusal_of_a_status_that_a_command_requests_does_not_end_the_one_for_an_identity(
+) -> None:
+    light = Requested()
+    pair = Pair(light).settle()
+    change(light, loses=[mav.INFORMATION_ID], refuses=STATUS_ID)
+    refresh = pair.ask_refresh()
+    # By then a status of the stream has ended the other request.
+    pair.run(0.2)
+    assert pair.enable(True).success
+    assert 'COMPONENT_INFORMATION_BASIC: received' in pair.wait_for(refresh).message
+
+
 def test_a_refresh_of_a_light_that_is_lost_and_heard_again_ends(
     fake: FakeLight, faked: Pair,
 ) -> None:

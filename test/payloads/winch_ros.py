@@ -19,13 +19,13 @@ from __future__ import annotations
 from illuminator_ros.payload.confirmed_command import Result
 from illuminator_ros.ros import monitor_view as shared
 from illuminator_ros.ros.monitor_view import Device, Key, Request, Topic
-from illuminator_ros.ros.node import CommandTopic, Interface, NodeInterface
+from illuminator_ros.ros.node import CommandTopic, Interface, NodeInterface, SWITCH_QOS
 from illuminator_ros.ros.payload import Host, RosPayload, ServedPayload
 from payloads.winch import WinchClient
 from std_msgs.msg import Float32
 
 LINE_LENGTH = Interface('line_length', Float32, 'length of the line that is out, m')
-RELEASE = Interface('cmd/release', Float32, 'length of line to release, m')
+RELEASE = Interface('cmd/release', Float32, 'length of line to release, m', SWITCH_QOS)
 
 
 class WinchNode(ServedPayload):

@@ -22,8 +22,15 @@ from unittest.mock import Mock
 
 from illuminator_ros.ros.deferred_service import DeferredService
 from illuminator_ros.ros.link_call import LinkCalls, MAX_PENDING
-from illuminator_ros.ros.node import Interface, NodeInterface, RequestService
+from illuminator_ros.ros.node import (
+    CommandTopic,
+    Interface,
+    NodeInterface,
+    RequestService,
+    SWITCH_QOS,
+)
 from rclpy.node import Node
+from std_msgs.msg import Bool, Float32
 from std_srvs.srv import SetBool
 from support.ros import Ros
 
@@ -79,3 +86,39 @@ def test_off_is_asked_however_many_requests_of_an_on_wait(ros: Ros) -> None:
     node.destroy_node()
 
     assert asked == [True] * MAX_PENDING + [False]
+
+
+def test_single_messages_and_requests_keep_their_order_and_a_stream_only_its_newest(
+    ros: Ros,
+) -> None:
+    calls: list[Callable[[float], None]] = []
+    taken: list[object] = []
+    node = Node('busy', context=ros.context)
+    # Any: a link whose thread is busy.
+    link: Any = Mock(call=calls.append)
+
+    def take(value: object, now: float) -> None:
+        taken.append(value)
+
+    NodeInterface(
+        node, link, Mock(),
+        services=[RequestService(Interface('enable', SetBool, ''),
+                                 lambda request, now, answer: taken.append('service'))],
+        commands=[CommandTopic(Interface('cmd/enable', Bool, '', SWITCH_QOS), take),
+                  CommandTopic(Interface('cmd/brightness', Float32, ''), take)])
+    callbacks: dict[str, Any] = {
+        one.topic_name: one.callback for one in node.subscriptions}
+    switch, stream = (callbacks[f'/busy/cmd/{name}'] for name in ('enable', 'brightness'))
+    [service] = [one.callback for one in node.services if one.service_name == '/busy/enable']
+    assert isinstance(service, DeferredService)
+
+    stream(Float32(data=1.0))
+    switch(Bool(data=False))
+    service.take(SetBool.Request(data=True), Mock())
+    stream(Float32(data=2.0))
+    switch(Bool(data=False))
+    for call in calls:
+        call(0.0)
+    node.destroy_node()
+
+    assert taken == [2.0, False, 'service', False]
