@@ -17,6 +17,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
+from dataclasses import replace
 import math
 from typing import Any
 
@@ -61,6 +62,7 @@ class GimbalRequests:
             GimbalDeviceAttitudeStatus.msgname, key.address, needs_status=True))
         self.place: Property[None] = Property(Target(manager, commands, 'gimbal manager'))
         self._device_id = key.device_id
+        self._commands = commands
         self._take, self._release = (
             Desired(configure(commands.address, key.device_id, take=take), limit=REQUEST_LIMIT)
             for take in (True, False))
@@ -74,7 +76,9 @@ class GimbalRequests:
     @property
     def is_releasing(self) -> bool:
         """Whether a release of control is under way."""
-        return bool(self._releasing) or self.control.desired == self._release
+        desired = self.control.desired
+        return bool(self._releasing) or (
+            desired is not None and desired.value == self._release.value)
 
     def request_control(self, take: bool, now: float, done: Done) -> None:
         """Take primary control, or release all control once ``release_due`` has passed."""
@@ -83,11 +87,17 @@ class GimbalRequests:
         message = f'superseded by {desired.change.goal}'
         if take:
             self._end_release(Result(False, message, superseded=True))
+            self.control.want(desired, now, caller)
         elif now < self.release_due:
             self.control.cancel(message, now, superseded=True)
             self._releasing.append(caller)
-            return
-        self.control.want(desired, now, caller)
+        else:
+            self._want_release(now, caller)
+
+    def _want_release(self, now: float, caller: Caller) -> None:
+        # The end of the process cannot await the end of a fence.
+        self.control.want(
+            replace(self._release, is_last=bool(self._commands.refusal)), now, caller)
 
     def _end_release(self, result: Result) -> None:
         """End a release of control that waits."""
@@ -161,7 +171,7 @@ class GimbalRequests:
         if now >= self.release_due:
             callers, self._releasing = self._releasing, []
             for caller in callers:
-                self.control.want(self._release, now, caller)
+                self._want_release(now, caller)
         for changes in self._properties().values():
             changes.poll(now)
         if self._next_place is not None and self.place.desired is None:
