@@ -189,7 +189,10 @@ class Gimbal:
     def take_control(self, now: float, done: Done) -> None:
         """Take primary control; succeed only if GIMBAL_MANAGER_STATUS shows it."""
         self._begin(now)
-        self._request_control(True, now, done)
+        if reason := self._commands.lateness(now):
+            done(Result(False, reason), now)
+        else:
+            self._request_control(True, now, done)
 
     def release_control(self, now: float, done: Done) -> None:
         """Stop, and release control; succeed only if GIMBAL_MANAGER_STATUS shows it."""

@@ -29,7 +29,7 @@ from ..mavlink.command_sender import CommandSender, format_seconds
 from ..mavlink.dialect import flag_names
 from ..mavlink.messages import Address
 from ..payload.confirmed_command import Desired, Done, Result, Target
-from ..payload.device_property import Caller, MAX_CALLERS, Outcome, Property
+from ..payload.device_property import answer, Caller, MAX_CALLERS, Outcome, Property
 from ..payload.messages import GeoPoint, GimbalDeviceAttitudeStatus
 from ..payload.mount_attitude import YawFrame
 
@@ -202,7 +202,7 @@ class YawLock:
         self._since = math.inf
         self._flags: int | None = None
         self._resend: list[float] = []
-        self._callers: list[Done] = []
+        self._callers: list[Caller] = []
 
     def want(self, flag: Flag, now: float, done: Done) -> None:
         """
@@ -216,7 +216,7 @@ class YawLock:
         elif len(self._callers) >= MAX_CALLERS:
             done(Result(False, f'{MAX_CALLERS} requests are waiting already'), now)
             return
-        self._callers.append(done)
+        self._callers.append(Caller(done, now))
         self._resend = [now + delay for delay in REPEATS]
         self._send(YawFrame.EARTH if flag.is_set else YawFrame.VEHICLE, now)
 
@@ -261,5 +261,4 @@ class YawLock:
 
     def _finish(self, result: Result, now: float) -> None:
         callers, self._callers, self._wanted = self._callers, [], None
-        for done in callers:
-            done(result, now)
+        answer(callers, result, now)
