@@ -177,6 +177,9 @@ class SetpointStream:
             before.due.clear()
         if is_place:
             self._last = place
+        elif kind is SuspendedBy.PLACE and before is not None and before.kind is Kind.ZERO:
+            # ArduPilot leaves a rate as it is, so the zero must arrive.
+            before = None
         self._suspended[kind] = before, place
 
     def request_ended(self, kind: SuspendedBy, result: Result) -> None:

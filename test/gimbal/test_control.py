@@ -590,10 +590,16 @@ def test_refusal_names_the_request_the_manager_and_who_has_control(
     assert rig.results[0].message.endswith('; 1/195 has control and must release it first')
 
 
-@pytest.mark.parametrize(('result', 'zeros'), [
-    (mavlink.MAV_RESULT_ACCEPTED, 1), (mavlink.MAV_RESULT_DENIED, 1 + len(REPEATS))])
-@pytest.mark.parametrize('ask', [*(ask for ask, *_ in POSES), clear_roi, set_roi])
-def test_zero_before_a_request_is_sent_again_only_if_the_request_fails(
+TURNING_REQUESTS = (*(ask for ask, *_ in POSES), set_roi)
+
+
+@pytest.mark.parametrize(('ask', 'result', 'zeros'), [
+    *((ask, mavlink.MAV_RESULT_ACCEPTED, 1) for ask in TURNING_REQUESTS),
+    # ArduPilot goes on with the rate.
+    (clear_roi, mavlink.MAV_RESULT_ACCEPTED, 1 + len(REPEATS)),
+    *((ask, mavlink.MAV_RESULT_DENIED, 1 + len(REPEATS))
+      for ask in (*TURNING_REQUESTS, clear_roi))])
+def test_zero_before_a_request_is_sent_again_unless_the_request_turns_the_gimbal(
         ask: Ask, result: int, zeros: int) -> None:
     rig = in_control()
     rig.managers[0].results = dict.fromkeys(DEVICE_ID_PARAM, result)
