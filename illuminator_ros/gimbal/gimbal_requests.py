@@ -17,6 +17,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
+from dataclasses import replace
 import math
 from typing import Any
 
@@ -28,7 +29,7 @@ from ..mavlink.command_sender import CommandSender, format_seconds
 from ..mavlink.dialect import flag_names
 from ..mavlink.messages import Address
 from ..payload.confirmed_command import Desired, Done, Result, Target
-from ..payload.device_property import Caller, MAX_CALLERS, Outcome, Property
+from ..payload.device_property import answer, Caller, MAX_CALLERS, Outcome, Property
 from ..payload.messages import GeoPoint, GimbalDeviceAttitudeStatus
 from ..payload.mount_attitude import YawFrame
 
@@ -61,6 +62,7 @@ class GimbalRequests:
             GimbalDeviceAttitudeStatus.msgname, key.address, needs_status=True))
         self.place: Property[None] = Property(Target(manager, commands, 'gimbal manager'))
         self._device_id = key.device_id
+        self._commands = commands
         self._take, self._release = (
             Desired(configure(commands.address, key.device_id, take=take), limit=REQUEST_LIMIT)
             for take in (True, False))
@@ -74,7 +76,9 @@ class GimbalRequests:
     @property
     def is_releasing(self) -> bool:
         """Whether a release of control is under way."""
-        return bool(self._releasing) or self.control.desired == self._release
+        desired = self.control.desired
+        return bool(self._releasing) or (
+            desired is not None and desired.value == self._release.value)
 
     def request_control(self, take: bool, now: float, done: Done) -> None:
         """Take primary control, or release all control once ``release_due`` has passed."""
@@ -83,11 +87,17 @@ class GimbalRequests:
         message = f'superseded by {desired.change.goal}'
         if take:
             self._end_release(Result(False, message, superseded=True))
+            self.control.want(desired, now, caller)
         elif now < self.release_due:
             self.control.cancel(message, now, superseded=True)
             self._releasing.append(caller)
-            return
-        self.control.want(desired, now, caller)
+        else:
+            self._want_release(now, caller)
+
+    def _want_release(self, now: float, caller: Caller) -> None:
+        # The end of the process cannot await the end of a fence.
+        self.control.want(
+            replace(self._release, is_last=bool(self._commands.refusal)), now, caller)
 
     def _end_release(self, result: Result) -> None:
         """End a release of control that waits."""
@@ -161,7 +171,7 @@ class GimbalRequests:
         if now >= self.release_due:
             callers, self._releasing = self._releasing, []
             for caller in callers:
-                self.control.want(self._release, now, caller)
+                self._want_release(now, caller)
         for changes in self._properties().values():
             changes.poll(now)
         if self._next_place is not None and self.place.desired is None:
@@ -192,7 +202,7 @@ class YawLock:
         self._since = math.inf
         self._flags: int | None = None
         self._resend: list[float] = []
-        self._callers: list[Done] = []
+        self._callers: list[Caller] = []
 
     def want(self, flag: Flag, now: float, done: Done) -> None:
         """
@@ -206,7 +216,7 @@ class YawLock:
         elif len(self._callers) >= MAX_CALLERS:
             done(Result(False, f'{MAX_CALLERS} requests are waiting already'), now)
             return
-        self._callers.append(done)
+        self._callers.append(Caller(done, now))
         self._resend = [now + delay for delay in REPEATS]
         self._send(YawFrame.EARTH if flag.is_set else YawFrame.VEHICLE, now)
 
@@ -251,5 +261,4 @@ class YawLock:
 
     def _finish(self, result: Result, now: float) -> None:
         callers, self._callers, self._wanted = self._callers, [], None
-        for done in callers:
-            done(result, now)
+        answer(callers, result, now)

@@ -78,6 +78,10 @@ class ManagerWithClient(Payload):
         self.manager.components_lost(lost, now, reason)
         self._component.components_lost(lost, now, reason)
 
+    def stalled(self, seconds: float, now: float) -> None:
+        """See :meth:`Payload.stalled`."""
+        self._component.stalled(seconds, now)
+
     def may_send_at_end(self, sent: Command | mav.Message) -> bool:
         """See :meth:`Payload.may_send_at_end`."""
         return self.manager.may_send_at_end(sent) or self.client.may_send_at_end(sent)

@@ -170,13 +170,16 @@ class SetpointStream:
         :param is_place: whether the request points the gimbal at a place.
         """
         before, place = self._last, _Setpoint(Kind.PLACE)
-        if before is not None and before.kind is Kind.RATE:
+        if before is not None and before.may_have_rate and before.kind is not Kind.ZERO:
             self.set_rates(STILL, now)
             before = self._last
         elif before is not None and before.kind is Kind.ATTITUDE:
             before.due.clear()
         if is_place:
             self._last = place
+        elif kind is SuspendedBy.PLACE and before is not None and before.kind is Kind.ZERO:
+            # ArduPilot leaves a rate as it is, so the zero must arrive.
+            before = None
         self._suspended[kind] = before, place
 
     def request_ended(self, kind: SuspendedBy, result: Result) -> None:
@@ -213,8 +216,11 @@ class SetpointStream:
 
     def end(self, now: float) -> None:
         """Repeat no attitude, and end a rate or a place with a zero once it can be sent."""
-        if self._last is not None and self._last.kind is not Kind.ZERO:
-            self._last.due = [now] if self._last.moves else []
+        last = self._last
+        if last is not None and last.kind is not Kind.ZERO:
+            if last.may_have_rate:
+                last.kind = Kind.RATE
+            last.due = [now] if last.moves else []
 
     def control_changed(self, *, is_lost: bool) -> None:
         """

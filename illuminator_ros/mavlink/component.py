@@ -244,6 +244,8 @@ class Component(Endpoint):
     def stalled(self, seconds: float, now: float) -> None:
         """See :meth:`Endpoint.stalled`."""
         self.commands.stalled(seconds, now)
+        for payload in self._payloads:
+            payload.stalled(seconds, now)
 
     def components_lost(self, lost: Collection[Address], now: float, reason: str) -> None:
         """See :meth:`Endpoint.components_lost`."""

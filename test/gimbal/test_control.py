@@ -17,6 +17,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+import contextlib
 import math
 import re
 
@@ -36,7 +37,7 @@ from illuminator_ros.gimbal.messages import (
 from illuminator_ros.gimbal.setpoint_stream import REPEATS
 from illuminator_ros.mavlink import messages as mav
 from illuminator_ros.mavlink.dialect import mavlink, short_names
-from illuminator_ros.payload.confirmed_command import Done
+from illuminator_ros.payload.confirmed_command import Done, Result
 from illuminator_ros.payload.device_events import DeviceDisconnected
 from illuminator_ros.payload.messages import GeoPoint
 from illuminator_ros.payload.mount_attitude import STILL, YawFrame
@@ -467,6 +468,19 @@ def test_of_requests_for_the_yaw_lock_equal_ones_share_the_outcome_and_the_last_
         (False, True, 'superseded by yaw locked'), *[(True, False, 'yaw locked')] * 2]
 
 
+def test_a_caller_that_raises_leaves_the_answer_to_the_others_of_the_yaw_lock() -> None:
+    def fail(result: Result, now: float) -> None:
+        raise RuntimeError
+
+    rig = in_control()
+    for done in (fail, rig.done):
+        set_yaw_lock(rig.gimbal, True, rig.now, done)
+    with contextlib.suppress(RuntimeError):
+        rig.run(1.0)
+
+    assert [one.success for one in rig.results] == [True]
+
+
 @pytest.mark.parametrize('later', [
     lambda gimbal, now, done: gimbal.set_rates((0.0, 0.1, 0.0), now),
     lambda gimbal, now, done: gimbal.set_attitude(Quaternion(), YawFrame.VEHICLE, now),
@@ -576,10 +590,16 @@ def test_refusal_names_the_request_the_manager_and_who_has_control(
     assert rig.results[0].message.endswith('; 1/195 has control and must release it first')
 
 
-@pytest.mark.parametrize(('result', 'zeros'), [
-    (mavlink.MAV_RESULT_ACCEPTED, 1), (mavlink.MAV_RESULT_DENIED, 1 + len(REPEATS))])
-@pytest.mark.parametrize('ask', [*(ask for ask, *_ in POSES), clear_roi, set_roi])
-def test_zero_before_a_request_is_sent_again_only_if_the_request_fails(
+TURNING_REQUESTS = (*(ask for ask, *_ in POSES), set_roi)
+
+
+@pytest.mark.parametrize(('ask', 'result', 'zeros'), [
+    *((ask, mavlink.MAV_RESULT_ACCEPTED, 1) for ask in TURNING_REQUESTS),
+    # ArduPilot goes on with the rate.
+    (clear_roi, mavlink.MAV_RESULT_ACCEPTED, 1 + len(REPEATS)),
+    *((ask, mavlink.MAV_RESULT_DENIED, 1 + len(REPEATS))
+      for ask in (*TURNING_REQUESTS, clear_roi))])
+def test_zero_before_a_request_is_sent_again_unless_the_request_turns_the_gimbal(
         ask: Ask, result: int, zeros: int) -> None:
     rig = in_control()
     rig.managers[0].results = dict.fromkeys(DEVICE_ID_PARAM, result)
@@ -690,6 +710,22 @@ def test_gm_14_request_without_control_is_not_sent_and_tells_who_has_it(
 
     assert asked(rig, ask) == (False, f'no control of gimbal 1/154: {reason}')
     assert not {one.command for one in rig.managers[0].commands} & set(DEVICE_ID_PARAM)
+
+
+@pytest.mark.parametrize('ask', [
+    Gimbal.take_control, *(ask for ask, *_ in FLAG_REQUESTS), clear_roi, set_roi])
+def test_a_request_that_may_have_waited_during_a_stop_of_the_process_is_refused(
+        ask: Ask) -> None:
+    rig = in_control()
+
+    rig.component.stalled(7.0, rig.now)
+    ask(rig.gimbal, rig.now, rig.done)
+    rig.gimbal.release_control(rig.now, rig.done)
+    rig.run(1.0)
+
+    assert [one.success for one in rig.results] == [False, True]
+    assert rig.results[0].message == (
+        'the request may be 7.00 s old, since this process was stopped as long; repeat it')
 
 
 @pytest.mark.parametrize('second', [2, 171])

@@ -16,13 +16,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from functools import partial
 import math
 import random
 from typing import Any
 
-from illuminator_ros.gimbal.gimbal import GimbalSettings
+from illuminator_ros.gimbal.gimbal import Gimbal, GimbalSettings
 from illuminator_ros.gimbal.manager import GimbalManager, ManagerSettings, RequestRefused
 from illuminator_ros.gimbal.manager_with_client import ManagerWithClient
 from illuminator_ros.gimbal.messages import (
@@ -36,7 +37,7 @@ from illuminator_ros.mavlink.command_sender import CommandSender
 from illuminator_ros.mavlink.component import Component
 from illuminator_ros.mavlink.dialect import mavlink
 from illuminator_ros.payload.command_sources import SourceSettings
-from illuminator_ros.payload.confirmed_command import Result
+from illuminator_ros.payload.confirmed_command import Done, Result
 from illuminator_ros.payload.mount_attitude import STILL, YawFrame
 from illuminator_ros.payload.rotation import Quaternion
 import pytest
@@ -146,6 +147,24 @@ def test_a_client_only_stops_and_releases_the_gimbal_whatever_is_under_way_and_c
     assert {answer.result[:2] for answer in later} <= {(False, ENDING)}
     # Only a release without a success may leave control with this component.
     assert manager.primary != OURS or must_release and not any(one.success for one in releases)
+
+
+@pytest.mark.parametrize('ask', [Gimbal.take_control, Gimbal.release_control])
+def test_the_release_at_the_end_is_confirmed_though_a_request_for_control_was_under_way(
+    ask: Callable[[Gimbal, float, Done], None],
+) -> None:
+    rig = Rig(FakeManager(primary=OURS)).run(4.0)
+    rig.managers[0].answers = False
+    ask(rig.gimbal, rig.now, Answer(rig.now))
+    rig.run(0.1)
+    rig.managers[0].answers = True
+
+    rig.component.close(rig.now, ENDING)
+    rig.gimbal.release_control(rig.now, rig.done)
+    rig.run(LIMIT)
+
+    assert [one.success for one in rig.results] == [True]
+    assert rig.managers[0].primary != OURS
 
 
 def follow(rig: ManagerRig, draw: random.Random) -> None:

@@ -170,6 +170,17 @@ def test_the_client_ends_its_requests_when_the_link_is_lost() -> None:
     assert (result.success, result.message) == (False, 'cut')
 
 
+def test_a_setpoint_of_ros_that_may_have_waited_during_a_stop_of_the_process_is_not_sent() -> None:
+    rig = Rig()
+    rig.ask(rig.gimbal.take_control)
+
+    rig.component.stalled(7.0, rig.now)
+
+    assert 'may be 7.00 s old' in rig.gimbal.set_rates((0.0, 0.0, 0.2), rig.now)
+    rig.run(1.0)
+    assert rig.gimbal.set_rates((0.0, 0.0, 0.2), rig.now) == ''
+
+
 def test_gm_18_another_manager_with_our_own_address_makes_ours_inactive() -> None:
     rig = Rig()
 

@@ -24,7 +24,8 @@ from illuminator_ros.gimbal.messages import DEVICE_ID_PARAM, GimbalManagerSetAtt
 from illuminator_ros.gimbal.setpoint_stream import REPEATS
 from illuminator_ros.mavlink.dialect import mavlink, replaced
 from illuminator_ros.mavlink.messages import Address, CommandInt, CommandLong
-from illuminator_ros.payload.mount_attitude import from_mavlink, to_mavlink, YawFrame
+from illuminator_ros.payload.command_sources import SourceSettings
+from illuminator_ros.payload.mount_attitude import from_mavlink, STILL, to_mavlink, YawFrame
 from illuminator_ros.payload.rotation import Quaternion, Vector
 import pytest
 from pytest import approx
@@ -213,6 +214,25 @@ def test_an_attitude_is_not_sent_again_after_a_request() -> None:
     rig.run(3.0)
 
     assert len(setpoints(rig)) == 1
+
+
+@pytest.mark.parametrize('follow', [
+    lambda rig: set_neutral(rig.gimbal, rig.now, rig.done),
+    lambda rig: rig.gimbal.set_roi(None, rig.now, rig.done),
+    lambda rig: rig.gimbal.set_roi(PLACE, rig.now, rig.done),
+    lambda rig: rig.gimbal.release('default', rig.now)], ids=['pose', 'clear', 'place', 'release'])
+def test_a_rate_ends_with_a_zero_though_an_attitude_came_after_it_which_may_be_lost(
+        follow: Callable[[Rig], object]) -> None:
+    rig = in_control(sources=SourceSettings(('default',)))
+    rig.gimbal.claim('default', rig.now)
+    turn(rig)
+    send_attitude(rig)
+    rig.run(0.1)
+
+    follow(rig)
+    rig.run(0.1)
+
+    assert rates_of(setpoints(rig)[-1][1]) == STILL
 
 
 def test_a_late_attitude_is_ignored_unless_the_device_has_restarted() -> None:

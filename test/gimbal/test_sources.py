@@ -21,9 +21,11 @@ import random
 from typing import Any
 
 from illuminator_ros.gimbal.messages import DEVICE_ID_PARAM, GimbalManagerSetAttitude
+from illuminator_ros.mavlink.dialect import mavlink
 from illuminator_ros.mavlink.messages import CommandInt, CommandLong
 from illuminator_ros.payload.arbitration import Cause, HolderChanged
 from illuminator_ros.payload.command_sources import SourceSettings
+from illuminator_ros.payload.confirmed_command import Result
 from illuminator_ros.payload.device_events import DeviceHeld
 from illuminator_ros.payload.mount_attitude import from_mavlink, YawFrame
 import pytest
@@ -139,6 +141,53 @@ def test_a_stream_leaves_the_call_of_its_own_source_under_way() -> None:
     rig.run(0.1)
 
     assert (holder(rig), rig.results) == ('operator', [])
+
+
+def call(rig: Rig, source: str) -> None:
+    """Request the neutral position as a node does, which no status shows yet."""
+    def done(result: Result, now: float) -> None:
+        rig.gimbal.end_call(source, now, success=result.success)
+        rig.done(result, now)
+
+    rig.managers[0].applies = False
+    assert rig.gimbal.claim(source, rig.now, is_call=True) == ''
+    set_neutral(rig.gimbal, rig.now, done)
+    rig.run(0.1)
+
+
+@pytest.mark.parametrize('holds', [False, True])
+def test_a_source_that_releases_the_gimbal_during_its_call_does_not_hold_it_later(
+        holds: bool) -> None:
+    rig = shared()
+    if holds:
+        rig.gimbal.claim('default', rig.now)
+    call(rig, 'default')
+
+    rig.gimbal.release('default', rig.now)
+    rig.managers[0].flags |= mavlink.GIMBAL_DEVICE_FLAGS_NEUTRAL
+    rig.run(1.0)
+
+    assert [one[:2] for one in rig.results] == [(False, 'default has released the gimbal')]
+    assert holder(rig) == ''
+
+
+@pytest.mark.parametrize('end', [
+    lambda rig: rig.gimbal.release('autonomy', rig.now), lambda rig: rig.run(TIMEOUT - 1.2)],
+    ids=['release', 'silence'])
+def test_a_call_goes_on_when_the_hold_of_a_lower_source_ends(
+        end: Callable[[Rig], object]) -> None:
+    rig = shared()
+    rig.gimbal.claim('autonomy', rig.now)
+    rig.run(1.2)
+    call(rig, 'default')
+
+    end(rig)
+    assert holder(rig) == ''
+    rig.managers[0].flags |= mavlink.GIMBAL_DEVICE_FLAGS_NEUTRAL
+    rig.run(0.5)
+
+    assert [one.success for one in rig.results] == [True]
+    assert holder(rig) == 'default'
 
 
 def test_a_takeover_ends_the_commands_of_the_lower_source_and_their_resends() -> None:
