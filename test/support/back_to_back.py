@@ -65,7 +65,8 @@ class Pair(Line):
         self.other = (lights if isinstance(lights, Endpoint)
                       else SimulatedComponents(map(SimulatedIlluminator, lights), START - uptime))
         there = there or Faults()
-        super().__init__(self.controller, self.other, there=there, back=back or there, seed=seed)
+        super().__init__(self.controller, self.other, there=there, back=back or there, seed=seed,
+                         keeps=True)
 
     def _take(self, event: LightEvent) -> None:
         if isinstance(event, DeviceFound):

@@ -122,23 +122,27 @@ class End:
     One end of a line: an endpoint, its sequence numbers, and its decoder.
 
     :ivar wire: the way from here.
-    :ivar sent: messages with their times; ``received`` with their senders, too.
+    :ivar sent: messages with their times; ``received`` with their senders, too; if they are kept.
     """
 
-    def __init__(self, endpoint: Endpoint, wire: FaultyWire, version: int) -> None:
+    def __init__(
+        self, endpoint: Endpoint, wire: FaultyWire, version: int, *, keeps: bool,
+    ) -> None:
         self.endpoint = endpoint
         self.wire = wire
         self.decoder = Decoder()
         self.classes = {cls.id: cls for cls in endpoint.messages}
         self.sent: list[tuple[float, Any]] = []
         self.received: list[tuple[float, mav.Address, Any]] = []
+        self._keeps = keeps
         self._codec = Codec(version=version)
 
     def flush(self, now: float) -> None:
         while self.endpoint.outgoing:
             source, message = self.endpoint.outgoing.popleft()
             if self.wire.is_open:
-                self.sent.append((now, message))
+                if self._keeps:
+                    self.sent.append((now, message))
                 self.wire.send(self._codec.frame(source, message), now)
 
     def take(self, data: bytes, now: float) -> None:
@@ -147,7 +151,8 @@ class End:
                 if self.endpoint.inspect is not None:
                     self.endpoint.inspect(frame, cls)
                 message = decode(cls, frame.payload)
-                self.received.append((now, frame.source, message))
+                if self._keeps:
+                    self.received.append((now, frame.source, message))
                 self.endpoint.receive(frame.source, message, now)
                 self.flush(now)
 
@@ -158,16 +163,17 @@ class Line:
 
     :param there: the faults of the way from the first to the second; ``back`` of the way back.
     :param version: of MAVLink.
+    :param keeps: whether both ends keep all messages.
     :ivar now: s.
     """
 
     def __init__(
         self, near: Endpoint, far: Endpoint, *, there: Faults = NO_FAULTS,
-        back: Faults = NO_FAULTS, seed: int | str = 0, version: int = 2,
+        back: Faults = NO_FAULTS, seed: int | str = 0, version: int = 2, keeps: bool = False,
     ) -> None:
         self.now = START
-        self.near = End(near, FaultyWire(there, f'{seed} there'), version)
-        self.far = End(far, FaultyWire(back, f'{seed} back'), version)
+        self.near = End(near, FaultyWire(there, f'{seed} there'), version, keeps=keeps)
+        self.far = End(far, FaultyWire(back, f'{seed} back'), version, keeps=keeps)
         self._turns = 0
         self.open()
 
