@@ -46,8 +46,8 @@ class MessageQuery:
     """
     Requests one message until it has come, or the light does not send it. Times are s.
 
-    A COMMAND_ACK of MAV_CMD_REQUEST_MESSAGE does not name the message: it may be that of a request
-    for another one, such as each try of a change has. So none ends the requests; that of the last
+    A COMMAND_ACK of MAV_CMD_REQUEST_MESSAGE does not name the message: it may answer a request for
+    another one, such as each try of a change carries. So no refusal ends the requests; the last
     one explains why the message has not come.
 
     :ivar first_asked: the time of the first request, infinity before it.

@@ -382,9 +382,10 @@ class CommandSender:
         elif now >= deadline:
             done(CommandResult(CommandStatus.OUT_OF_TIME), now)
         else:
-            if older := self._pending.get(command.key):
+            key = command.key
+            if older := self._pending.get(key):
                 self._end(older, CommandStatus.CANCELLED, now)
-            self._pending[command.key] = sending
+            self._pending[key] = sending
             sending.first_sent = now
             sending.tries = sending.rejected = tried
             self._transmit(sending, now)

@@ -19,6 +19,7 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections import deque
 from collections.abc import Callable, Collection, Sequence
+import contextlib
 import math
 
 from .command_receiver import CommandReceiver
@@ -42,6 +43,13 @@ from .statistics import MAX_SOURCES
 HEARTBEAT_INTERVAL = 1.0
 # s for which a message from our own address counts as an address conflict.
 CONFLICT_MEMORY = 10.0
+
+
+def poll_each(polls: Sequence[Callable[[float], None]], now: float) -> None:
+    """Call functions in their order; raise the exception of one once all have been called."""
+    with contextlib.ExitStack() as calls:
+        for poll in reversed(polls):
+            calls.callback(poll, now)
 
 
 class MessageHandler(ABC):
@@ -204,6 +212,8 @@ class Component(Endpoint):
                            for cls in self.messages}
         self._received = CommandReceiver(self.address)
         self._heartbeat = HeartbeatTimer(self.address, mav_type, self.outgoing)
+        # A payload may end a command that is due to be sent again.
+        self._polls = (self._heartbeat.poll, *(one.poll for one in payloads), commands.poll)
         self._conflict_at = -math.inf
         # The last heartbeat from another sender with our address.
         self._conflicting: Heartbeat | None = None
@@ -293,12 +303,7 @@ class Component(Endpoint):
 
     def poll(self, now: float) -> None:
         """See :meth:`Endpoint.poll`."""
-        self._heartbeat.poll(now)
-        # A payload may end a command that is due to be sent again.
-        for payload in self._payloads:
-            payload.poll(now)
-        if now >= self.commands.next_deadline():
-            self.commands.poll(now)
+        poll_each(self._polls, now)
 
     def next_deadline(self) -> float:
         """See :meth:`Endpoint.next_deadline`."""

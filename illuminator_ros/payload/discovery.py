@@ -27,6 +27,7 @@ import math
 from typing import Generic, Protocol, TypeVar
 
 from .device_events import DeviceEvent, DeviceForgotten, DeviceFound
+from ..mavlink.component import poll_each
 
 # Devices of one kind; one more is ignored, so that memory is bounded.
 MAX_DEVICES = 128
@@ -160,11 +161,13 @@ class Discovery(Generic[K, D]):
 
     def poll(self, now: float) -> None:
         """Poll the devices that have something to do, and forget silent ones."""
+        due = []
         for key, device in [*self.devices.items(), *self.candidates.items()]:
             if not device.was_commanded and now >= device.lost_at + FORGET_AFTER:
                 self._drop(key, now)
             elif now >= device.next_deadline():
-                device.poll(now)
+                due.append(device.poll)
+        poll_each(due, now)
 
     def next_deadline(self) -> float:
         """Return when :meth:`poll` is due, infinity if never."""

@@ -135,10 +135,8 @@ class NodeInterface:
                             SERVICE_QOS, log)
         for command in commands:
             endpoint = command.endpoint
-            hand = (_each(link, command.take) if endpoint.qos is SWITCH_QOS
-                    else _Newest(link, command.take).offer)
             node.create_subscription(
-                endpoint.type, f'~/{endpoint.name}', _reader(command, hand, log),
+                endpoint.type, f'~/{endpoint.name}', _TopicCalls(link, log, command).offer,
                 endpoint.qos or COMMAND_QOS)
 
     def publish(self, name: str, value: object) -> None:
@@ -182,37 +180,26 @@ def _taker(service: RequestService, calls: LinkCalls) -> Take:
     return take
 
 
-def _reader(
-    command: CommandTopic[T], hand: Callable[[T], None], log: NodeLog,
-) -> Callable[[Any], None]:
-    """Return a callback that reads messages of a topic and hands their values to the link."""
-    name = command.endpoint.name
+class _TopicCalls(Generic[T]):
+    """Hands the values of a topic to the link: of a stream only the newest."""
 
-    def take(message: Any) -> None:
-        try:
-            value = command.read(message)
-        except ValueError as error:
-            log.warning(f'~/{name}: ignored: {error}', name)
-        else:
-            hand(value)
-
-    return take
-
-
-def _each(link: Link, take: Callable[[T, float], None]) -> Callable[[T], None]:
-    return lambda value: link.call(functools.partial(take, value))
-
-
-class _Newest(Generic[T]):
-    """Hands the newest value of a stream to the link."""
-
-    def __init__(self, link: Link, take: Callable[[T, float], None]) -> None:
+    def __init__(self, link: Link, log: NodeLog, command: CommandTopic[T]) -> None:
         self._link = link
-        self._take = take
+        self._log = log
+        self._command = command
         self._waiting: list[T] = []
         self._lock = threading.Lock()
 
-    def offer(self, value: T) -> None:
+    def offer(self, message: Any) -> None:
+        endpoint = self._command.endpoint
+        try:
+            value = self._command.read(message)
+        except ValueError as error:
+            self._log.warning(f'~/{endpoint.name}: ignored: {error}', endpoint.name)
+            return
+        if endpoint.qos is SWITCH_QOS:
+            self._link.call(functools.partial(self._command.take, value))
+            return
         with self._lock:
             called = bool(self._waiting)
             self._waiting[:] = [value]
@@ -222,4 +209,4 @@ class _Newest(Generic[T]):
     def _deliver(self, now: float) -> None:
         with self._lock:
             value = self._waiting.pop()
-        self._take(value, now)
+        self._command.take(value, now)
