@@ -358,6 +358,9 @@ def test_a_call_whose_source_releases_the_light_meanwhile_claims_it_no_more() ->
     assert answer.result.success
     assert shared.holder == ''
     assert shared.pair.wait_for(shared.call('autonomy', False)).success
+    # The release is reported, too, since the call had taken the light.
+    assert [event.change.after for event in shared.pair.recorder.others
+            if isinstance(event, DeviceHeld)] == [None, 'autonomy']
 
 
 def test_an_off_that_a_call_under_way_refuses_is_sent_when_the_call_has_failed() -> None:
