@@ -86,6 +86,8 @@ class _Setpoint:
     @property
     def may_have_rate(self) -> bool:
         """Whether the gimbal may turn at a rate, since the message that ends it may be lost."""
+        if self.kind is Kind.ZERO and not self.stands:
+            return True
         return bool(self.due) and (self.kind is not Kind.ATTITUDE or self.ends_rate)
 
 

@@ -428,6 +428,30 @@ def test_control_is_released_once_an_attitude_shows_that_the_gimbal_stands_or_af
     assert sent[0][0] - asked_at <= most
 
 
+def lose_control_for_a_while(rig: Rig) -> None:
+    for primary in (OTHER, OURS):
+        rig.managers[0].primary = primary
+        rig.run(1.0)
+
+
+@pytest.mark.parametrize('change', [
+    lambda rig: rig.gimbal.release_control(rig.now, rig.done), lose_control_for_a_while],
+    ids=['release', 'loss'])
+def test_a_gimbal_that_no_zero_has_stopped_gets_another_one_when_control_changes(
+        change: Callable[[Rig], object]) -> None:
+    rig = in_control()
+    rig.managers[0].rates = (0.0, -0.2, 0.0)
+    rig.gimbal.set_rates((0.0, 0.2, 0.0), rig.now)
+    rig.run(3.0)
+    before = len(setpoints(rig))
+    assert before == 2 + len(REPEATS)
+
+    change(rig)
+    rig.run(0.1)
+
+    assert len(setpoints(rig)) > before
+
+
 MOVES: list[Callable[[Rig], object]] = [
     lambda rig: rig.gimbal.set_rates((0.0, 0.2, 0.0), rig.now),
     lambda rig: rig.gimbal.set_attitude(Quaternion(), VEHICLE, rig.now),
