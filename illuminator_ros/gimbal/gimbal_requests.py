@@ -108,11 +108,6 @@ class GimbalRequests:
 
     # Poses and places
 
-    @property
-    def pose_since(self) -> float:
-        """Return since when a request for a pose is under way, -inf if none is."""
-        return -math.inf if self.pose.desired is None else self.pose.sent_at
-
     def set_pose(self, flag: Flag, now: float, done: Done) -> None:
         """Turn the gimbal to a pose."""
         self.pose.want(Desired(flag.change(self._device_id), limit=REQUEST_LIMIT), now,

@@ -102,20 +102,17 @@ class SetpointStream:
     :param make: returns the message of a setpoint.
     :param send: sends a message.
     :param timeout: from the last rate until a rate of zero is sent.
-    :param pose_since: returns since when a request for a pose is under way, -inf if none is.
     :ivar sent: the number of messages.
     """
 
     def __init__(
         self, make: Callable[[YawFrame, Wxyz, Vector], GimbalManagerSetAttitude],
         send: Callable[[GimbalManagerSetAttitude], None], timeout: float,
-        pose_since: Callable[[], float],
     ) -> None:
         self.sent = 0
         self._make = make
         self._send_message = send
         self._timeout = timeout
-        self._pose_since = pose_since
         self._last: _Setpoint | None = None
         # The setpoint that the last request of each kind has suspended, and its place.
         self._suspended: dict[SuspendedBy, tuple[_Setpoint | None, _Setpoint]] = {}
@@ -157,11 +154,8 @@ class SetpointStream:
 
     def _yaw_frame(self, now: float) -> YawFrame:
         """Return the yaw frame that rates keep, which implies the yaw lock."""
-        since = self._pose_since()
-        if since <= self._attitude_at > now - LOCK_DELAY:
-            return self._attitude_frame
-        # The flags of a pose clear the lock.
-        return YawFrame.VEHICLE if since > -math.inf else self._reported_frame
+        return (self._attitude_frame if self._attitude_at > now - LOCK_DELAY
+                else self._reported_frame)
 
     def suspend(self, now: float, kind: SuspendedBy, *, is_place: bool = False) -> None:
         """
@@ -179,7 +173,10 @@ class SetpointStream:
             before.due.clear()
         if is_place:
             self._last = place
-        elif kind is SuspendedBy.PLACE and before is not None and before.kind is Kind.ZERO:
+        elif kind is SuspendedBy.POSE:
+            # The flags of a pose clear the lock.
+            self._attitude_frame, self._attitude_at = YawFrame.VEHICLE, now
+        elif before is not None and before.kind is Kind.ZERO:
             # ArduPilot leaves a rate as it is, so the zero must arrive.
             before = None
         self._suspended[kind] = before, place
@@ -187,6 +184,8 @@ class SetpointStream:
     def request_ended(self, kind: SuspendedBy, result: Result) -> None:
         """Take the result of the last request: the setpoint counts again if it was refused."""
         before, place = self._suspended.get(kind, (None, None))
+        if result.refused and kind is SuspendedBy.POSE:
+            self._attitude_at = -math.inf
         if result.success and before is not None:
             before.is_over = True
         # Without an answer the gimbal may follow the place.

@@ -561,6 +561,24 @@ def test_gm_8_place_without_an_answer_is_not_sent_again_after_a_later_setpoint_o
     assert [(one.success, one.superseded) for one in rig.results[:2]] == [(False, True)] * 2
 
 
+@pytest.mark.parametrize('later', [
+    lambda gimbal, now: gimbal.set_attitude(Quaternion(), YawFrame.VEHICLE, now),
+    lambda gimbal, now: gimbal.set_rates((0.0, 0.1, 0.0), now)])
+def test_a_pose_without_an_answer_is_not_sent_again_after_a_later_setpoint(
+        later: Callable[[Gimbal, float], str]) -> None:
+    rig = in_control()
+    rig.managers[0].answers = False
+    set_neutral(rig.gimbal, rig.now, rig.done)
+    rig.run(0.1)
+
+    assert later(rig.gimbal, rig.now) == ''
+    rig.run(3.0)
+
+    assert len(commands(rig, mavlink.MAV_CMD_DO_GIMBAL_MANAGER_PITCHYAW)) == 1
+    assert [(one.superseded, one.message) for one in rig.results] == [
+        (True, 'superseded by a setpoint')]
+
+
 @pytest.mark.parametrize(('ask', 'command', 'wish'), [
     (retract, mavlink.MAV_CMD_DO_GIMBAL_MANAGER_PITCHYAW, 'retract'),
     (set_roi, mavlink.MAV_CMD_DO_SET_ROI_LOCATION, 'point at 47, 8.5, 500 m'),

@@ -205,6 +205,26 @@ def test_gm_2_rate_leaves_the_yaw_lock_of_the_newer_of_a_request_and_an_attitude
     assert has_lock is lock
 
 
+@pytest.mark.parametrize(('results', 'has_lock'), [
+    ({}, False), ({mavlink.MAV_CMD_DO_GIMBAL_MANAGER_PITCHYAW: mavlink.MAV_RESULT_DENIED}, True)])
+def test_gm_2_rate_after_a_pose_leaves_the_yaw_unlocked_unless_the_pose_is_refused(
+        results: dict[int, int], has_lock: bool) -> None:
+    rig = in_control()
+    manager = rig.managers[0]
+    manager.flags, manager.applies, manager.results = (
+        mavlink.GIMBAL_DEVICE_FLAGS_YAW_LOCK, False, results)
+    rig.run(1.0)
+
+    set_neutral(rig.gimbal, rig.now, rig.done)
+    rig.run(0.3)
+    for _ in range(2):
+        turn(rig)
+        rig.run(0.1)
+
+    assert [bool(one.flags & mavlink.GIMBAL_DEVICE_FLAGS_YAW_LOCK)
+            for _, one in setpoints(rig)] == [has_lock] * 2
+
+
 def test_an_attitude_is_not_sent_again_after_a_request() -> None:
     rig = in_control()
     send_attitude(rig)
