@@ -90,6 +90,16 @@ class _Setpoint:
             return True
         return bool(self.due) and (self.kind is not Kind.ATTITUDE or self.ends_rate)
 
+    @property
+    def awaits_status(self) -> bool:
+        """
+        Whether it is sent again when the next status of the device comes.
+
+        A status shows that the line is not cut, so an attitude that ends a rate awaits one, too.
+        """
+        return self.kind is Kind.ZERO or (
+            self.kind is Kind.ATTITUDE and self.ends_rate and len(self.due) == 1)
+
 
 class SetpointStream:
     """
@@ -263,20 +273,24 @@ class SetpointStream:
         """
         is_locked = status.flags & mavlink.GIMBAL_DEVICE_FLAGS_YAW_LOCK
         self._reported_frame = YawFrame.EARTH if is_locked else YawFrame.VEHICLE
-        zero = self._last
-        if not may_send or zero is None or zero.kind is not Kind.ZERO or not zero.due:
+        last = self._last
+        if not may_send or last is None or not last.due or not last.awaits_status:
             return
         turns = self._detector.turns(status, now)
-        if now < zero.due[0]:
+        if now < last.due[0]:
+            return
+        if last.kind is Kind.ATTITUDE:
+            last.due.clear()
+            self._send(last)
             return
         if turns is not None:
-            zero.stands = not turns
-            del zero.due[0]
+            last.stands = not turns
+            del last.due[0]
             self._detector.reset()
         if turns:
             # The yaw lock may have changed since.
-            zero.message = self._make(self._yaw_frame(now), UNSET_QUATERNION, STILL)
-            self._send(zero)
+            last.message = self._make(self._yaw_frame(now), UNSET_QUATERNION, STILL)
+            self._send(last)
 
     def poll(self, now: float) -> None:
         """Send what is due; this component must have control."""
@@ -291,8 +305,7 @@ class SetpointStream:
     def next_deadline(self) -> float:
         """Return when :meth:`poll` is due, infinity if never."""
         last = self._last
-        # A zero is sent again only when a status comes.
-        return last.due[0] if last and last.due and last.kind is not Kind.ZERO else math.inf
+        return last.due[0] if last and last.due and not last.awaits_status else math.inf
 
     def _set(self, setpoint: _Setpoint) -> None:
         self._last = setpoint

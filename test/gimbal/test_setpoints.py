@@ -236,6 +236,20 @@ def test_an_attitude_is_not_sent_again_after_a_request() -> None:
     assert len(setpoints(rig)) == 1
 
 
+def test_an_attitude_that_ends_a_rate_is_sent_again_after_a_gap_in_which_all_were_lost() -> None:
+    rig = in_control()
+    manager = rig.managers[0]
+    turn(rig)
+    rig.run(0.1)
+    send_attitude(rig)
+    rig.managers.clear()
+    rig.run(2.0)
+    rig.managers.append(manager)
+    rig.run(1.0)
+
+    assert [all(map(math.isfinite, one.q)) for one in manager.received] == [False, True]
+
+
 @pytest.mark.parametrize('follow', [
     lambda rig: set_neutral(rig.gimbal, rig.now, rig.done),
     lambda rig: rig.gimbal.set_roi(None, rig.now, rig.done),
