@@ -468,6 +468,20 @@ def test_of_requests_for_the_yaw_lock_equal_ones_share_the_outcome_and_the_last_
         (False, True, 'superseded by yaw locked'), *[(True, False, 'yaw locked')] * 2]
 
 
+def test_each_of_equal_requests_for_the_yaw_lock_has_its_own_time() -> None:
+    rig = in_control()
+    rig.managers[0].applies = False
+    for seconds in (1.5, 1.0):
+        set_yaw_lock(rig.gimbal, True, rig.now, rig.done)
+        rig.run(seconds)
+    assert [one.success for one in rig.results] == [False]
+
+    rig.managers[0].flags |= mavlink.GIMBAL_DEVICE_FLAGS_YAW_LOCK
+    rig.run(0.5)
+
+    assert [one.success for one in rig.results] == [False, True]
+
+
 def test_a_caller_that_raises_leaves_the_answer_to_the_others_of_the_yaw_lock() -> None:
     def fail(result: Result, now: float) -> None:
         raise RuntimeError
