@@ -88,8 +88,7 @@ class Gimbal:
         self._emit = emit
         self._requests = GimbalRequests(key, manager, commands)
         self._setpoints = SetpointStream(
-            self._message, commands.send, settings.setpoint_timeout,
-            lambda: self._requests.pose_since)
+            self._message, commands.send, settings.setpoint_timeout)
         self._yaw_lock = YawLock(self._setpoints.hold)
         # Whether control must be taken as soon as no component has it.
         self._take_due = False
@@ -364,7 +363,7 @@ class Gimbal:
             mavlink.GIMBAL_DEVICE_CAP_FLAGS_SUPPORTS_YAW_IN_EARTH_FRAME,
         ) if frame is YawFrame.EARTH else '')
         if not reason:
-            self._requests.cancel_places('superseded by a setpoint', now, superseded=True)
+            self._requests.cancel_moves('superseded by a setpoint', now, superseded=True)
             self._setpoints.set_attitude(rotation, frame, now)
         return reason
 
@@ -400,7 +399,7 @@ class Gimbal:
         self._begin(now)
         reason = self.unavailable(now)
         if not reason:
-            self._requests.cancel_places('superseded by a setpoint', now, superseded=True)
+            self._requests.cancel_moves('superseded by a setpoint', now, superseded=True)
             self._setpoints.set_rates(rates, now)
         return reason
 

@@ -108,11 +108,6 @@ class GimbalRequests:
 
     # Poses and places
 
-    @property
-    def pose_since(self) -> float:
-        """Return since when a request for a pose is under way, -inf if none is."""
-        return -math.inf if self.pose.desired is None else self.pose.sent_at
-
     def set_pose(self, flag: Flag, now: float, done: Done) -> None:
         """Turn the gimbal to a pose."""
         self.pose.want(Desired(flag.change(self._device_id), limit=REQUEST_LIMIT), now,
@@ -244,20 +239,23 @@ class YawLock:
         wanted = self._wanted
         if wanted is None:
             return
-        if now >= self._since + LOCK_LIMIT:
+        if late := [one for one in self._callers if now >= one.asked_at + LOCK_LIMIT]:
             name = GimbalDeviceAttitudeStatus.msgname
             shown = (f'no {name} came' if self._flags is None else f'{name} shows ' + (
                 ', '.join(flag_names('GIMBAL_DEVICE_FLAGS', self._flags)) or 'no flags'))
             advice = '; the device may need the heading of the vehicle' if wanted.is_set else ''
             text = f'{wanted.goal} not confirmed: {shown} within {LOCK_LIMIT:g} s{advice}'
-            self._finish(Result(False, text), now)
+            self._callers = self._callers[len(late):]
+            self._wanted = wanted if self._callers else None
+            answer(late, Result(False, text), now)
         elif self._resend and now >= self._resend[0]:
             del self._resend[0]
             self._send(YawFrame.EARTH if wanted.is_set else YawFrame.VEHICLE, now)
 
     def next_deadline(self) -> float:
         """Return when :meth:`poll` is due, infinity if never."""
-        return math.inf if self._wanted is None else min([self._since + LOCK_LIMIT, *self._resend])
+        return math.inf if self._wanted is None else min(
+            [self._callers[0].asked_at + LOCK_LIMIT, *self._resend])
 
     def _finish(self, result: Result, now: float) -> None:
         callers, self._callers, self._wanted = self._callers, [], None

@@ -86,7 +86,19 @@ class _Setpoint:
     @property
     def may_have_rate(self) -> bool:
         """Whether the gimbal may turn at a rate, since the message that ends it may be lost."""
+        if self.kind is Kind.ZERO and not self.stands:
+            return True
         return bool(self.due) and (self.kind is not Kind.ATTITUDE or self.ends_rate)
+
+    @property
+    def awaits_status(self) -> bool:
+        """
+        Whether it is sent again when the next status of the device comes.
+
+        A status shows that the line is not cut, so an attitude that ends a rate awaits one, too.
+        """
+        return self.kind is Kind.ZERO or (
+            self.kind is Kind.ATTITUDE and self.ends_rate and len(self.due) == 1)
 
 
 class SetpointStream:
@@ -100,20 +112,17 @@ class SetpointStream:
     :param make: returns the message of a setpoint.
     :param send: sends a message.
     :param timeout: from the last rate until a rate of zero is sent.
-    :param pose_since: returns since when a request for a pose is under way, -inf if none is.
     :ivar sent: the number of messages.
     """
 
     def __init__(
         self, make: Callable[[YawFrame, Wxyz, Vector], GimbalManagerSetAttitude],
         send: Callable[[GimbalManagerSetAttitude], None], timeout: float,
-        pose_since: Callable[[], float],
     ) -> None:
         self.sent = 0
         self._make = make
         self._send_message = send
         self._timeout = timeout
-        self._pose_since = pose_since
         self._last: _Setpoint | None = None
         # The setpoint that the last request of each kind has suspended, and its place.
         self._suspended: dict[SuspendedBy, tuple[_Setpoint | None, _Setpoint]] = {}
@@ -155,11 +164,8 @@ class SetpointStream:
 
     def _yaw_frame(self, now: float) -> YawFrame:
         """Return the yaw frame that rates keep, which implies the yaw lock."""
-        since = self._pose_since()
-        if since <= self._attitude_at > now - LOCK_DELAY:
-            return self._attitude_frame
-        # The flags of a pose clear the lock.
-        return YawFrame.VEHICLE if since > -math.inf else self._reported_frame
+        return (self._attitude_frame if self._attitude_at > now - LOCK_DELAY
+                else self._reported_frame)
 
     def suspend(self, now: float, kind: SuspendedBy, *, is_place: bool = False) -> None:
         """
@@ -177,7 +183,10 @@ class SetpointStream:
             before.due.clear()
         if is_place:
             self._last = place
-        elif kind is SuspendedBy.PLACE and before is not None and before.kind is Kind.ZERO:
+        elif kind is SuspendedBy.POSE:
+            # The flags of a pose clear the lock.
+            self._attitude_frame, self._attitude_at = YawFrame.VEHICLE, now
+        elif before is not None and before.kind is Kind.ZERO:
             # ArduPilot leaves a rate as it is, so the zero must arrive.
             before = None
         self._suspended[kind] = before, place
@@ -185,6 +194,8 @@ class SetpointStream:
     def request_ended(self, kind: SuspendedBy, result: Result) -> None:
         """Take the result of the last request: the setpoint counts again if it was refused."""
         before, place = self._suspended.get(kind, (None, None))
+        if result.refused and kind is SuspendedBy.POSE:
+            self._attitude_at = -math.inf
         if result.success and before is not None:
             before.is_over = True
         # Without an answer the gimbal may follow the place.
@@ -262,20 +273,24 @@ class SetpointStream:
         """
         is_locked = status.flags & mavlink.GIMBAL_DEVICE_FLAGS_YAW_LOCK
         self._reported_frame = YawFrame.EARTH if is_locked else YawFrame.VEHICLE
-        zero = self._last
-        if not may_send or zero is None or zero.kind is not Kind.ZERO or not zero.due:
+        last = self._last
+        if not may_send or last is None or not last.due or not last.awaits_status:
             return
         turns = self._detector.turns(status, now)
-        if now < zero.due[0]:
+        if now < last.due[0]:
+            return
+        if last.kind is Kind.ATTITUDE:
+            last.due.clear()
+            self._send(last)
             return
         if turns is not None:
-            zero.stands = not turns
-            del zero.due[0]
+            last.stands = not turns
+            del last.due[0]
             self._detector.reset()
         if turns:
             # The yaw lock may have changed since.
-            zero.message = self._make(self._yaw_frame(now), UNSET_QUATERNION, STILL)
-            self._send(zero)
+            last.message = self._make(self._yaw_frame(now), UNSET_QUATERNION, STILL)
+            self._send(last)
 
     def poll(self, now: float) -> None:
         """Send what is due; this component must have control."""
@@ -290,8 +305,7 @@ class SetpointStream:
     def next_deadline(self) -> float:
         """Return when :meth:`poll` is due, infinity if never."""
         last = self._last
-        # A zero is sent again only when a status comes.
-        return last.due[0] if last and last.due and last.kind is not Kind.ZERO else math.inf
+        return last.due[0] if last and last.due and not last.awaits_status else math.inf
 
     def _set(self, setpoint: _Setpoint) -> None:
         self._last = setpoint

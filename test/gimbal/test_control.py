@@ -468,6 +468,20 @@ def test_of_requests_for_the_yaw_lock_equal_ones_share_the_outcome_and_the_last_
         (False, True, 'superseded by yaw locked'), *[(True, False, 'yaw locked')] * 2]
 
 
+def test_each_of_equal_requests_for_the_yaw_lock_has_its_own_time() -> None:
+    rig = in_control()
+    rig.managers[0].applies = False
+    for seconds in (1.5, 1.0):
+        set_yaw_lock(rig.gimbal, True, rig.now, rig.done)
+        rig.run(seconds)
+    assert [one.success for one in rig.results] == [False]
+
+    rig.managers[0].flags |= mavlink.GIMBAL_DEVICE_FLAGS_YAW_LOCK
+    rig.run(0.5)
+
+    assert [one.success for one in rig.results] == [False, True]
+
+
 def test_a_caller_that_raises_leaves_the_answer_to_the_others_of_the_yaw_lock() -> None:
     def fail(result: Result, now: float) -> None:
         raise RuntimeError
@@ -559,6 +573,24 @@ def test_gm_8_place_without_an_answer_is_not_sent_again_after_a_later_setpoint_o
 
     assert len(rig.messages(mav.CommandInt)) == 1
     assert [(one.success, one.superseded) for one in rig.results[:2]] == [(False, True)] * 2
+
+
+@pytest.mark.parametrize('later', [
+    lambda gimbal, now: gimbal.set_attitude(Quaternion(), YawFrame.VEHICLE, now),
+    lambda gimbal, now: gimbal.set_rates((0.0, 0.1, 0.0), now)])
+def test_a_pose_without_an_answer_is_not_sent_again_after_a_later_setpoint(
+        later: Callable[[Gimbal, float], str]) -> None:
+    rig = in_control()
+    rig.managers[0].answers = False
+    set_neutral(rig.gimbal, rig.now, rig.done)
+    rig.run(0.1)
+
+    assert later(rig.gimbal, rig.now) == ''
+    rig.run(3.0)
+
+    assert len(commands(rig, mavlink.MAV_CMD_DO_GIMBAL_MANAGER_PITCHYAW)) == 1
+    assert [(one.superseded, one.message) for one in rig.results] == [
+        (True, 'superseded by a setpoint')]
 
 
 @pytest.mark.parametrize(('ask', 'command', 'wish'), [

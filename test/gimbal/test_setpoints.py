@@ -205,6 +205,26 @@ def test_gm_2_rate_leaves_the_yaw_lock_of_the_newer_of_a_request_and_an_attitude
     assert has_lock is lock
 
 
+@pytest.mark.parametrize(('results', 'has_lock'), [
+    ({}, False), ({mavlink.MAV_CMD_DO_GIMBAL_MANAGER_PITCHYAW: mavlink.MAV_RESULT_DENIED}, True)])
+def test_gm_2_rate_after_a_pose_leaves_the_yaw_unlocked_unless_the_pose_is_refused(
+        results: dict[int, int], has_lock: bool) -> None:
+    rig = in_control()
+    manager = rig.managers[0]
+    manager.flags, manager.applies, manager.results = (
+        mavlink.GIMBAL_DEVICE_FLAGS_YAW_LOCK, False, results)
+    rig.run(1.0)
+
+    set_neutral(rig.gimbal, rig.now, rig.done)
+    rig.run(0.3)
+    for _ in range(2):
+        turn(rig)
+        rig.run(0.1)
+
+    assert [bool(one.flags & mavlink.GIMBAL_DEVICE_FLAGS_YAW_LOCK)
+            for _, one in setpoints(rig)] == [has_lock] * 2
+
+
 def test_an_attitude_is_not_sent_again_after_a_request() -> None:
     rig = in_control()
     send_attitude(rig)
@@ -214,6 +234,20 @@ def test_an_attitude_is_not_sent_again_after_a_request() -> None:
     rig.run(3.0)
 
     assert len(setpoints(rig)) == 1
+
+
+def test_an_attitude_that_ends_a_rate_is_sent_again_after_a_gap_in_which_all_were_lost() -> None:
+    rig = in_control()
+    manager = rig.managers[0]
+    turn(rig)
+    rig.run(0.1)
+    send_attitude(rig)
+    rig.managers.clear()
+    rig.run(2.0)
+    rig.managers.append(manager)
+    rig.run(1.0)
+
+    assert [all(map(math.isfinite, one.q)) for one in manager.received] == [False, True]
 
 
 @pytest.mark.parametrize('follow', [
@@ -426,6 +460,30 @@ def test_control_is_released_once_an_attitude_shows_that_the_gimbal_stands_or_af
     assert {rates_of(one) for one in zeros} == {(0.0, 0.0, 0.0)}
     assert len(zeros) >= 1 + min(lost, 1) * (turning == 0.2)
     assert sent[0][0] - asked_at <= most
+
+
+def lose_control_for_a_while(rig: Rig) -> None:
+    for primary in (OTHER, OURS):
+        rig.managers[0].primary = primary
+        rig.run(1.0)
+
+
+@pytest.mark.parametrize('change', [
+    lambda rig: rig.gimbal.release_control(rig.now, rig.done), lose_control_for_a_while],
+    ids=['release', 'loss'])
+def test_a_gimbal_that_no_zero_has_stopped_gets_another_one_when_control_changes(
+        change: Callable[[Rig], object]) -> None:
+    rig = in_control()
+    rig.managers[0].rates = (0.0, -0.2, 0.0)
+    rig.gimbal.set_rates((0.0, 0.2, 0.0), rig.now)
+    rig.run(3.0)
+    before = len(setpoints(rig))
+    assert before == 2 + len(REPEATS)
+
+    change(rig)
+    rig.run(0.1)
+
+    assert len(setpoints(rig)) > before
 
 
 MOVES: list[Callable[[Rig], object]] = [
