@@ -25,9 +25,9 @@ from .messages import GimbalManagerStatus, NO_COMPONENT, REMOVE_SENDER, UNCHANGE
 from ..mavlink.command_sender import CommandPosition
 from ..mavlink.dialect import flag_names, mavlink
 from ..mavlink.messages import Address
+from ..payload.confirmed_command import Change
 from ..payload.messages import GeoPoint, GimbalDeviceAttitudeStatus
 from ..payload.mount_attitude import YawFrame
-from ..payload.plain_change import PlainChange
 
 
 @dataclass(frozen=True)
@@ -72,7 +72,7 @@ def setpoint_flags(frame: YawFrame) -> int:
     return LEVEL | frame.flag | lock
 
 
-def configure(us: Address, device_id: int, *, take: bool) -> PlainChange[GimbalManagerStatus]:
+def configure(us: Address, device_id: int, *, take: bool) -> Change[GimbalManagerStatus]:
     """Return the change that takes primary control, or releases all control of this component."""
     def is_shown(status: GimbalManagerStatus) -> bool:
         control = Control.of(status)
@@ -80,10 +80,9 @@ def configure(us: Address, device_id: int, *, take: bool) -> PlainChange[GimbalM
 
     # The address instead of SENDER, which PX4 reads as the autopilot.
     players = (*us, UNCHANGED, UNCHANGED) if take else (REMOVE_SENDER,) * 4
-    return PlainChange(
+    return Change(
         mavlink.MAV_CMD_DO_GIMBAL_MANAGER_CONFIGURE, (*players, 0, 0, device_id),
-        'control taken' if take else 'control released',
-        status_name=GimbalManagerStatus.msgname, shown_by=is_shown,
+        'control taken' if take else 'control released', shown_by=is_shown,
         actual=lambda status: str(Control.of(status)))
 
 
@@ -107,18 +106,17 @@ class Flag(NamedTuple):
         """Whether it alone sets the attitude."""
         return self.flag != mavlink.GIMBAL_DEVICE_FLAGS_YAW_LOCK
 
-    def change(self, device_id: int) -> PlainChange[GimbalDeviceAttitudeStatus]:
+    def change(self, device_id: int) -> Change[GimbalDeviceAttitudeStatus]:
         """
         Return the change by a flag of a pose.
 
         Such a flag takes precedence over the angles and rates (GIMBAL_DEVICE_FLAGS), so they are
         NaN, "unset" (MAV_CMD_DO_GIMBAL_MANAGER_PITCHYAW). Without it PX4 would turn to 0.
         """
-        return PlainChange(
+        return Change(
             mavlink.MAV_CMD_DO_GIMBAL_MANAGER_PITCHYAW,
             (*(math.nan,) * 4, setpoint_flags(YawFrame.VEHICLE) | self.flag, 0, device_id),
             self.goal,
-            status_name=GimbalDeviceAttitudeStatus.msgname,
             shown_by=lambda status: bool(status.flags & self.flag),
             actual=lambda status: ', '.join(
                 flag_names('GIMBAL_DEVICE_FLAGS', status.flags)) or 'no flags')
@@ -135,17 +133,17 @@ YAW_LOCKS = {
                 0, is_set=False)}
 
 
-def point(device_id: int, place: GeoPoint | None) -> PlainChange[None]:
+def point(device_id: int, place: GeoPoint | None) -> Change[None]:
     """
     Return the change that points the gimbal at a place, or at none.
 
     :param place: with its altitude above mean sea level.
     """
     if place is None:
-        return PlainChange(
+        return Change(
             mavlink.MAV_CMD_DO_SET_ROI_NONE, (float(device_id),), 'point at no place')
     latitude, longitude, altitude = place
-    return PlainChange(
+    return Change(
         mavlink.MAV_CMD_DO_SET_ROI_LOCATION, (float(device_id),),
         f'point at {latitude:.7g}, {longitude:.7g}, {altitude:.4g} m',
         CommandPosition(MAV_FRAME_GLOBAL, *place))

@@ -16,10 +16,12 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from dataclasses import dataclass
+from functools import partial
 
 from .model import Configuration, DIMMING_FLAGS, flag_names, Status, unexpected_differences
 from ..mavlink.dialect import mavlink
+from ..payload.confirmed_command import Change
 
 CONFIRMED = 'confirmed by ILLUMINATOR_STATUS'
 
@@ -33,55 +35,35 @@ def _with_flags(shown: str, status: Status) -> str:
     return ', '.join(filter(None, (shown, *flag_names(status.error_flags))))
 
 
-class OnOff(NamedTuple):
-    """Switches all lights of a component on or off; the command cannot select one of them."""
-
-    on: bool
-    note: str = ''
-    position: None = None
-    command: int = mavlink.MAV_CMD_ILLUMINATOR_ON_OFF
-    is_idempotent: bool = True
-
-    @property
-    def is_repeated(self) -> bool:
-        """See :class:`~..payload.confirmed_command.Change`."""
-        return not self.on
-
-    @property
-    def params(self) -> tuple[float, ...]:
-        """See :class:`~..payload.confirmed_command.Change`."""
-        return (float(self.on),)
-
-    @property
-    def goal(self) -> str:
-        """See :class:`~..payload.confirmed_command.Change`."""
-        return 'on' if self.on else 'off'
-
-    def shown_by(self, status: Status) -> bool | None:
-        """See :class:`~..payload.confirmed_command.Change`."""
-        if not self.on and status.is_off_by_heat:
-            return None
-        return status.enabled is self.on
-
-    def evidence(self, status: Status) -> str:
-        """See :class:`~..payload.confirmed_command.Change`."""
-        if self.on:
-            return _despite_heat(status)
-        if status.is_off_by_heat:
-            return f'accepted (ILLUMINATOR_STATUS shows {self.actual(status)})'
-        return CONFIRMED
-
-    def actual(self, status: Status) -> str:
-        """See :class:`~..payload.confirmed_command.Change`."""
-        shown = {True: 'on', False: 'off', None: 'neither on nor off'}[status.enabled]
-        return _with_flags(shown, status)
+def _shows_switch(on: bool, status: Status) -> bool | None:
+    if not on and status.is_off_by_heat:
+        return None
+    return status.enabled is on
 
 
-# Made once, since each request needs one before its command is sent.
-SWITCHES = {on: OnOff(on) for on in (False, True)}
+def _shown_switch(status: Status) -> str:
+    shown = {True: 'on', False: 'off', None: 'neither on nor off'}[status.enabled]
+    return _with_flags(shown, status)
 
 
-class Configure(NamedTuple):
+def _switch_evidence(on: bool, status: Status) -> str:
+    if on:
+        return _despite_heat(status)
+    if status.is_off_by_heat:
+        return f'accepted (ILLUMINATOR_STATUS shows {_shown_switch(status)})'
+    return CONFIRMED
+
+
+# Each switches all lights of a component; the command cannot select one of them. Made once, since
+# each request needs one before its command is sent.
+SWITCHES = {on: Change[Status](
+    mavlink.MAV_CMD_ILLUMINATOR_ON_OFF, (float(on),), 'on' if on else 'off', is_repeated=not on,
+    shown_by=partial(_shows_switch, on), actual=_shown_switch,
+    evidence=partial(_switch_evidence, on)) for on in (False, True)}
+
+
+@dataclass(frozen=True, kw_only=True)
+class Configure(Change[Status]):
     """
     Configures a light; the command carries all four fields.
 
@@ -90,52 +72,46 @@ class Configure(NamedTuple):
 
     configuration: Configuration
     names: list[str]
-    note: str = ''
-    position: None = None
-    command: int = mavlink.MAV_CMD_DO_ILLUMINATOR_CONFIGURE
-    is_idempotent: bool = True
-    is_repeated: bool = False
 
-    @property
-    def params(self) -> tuple[float, ...]:
-        """See :class:`~..payload.confirmed_command.Change`."""
-        return self.configuration.params()
+    @classmethod
+    def of(cls, configuration: Configuration, names: list[str], note: str = '') -> Configure:
+        """Return the change that sets some fields of a configuration."""
+        return cls(
+            mavlink.MAV_CMD_DO_ILLUMINATOR_CONFIGURE, configuration.params(),
+            configuration.describe(names), note=note, configuration=configuration, names=names,
+            shown_by=partial(_shows, configuration, names), actual=partial(_shown, configuration),
+            evidence=partial(_evidence, configuration, names))
 
-    @property
-    def goal(self) -> str:
-        """See :class:`~..payload.confirmed_command.Change`."""
-        return self.configuration.describe(self.names)
 
-    def _missing(self, status: Status) -> list[str]:
-        return unexpected_differences(
-            self.configuration, status.configuration(self.configuration), status.error_flags,
-            step=True)
+def _missing(configuration: Configuration, status: Status) -> list[str]:
+    return unexpected_differences(
+        configuration, status.configuration(configuration), status.error_flags, step=True)
 
-    def _hidden(self, status: Status) -> list[str]:
-        """Return those of the fields that must change whose value a status does not show."""
-        different = self.configuration.differences(status.configuration(self.configuration))
-        return [name for name in self.names
-                if name in different or getattr(status, name) is None]
 
-    def shown_by(self, status: Status) -> bool | None:
-        """See :class:`~..payload.confirmed_command.Change`."""
-        if self._missing(status):
-            return False
-        return None if self._hidden(status) else True
+def _hidden(configuration: Configuration, names: list[str], status: Status) -> list[str]:
+    """Return those of the fields that must change whose value a status does not show."""
+    different = configuration.differences(status.configuration(configuration))
+    return [name for name in names if name in different or getattr(status, name) is None]
 
-    def evidence(self, status: Status) -> str:
-        """See :class:`~..payload.confirmed_command.Change`."""
-        hidden = self._hidden(status)
-        if not hidden:
-            return CONFIRMED
-        if status.error_flags & DIMMING_FLAGS:
-            return _despite_heat(status)
-        reported = status.configuration(self.configuration)
-        shown = (f'no valid {name}' if getattr(status, name) is None
-                 else reported.describe([name]) for name in hidden)
-        return f'accepted (ILLUMINATOR_STATUS shows {", ".join(shown)})'
 
-    def actual(self, status: Status) -> str:
-        """See :class:`~..payload.confirmed_command.Change`."""
-        reported = status.configuration(self.configuration)
-        return _with_flags(reported.describe(self._missing(status)), status)
+def _shows(configuration: Configuration, names: list[str], status: Status) -> bool | None:
+    if _missing(configuration, status):
+        return False
+    return None if _hidden(configuration, names, status) else True
+
+
+def _shown(configuration: Configuration, status: Status) -> str:
+    reported = status.configuration(configuration)
+    return _with_flags(reported.describe(_missing(configuration, status)), status)
+
+
+def _evidence(configuration: Configuration, names: list[str], status: Status) -> str:
+    hidden = _hidden(configuration, names, status)
+    if not hidden:
+        return CONFIRMED
+    if status.error_flags & DIMMING_FLAGS:
+        return _despite_heat(status)
+    reported = status.configuration(configuration)
+    shown = (f'no valid {name}' if getattr(status, name) is None
+             else reported.describe([name]) for name in hidden)
+    return f'accepted (ILLUMINATOR_STATUS shows {", ".join(shown)})'

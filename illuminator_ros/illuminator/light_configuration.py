@@ -58,7 +58,7 @@ DEFAULT_DUTY_CYCLE = 50.0
 # The reasons of values that no request asks for.
 _REQUIRED, _SETPOINT = 'required values', 'a setpoint'
 # Of a request that is refused before a command is made.
-NOTHING_CHANGED = Configure(NOTHING, [])
+NOTHING_CHANGED = Configure.of(NOTHING, [])
 NO_FAILURE = ('', None, None)
 
 
@@ -281,7 +281,7 @@ class LightConfiguration:
         limited = self._limits.clipped(goal, self.strobe_range)
         ordered = [name for name in FIELDS
                    if name in names or name in goal.differences(limited)]
-        return Configure(limited, ordered, note)
+        return Configure.of(limited, ordered, note)
 
     # Requests
 

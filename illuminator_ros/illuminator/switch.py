@@ -21,11 +21,11 @@ from dataclasses import dataclass
 import math
 
 from . import events
-from .commands import OnOff, SWITCHES
+from .commands import SWITCHES
 from .model import Mode, Status
 from ..mavlink.command_sender import format_seconds
 from ..mavlink.retries import UNCONFIRMED
-from ..payload.confirmed_command import Desired, Done, Result, Target
+from ..payload.confirmed_command import Change, Desired, Done, Result, Target
 from ..payload.device_property import Caller, Outcome, Property
 
 ON, OFF = SWITCHES[True], SWITCHES[False]
@@ -167,7 +167,7 @@ class Switch:
 
     # Known facts
 
-    def is_pending(self, change: OnOff) -> bool:
+    def is_pending(self, change: Change[Status]) -> bool:
         """Return whether a change is under way."""
         desired = self.property.desired
         return desired is not None and desired.change == change

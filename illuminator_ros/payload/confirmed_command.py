@@ -29,9 +29,9 @@ it. Nothing is concluded from the clock of the device.
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 import math
-from typing import Generic, NamedTuple, Protocol, TypeVar
+from typing import Generic, NamedTuple, TypeVar
 
 from ..mavlink.command_sender import (
     Command,
@@ -69,7 +69,6 @@ CommandedValue = tuple[int, tuple[float, ...], CommandPosition | None]
 ENDS_REPEATING = frozenset((CommandStatus.CLOSED, CommandStatus.LINK_LOST))
 
 S = TypeVar('S')
-S_contra = TypeVar('S_contra', contravariant=True)
 
 
 class Target(NamedTuple):
@@ -99,53 +98,35 @@ class Target(NamedTuple):
                 else request_message(self.status_source or self.address, self.status_id))
 
 
-class Change(Protocol[S_contra]):
+@dataclass(frozen=True)
+class Change(Generic[S]):
     """
     A value of a property of a device, and the command that sets it.
 
     Two changes are equal if they set the same values.
+
+    :param command: the MAV_CMD that makes it, with ``params`` and ``position``.
+    :param goal: the state to be reached, for people.
+    :param note: a change that was not requested but comes with it, '' if there is none.
+    :param is_idempotent: whether the command may be sent twice; one that may not is sent once.
+    :param is_repeated: whether it is sent again if the device has accepted it and does not show
+        it. That undoes what another sender has changed meanwhile, so it is for a safe state only.
+    :param shown_by: returns whether a status shows the change; None if it cannot show it.
+    :param actual: describes the state that a status shows instead, for people.
+    :param evidence: describes how far a status that does not contradict shows the change, for
+        people; None for "confirmed".
     """
 
-    @property
-    def command(self) -> int:
-        """Return the MAV_CMD that makes it."""
-
-    @property
-    def params(self) -> tuple[float, ...]:
-        """Return the params of the command."""
-
-    @property
-    def position(self) -> CommandPosition | None:
-        """Return the position of the command, which makes it a COMMAND_INT; None for none."""
-
-    @property
-    def is_idempotent(self) -> bool:
-        """Return whether the command may be sent twice; one that may not is sent once."""
-
-    @property
-    def is_repeated(self) -> bool:
-        """
-        Return whether it is sent again if the device has accepted it and does not show it.
-
-        That undoes what another sender has changed meanwhile, so it is for a safe state only.
-        """
-
-    @property
-    def goal(self) -> str:
-        """Describe the state to be reached, for people."""
-
-    @property
-    def note(self) -> str:
-        """Describe a change that was not requested but comes with it, '' if there is none."""
-
-    def shown_by(self, status: S_contra) -> bool | None:
-        """Return whether a status shows the change; None if it cannot show it."""
-
-    def evidence(self, status: S_contra) -> str:
-        """Describe how far a status that does not contradict shows the change, for people."""
-
-    def actual(self, status: S_contra) -> str:
-        """Describe the state that a status shows instead, for people."""
+    command: int
+    params: tuple[float, ...]
+    goal: str
+    position: CommandPosition | None = None
+    note: str = ''
+    is_idempotent: bool = True
+    is_repeated: bool = False
+    shown_by: Callable[[S], bool | None] = field(default=lambda status: None, compare=False)
+    actual: Callable[[S], str] = field(default=lambda status: '', compare=False)
+    evidence: Callable[[S], str] | None = field(default=None, compare=False)
 
 
 class Result(NamedTuple):
@@ -349,7 +330,9 @@ class ConfirmedCommand(Generic[S]):
             return None
         if shown or shown is None and self._is_accepted:
             answer = self._protocol()
-            return self._result(f'{change.goal}, {change.evidence(status)}' + (
+            evidence = (change.evidence(status) if change.evidence else
+                        f'confirmed by {self._target.status_name}')
+            return self._result(f'{change.goal}, {evidence}' + (
                 ', without an acknowledgement' if answer.result is None
                 else f': {result_name(answer.result)}'), now, success=True)
         if shown is False:

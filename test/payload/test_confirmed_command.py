@@ -20,7 +20,13 @@ import math
 from typing import Any
 
 from illuminator_ros.mavlink.command_sender import CommandStatus, timing
-from illuminator_ros.payload.confirmed_command import ConfirmedCommand, Desired, FENCE, Result
+from illuminator_ros.payload.confirmed_command import (
+    Change,
+    ConfirmedCommand,
+    Desired,
+    FENCE,
+    Result,
+)
 import pytest
 from support.level_device import (
     ACCEPTED,
@@ -28,17 +34,17 @@ from support.level_device import (
     DENIED,
     FAILED,
     IN_PROGRESS,
-    Level,
+    level_change,
     REJECTED,
 )
 
-LEVEL_5 = Level(5)
+LEVEL_5 = level_change(5)
 
 
 class CommandBench(Bench):
     """One command for level 5 at the time 0."""
 
-    def begin(self, change: Level = LEVEL_5, *, gap: float | None = 0.5,
+    def begin(self, change: Change[int | None] = LEVEL_5, *, gap: float | None = 0.5,
               target: dict[str, Any] | None = None, **arguments: Any) -> CommandBench:
         """Send the command; return this bench."""
         self.result: Result | None = None
@@ -88,8 +94,8 @@ IN_PROGRESS_STOPPED = ('no final acknowledgement, last answer MAV_RESULT_IN_PROG
 HIDES: dict[str, Any] = {'level': None, 'executes': []}
 OBEYS: dict[str, Any] = {'results': [None], 'executes': [None]}
 MUTE: dict[str, Any] = {'sends_status': False}
-SINGLE, REPEATED = ({'change': Level(5, is_idempotent=False)},
-                    {'change': Level(5, is_repeated=True)})
+SINGLE, REPEATED = ({'change': level_change(5, is_idempotent=False)},
+                    {'change': level_change(5, is_repeated=True)})
 
 
 # The device and the command -> success, message, when it was sent and ended, flags of the result.
@@ -190,7 +196,8 @@ def test_a_status_before_an_acknowledgement_the_last_try_or_the_fence_does_not_c
 
 def test_each_try_carries_a_request_for_the_status_which_is_repeated_until_it_shows_the_change(
 ) -> None:
-    bench = CommandBench(0, None, ACCEPTED, executes=[]).begin(Level(5, note='the fan runs too'))
+    bench = CommandBench(0, None, ACCEPTED, executes=[]).begin(
+        level_change(5, note='the fan runs too'))
     bench.later(1.0, lambda: setattr(bench, 'level', 5))
     bench.run()
     assert bench.requests == [0.0, 0.25, 0.32, 0.42, 0.62, 0.87, 1.12]
@@ -236,12 +243,12 @@ def test_a_lost_link_and_the_end_of_the_process_end_every_command(
 # Restarts
 
 @pytest.mark.parametrize(('device', 'change', 'text', 'tries', 'ended_at'), [
-    ({}, Level(5), SHOWN, 8, 1.62),
-    ({'results': [ACCEPTED, None], 'executes': []}, Level(5), f'{NO_ANSWER}, and {LEVEL_0}', 11,
-     4.35),
+    ({}, level_change(5), SHOWN, 8, 1.62),
+    ({'results': [ACCEPTED, None], 'executes': []}, level_change(5),
+     f'{NO_ANSWER}, and {LEVEL_0}', 11, 4.35),
     ({'executes': []}, SINGLE['change'], INSTEAD, 1, 1.02)])
 def test_a_restart_confirms_nothing_and_a_command_that_may_be_repeated_is_sent_again(
-    device: dict[str, Any], change: Level, text: str, tries: int, ended_at: float,
+    device: dict[str, Any], change: Change[int | None], text: str, tries: int, ended_at: float,
 ) -> None:
     bench = CommandBench(**device, sends_status=False).begin(change, is_sole_cause=True)
     bench.run(0.1)

@@ -37,7 +37,7 @@ from illuminator_ros.payload.device_property import (
     Property,
 )
 import pytest
-from support.level_device import ACCEPTED, Bench, DENIED, Level
+from support.level_device import ACCEPTED, Bench, DENIED, level_change
 
 ROUND_TRIP = 0.02
 
@@ -53,7 +53,7 @@ class PropertyBench(Bench):
              **desired: Any) -> list[Result]:
         """Want a level, and return the list that gets its results."""
         results: list[Result] = []
-        self.property.want(Desired(Level(level), **desired), self.now, Caller(
+        self.property.want(Desired(level_change(level), **desired), self.now, Caller(
             lambda result, now: results.append(result),
             self.now if asked_at is None else asked_at, is_stream=is_stream))
         self.flush()
@@ -151,7 +151,7 @@ def test_callers_are_bounded_and_of_a_stream_the_newest_waits() -> None:
 def test_callers_who_ask_at_one_time_share_a_command_and_are_answered_in_that_order() -> None:
     bench, order = PropertyBench(executes=[]).report(), list[int]()
     for number in range(3):
-        bench.property.want(Desired(Level(3), limit=0.9), bench.now, Caller(
+        bench.property.want(Desired(level_change(3), limit=0.9), bench.now, Caller(
             functools.partial(lambda number, result, now: order.append(number), number),
             bench.now))
     bench.run(1.0)
@@ -284,14 +284,14 @@ def test_a_change_that_ended_unconfirmed_may_take_effect_until_a_status_shows_it
     bench = PropertyBench(0, None).report()
     bench.want(3)
     bench.property.cancel('', bench.now)
-    assert bench.property.unconfirmed(bench.now) == Level(3)
+    assert bench.property.unconfirmed(bench.now) == level_change(3)
     bench.run(after)
     if event.startswith('another'):
         bench.results = [ACCEPTED if event.endswith('confirmed') else DENIED]
         bench.ended(4)
     elif event:
         bench.report(3 if event == 'shown' else 0)
-    assert bench.property.unconfirmed(bench.now) == (Level(3) if remains else None)
+    assert bench.property.unconfirmed(bench.now) == (level_change(3) if remains else None)
 
 
 @pytest.mark.parametrize(('reports', 'text'), [

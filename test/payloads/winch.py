@@ -33,13 +33,12 @@ from illuminator_ros.mavlink.command_sender import CommandSender
 from illuminator_ros.mavlink.component import Payload
 from illuminator_ros.mavlink.dialect import mavlink
 from illuminator_ros.mavlink.messages import Address, AnyCommand, Heartbeat, Message
-from illuminator_ros.payload.confirmed_command import Desired, Done, Result, Target
+from illuminator_ros.payload.confirmed_command import Change, Desired, Done, Result, Target
 from illuminator_ros.payload.device_property import answer, Caller, Property
 from illuminator_ros.payload.discovery import Discovery
 from illuminator_ros.payload.listeners import Listeners
 from illuminator_ros.payload.liveness import Liveness
 from illuminator_ros.payload.payload_type import PayloadType
-from illuminator_ros.payload.plain_change import PlainChange
 from illuminator_ros.simulation import simulated
 from illuminator_ros.simulation.faults import Behaviour
 
@@ -58,12 +57,12 @@ class WinchReport:
     line_length: float
 
 
-def release(length: float, line_length: float) -> PlainChange[WinchStatus]:
+def release(length: float, line_length: float) -> Change[WinchStatus]:
     """Return the change by a length of line, m, to the released line afterwards, m."""
     # A winch that gets the command twice releases twice the length.
-    return PlainChange(
+    return Change(
         mavlink.MAV_CMD_DO_WINCH, (1, mavlink.WINCH_RELATIVE_LENGTH_CONTROL, length),
-        f'{line_length:g} m released', status_name=WinchStatus.msgname, is_idempotent=False,
+        f'{line_length:g} m released', is_idempotent=False,
         shown_by=lambda status: abs(status.line_length - line_length) < 0.01,
         actual=lambda status: f'{status.line_length:g} m')
 

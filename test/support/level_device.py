@@ -18,7 +18,6 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Collection
-from dataclasses import dataclass
 import functools
 import heapq
 import itertools
@@ -28,7 +27,7 @@ from typing import Any
 from illuminator_ros.mavlink.command_sender import CommandSender
 from illuminator_ros.mavlink.dialect import mavlink
 from illuminator_ros.mavlink.messages import Address, CommandAck
-from illuminator_ros.payload.confirmed_command import Target
+from illuminator_ros.payload.confirmed_command import Change, Target
 
 US, DEVICE = Address(1, 194), Address(1, 7)
 SET_LEVEL, STATUS_ID = 31000, 40000
@@ -39,33 +38,14 @@ ACCEPTED, REJECTED, DENIED, FAILED, IN_PROGRESS = (
 LATENCY = 0.01
 
 
-@dataclass(frozen=True)
-class Level:
-    """A level of the device; a status of None cannot show it."""
-
-    level: int
-    is_idempotent: bool = True
-    is_repeated: bool = False
-    note: str = ''
-    position: None = None
-    command: int = SET_LEVEL
-
-    @property
-    def params(self) -> tuple[float, ...]:
-        return (float(self.level),)
-
-    @property
-    def goal(self) -> str:
-        return f'level {self.level}'
-
-    def shown_by(self, status: int | None) -> bool | None:
-        return None if status is None else status == self.level
-
-    def evidence(self, status: int | None) -> str:
-        return 'accepted' if status is None else 'confirmed by STATUS'
-
-    def actual(self, status: int | None) -> str:
-        return f'level {status}'
+def level_change(level: int, **options: Any) -> Change[int | None]:
+    """Return the change to a level of the device; a status of None cannot show it."""
+    return Change(
+        SET_LEVEL, (float(level),), f'level {level}',
+        shown_by=lambda status: None if status is None else status == level,
+        actual=lambda status: f'level {status}',
+        evidence=lambda status: 'accepted' if status is None else 'confirmed by STATUS',
+        **options)
 
 
 class Bench(ABC):
