@@ -41,7 +41,7 @@ class Light:
     No I/O; times are s.
 
     :param emit: takes the events.
-    :ivar control: what is requested of it.
+    :ivar control: takes the requests to it.
     """
 
     def __init__(

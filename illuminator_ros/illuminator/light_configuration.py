@@ -116,7 +116,7 @@ class LightConfiguration:
     :ivar exceeded: how the light exceeds the limits.
     :ivar brightness_is_switch: whether a brightness above 0 switches the light on, as in ArduSub:
         it reports 0 while it is off; None if unknown.
-    :ivar property: that of the light; :meth:`take` takes its outcomes.
+    :ivar property: the property of the light; :meth:`take` takes its outcomes.
     """
 
     def __init__(

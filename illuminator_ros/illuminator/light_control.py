@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""What is requested of one light: its sources, its switch and its configuration."""
+"""The requests to one light: its sources, its switch and its configuration."""
 
 from __future__ import annotations
 

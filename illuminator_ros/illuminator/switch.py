@@ -63,7 +63,7 @@ class Switch:
     :ivar enabled: as reported, None if unknown; while heat keeps the light off, as before, since
         it may light up once it has cooled down.
     :ivar silence: of all who may request something.
-    :ivar property: that of the light; :meth:`take` takes its outcomes.
+    :ivar property: the property of the light; :meth:`take` takes its outcomes.
     """
 
     def __init__(

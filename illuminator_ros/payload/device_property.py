@@ -113,7 +113,7 @@ class Property(Generic[S]):
         self.newest_at = self.fence = -math.inf
         self._target = target
         self._gap: float | None = None
-        # When the last command began, and when one that has ended was sent last, s.
+        # When the last command began, and when a command that has ended was sent last, s.
         self._began_at = self._sent_at = -math.inf
         self._callers: list[Caller] = []
         self._next_callers: list[Caller] = []
