@@ -230,7 +230,7 @@ class Gimbal:
         for kind, outcome in self._requests.take_outcomes():
             result = outcome.result
             if kind is not None:
-                self._setpoints.request_ended(kind, result)
+                self._setpoints.request_ended(kind, result, now)
             else:
                 is_release = outcome.desired.change.params[0] == gimbal.REMOVE_SENDER
                 if result.success or result.refused and not is_release:
