@@ -30,7 +30,7 @@ from .setpoint_stream import SetpointStream, SuspendedBy
 from ..mavlink.command_sender import CommandSender
 from ..mavlink.dialect import mavlink
 from ..mavlink.messages import Address
-from ..payload.arbitration import HolderChanged
+from ..payload.arbitration import Cause, HolderChanged
 from ..payload.command_sources import Sources, SourceSettings
 from ..payload.confirmed_command import Done, Result
 from ..payload.device_events import DeviceHeld
@@ -230,7 +230,7 @@ class Gimbal:
         for kind, outcome in self._requests.take_outcomes():
             result = outcome.result
             if kind is not None:
-                self._setpoints.request_ended(kind, result)
+                self._setpoints.request_ended(kind, result, now)
             else:
                 is_release = outcome.desired.change.params[0] == gimbal.REMOVE_SENDER
                 if result.success or result.refused and not is_release:
@@ -257,7 +257,7 @@ class Gimbal:
         self._setpoints.change_timeout(settings.setpoint_timeout, now)
         if settings.sources:
             self.sources.set_lease(settings.sources.timeout)
-            self._end_silence(now)
+            self._take_holder(self.sources.poll(now), now)
 
     # Sources
 
@@ -267,19 +267,19 @@ class Gimbal:
 
         A stream claims the gimbal at once, a call when :meth:`end_call` notes that it succeeded.
         """
-        self._end_silence(now)
+        self._take_holder(self.sources.poll(now), now)
         refusal = self.sources.refusal(source)
         if self.sources.takes_over(source):
             self._end_commands(f'held by {source}', now)
         if not is_call:
-            self._note_holder(self.sources.claim(source, now))
+            self._take_holder(self.sources.claim(source, now), now)
         elif not refusal:
             self.sources.begin_call(source)
         return refusal
 
     def end_call(self, source: str, now: float, *, success: bool) -> None:
         """End a call, which claims the gimbal if it has succeeded."""
-        self._note_holder(self.sources.end_call(source, now, success=success))
+        self._take_holder(self.sources.end_call(source, now, success=success), now)
 
     def release(self, source: str, now: float) -> str:
         """
@@ -287,24 +287,21 @@ class Gimbal:
 
         :return: the source that holds it now, '' if none does.
         """
-        self._end_silence(now)
+        self._take_holder(self.sources.poll(now), now)
         if source == self.sources.commander:
             self._end_commands(f'{source} has released the gimbal', now)
-        self._note_holder(self.sources.release(source, now))
+        self._take_holder(self.sources.release(source, now), now)
         return self.sources.holder or ''
 
-    def _end_silence(self, now: float) -> None:
-        """End the hold of a source that has been silent for the time-out."""
-        commander, change = self.sources.commander, self.sources.poll(now)
+    def _take_holder(self, change: HolderChanged[str] | None, now: float) -> None:
+        """Take a change of the source that holds the gimbal."""
+        if change is None:
+            return
+        silent = change.before if change.cause is Cause.SILENCE else None
         # The call of a higher source may be under way.
-        if change is not None and change.before == commander:
-            self._end_commands(f'the hold of {commander} has ended (source_timeout)', now)
-        self._note_holder(change)
-
-    def _note_holder(self, change: HolderChanged[str] | None) -> None:
-        """Report a change of the source that holds the gimbal."""
-        if change is not None:
-            self._emit(DeviceHeld(self.key, change))
+        if silent and not self.sources.refusal(silent):
+            self._end_commands(f'the hold of {silent} has ended (source_timeout)', now)
+        self._emit(DeviceHeld(self.key, change))
 
     def _end_commands(self, message: str, now: float, *, superseded: bool = False) -> None:
         """End the setpoint, and the requests that may turn the gimbal or stop it later."""
@@ -421,7 +418,7 @@ class Gimbal:
                 self._emit(events.AutomaticTakeFailed(self.key, result.message))
 
         self.update(now)
-        self._end_silence(now)
+        self._take_holder(self.sources.poll(now), now)
         self._requests.poll(now)
         self._yaw_lock.poll(now)
         self._settle(now)

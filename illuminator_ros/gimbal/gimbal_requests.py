@@ -194,7 +194,6 @@ class YawLock:
     def __init__(self, send: Callable[[YawFrame, float], None]) -> None:
         self._send = send
         self._wanted: Flag | None = None
-        self._since = math.inf
         self._flags: int | None = None
         self._resend: list[float] = []
         self._callers: list[Caller] = []
@@ -207,7 +206,7 @@ class YawLock:
         """
         if flag is not self._wanted:
             self.cancel(f'superseded by {flag.goal}', now, superseded=True)
-            self._wanted, self._since, self._flags = flag, now, None
+            self._wanted, self._flags = flag, None
         elif len(self._callers) >= MAX_CALLERS:
             done(Result(False, f'{MAX_CALLERS} requests are waiting already'), now)
             return
@@ -221,17 +220,18 @@ class YawLock:
 
     def cancel(self, message: str, now: float, *, superseded: bool = False) -> None:
         """End the request."""
-        self._finish(Result(False, message, superseded=superseded), now)
+        self._answer(self._callers, Result(False, message, superseded=superseded), now)
 
     def reported(self, status: GimbalDeviceAttitudeStatus, now: float) -> None:
         """Take a status of the device."""
         wanted = self._wanted
-        if wanted is None or now < self._since + STATUS_DELAY:
+        waiting = [one for one in self._callers if now >= one.asked_at + STATUS_DELAY]
+        if wanted is None or not waiting:
             return
         self._flags = status.flags
         if bool(status.flags & wanted.flag) is wanted.is_set:
-            took = format_seconds(now - self._since)
-            self._finish(Result(
+            took = format_seconds(now - waiting[0].asked_at)
+            self._answer(waiting, Result(
                 True, f'{wanted.goal}, confirmed by {status.msgname} ({took})'), now)
 
     def poll(self, now: float) -> None:
@@ -245,9 +245,7 @@ class YawLock:
                 ', '.join(flag_names('GIMBAL_DEVICE_FLAGS', self._flags)) or 'no flags'))
             advice = '; the device may need the heading of the vehicle' if wanted.is_set else ''
             text = f'{wanted.goal} not confirmed: {shown} within {LOCK_LIMIT:g} s{advice}'
-            self._callers = self._callers[len(late):]
-            self._wanted = wanted if self._callers else None
-            answer(late, Result(False, text), now)
+            self._answer(late, Result(False, text), now)
         elif self._resend and now >= self._resend[0]:
             del self._resend[0]
             self._send(YawFrame.EARTH if wanted.is_set else YawFrame.VEHICLE, now)
@@ -257,6 +255,9 @@ class YawLock:
         return math.inf if self._wanted is None else min(
             [self._callers[0].asked_at + LOCK_LIMIT, *self._resend])
 
-    def _finish(self, result: Result, now: float) -> None:
-        callers, self._callers, self._wanted = self._callers, [], None
+    def _answer(self, callers: list[Caller], result: Result, now: float) -> None:
+        """Answer the first callers; the request ends with the last one."""
+        self._callers = self._callers[len(callers):]
+        if not self._callers:
+            self._wanted = None
         answer(callers, result, now)

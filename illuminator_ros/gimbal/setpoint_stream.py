@@ -65,7 +65,8 @@ class _Setpoint:
 
     :param message: None for a place, and for a zero that was not sent.
     :param due: when it is sent again, s; of a rate or a place, when it ends with a zero.
-    :param ends_rate: whether it is an attitude that ends a rate, unless it is lost.
+    :param ends_rate: whether it ends a rate, unless it is lost: an attitude, or a place until the
+        manager has accepted it.
     :param is_over: whether the gimbal follows a later request.
     :param stands: whether the last attitude after a zero shows that the gimbal stands.
     """
@@ -182,6 +183,8 @@ class SetpointStream:
         elif before is not None and before.kind is Kind.ATTITUDE:
             before.due.clear()
         if is_place:
+            place.ends_rate = before is not None and (before.may_have_rate or (
+                before.kind is Kind.PLACE and before.ends_rate))
             self._last = place
         elif kind is SuspendedBy.POSE:
             # The flags of a pose clear the lock.
@@ -191,19 +194,31 @@ class SetpointStream:
             before = None
         self._suspended[kind] = before, place
 
-    def request_ended(self, kind: SuspendedBy, result: Result) -> None:
-        """Take the result of the last request: the setpoint counts again if it was refused."""
+    def request_ended(self, kind: SuspendedBy, result: Result, now: float) -> None:
+        """
+        Take the result of the last request: the setpoint counts again if it was refused.
+
+        A zero follows a place without an answer that came after a rate, since the zero before it
+        may be lost, too.
+        """
         before, place = self._suspended.get(kind, (None, None))
         if result.refused and kind is SuspendedBy.POSE:
             self._attitude_at = -math.inf
         if result.success and before is not None:
             before.is_over = True
+        last = self._last
         # Without an answer the gimbal may follow the place.
-        if result.refused and self._last is not None and self._last is place:
-            self._last = before
-            # Another request may have suspended the place.
-            self._suspended = {one: (before if suspended is place else suspended, its_place)
-                               for one, (suspended, its_place) in self._suspended.items()}
+        if last is not None and last is place and not result.superseded:
+            if result.success:
+                last.ends_rate = False
+            elif result.refused:
+                last = self._last = before
+                # Another request may have suspended the place.
+                self._suspended = {
+                    one: (before if suspended is place else suspended, its_place)
+                    for one, (suspended, its_place) in self._suspended.items()}
+            if last is not None and last.kind is Kind.PLACE and last.ends_rate:
+                last.due = [now]
         if self._last is not None and self._last.is_over:
             self._last = None
 
@@ -243,7 +258,8 @@ class SetpointStream:
         """
         if not is_lost and self._last is not None:
             return
-        owes = not is_lost or self._last is not None and self._last.may_have_rate
+        owes = not is_lost or self._last is not None and (
+            self._last.may_have_rate or self._last.ends_rate)
         self._last = _Setpoint(Kind.ZERO, due=[-math.inf] * len(REPEATS)) if owes else None
 
     def control_unknown(self, now: float, *, can_send: bool, is_heard: bool) -> None:

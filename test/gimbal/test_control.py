@@ -482,6 +482,21 @@ def test_each_of_equal_requests_for_the_yaw_lock_has_its_own_time() -> None:
     assert [one.success for one in rig.results] == [False, True]
 
 
+def test_a_status_from_before_an_equal_request_for_the_yaw_lock_does_not_confirm_it() -> None:
+    rig = in_control()
+    manager = rig.managers[0]
+    manager.applies, manager.streams, manager.device_reports = False, False, False
+    for _ in range(2):
+        set_yaw_lock(rig.gimbal, True, rig.now, rig.done)
+        rig.run(0.3)
+    set_yaw_lock(rig.gimbal, True, rig.now, rig.done)
+
+    manager.flags |= mavlink.GIMBAL_DEVICE_FLAGS_YAW_LOCK
+    rig.receive(DEVICE, manager.attitude())
+
+    assert [one.success for one in rig.results] == [True, True]
+
+
 def test_a_caller_that_raises_leaves_the_answer_to_the_others_of_the_yaw_lock() -> None:
     def fail(result: Result, now: float) -> None:
         raise RuntimeError

@@ -250,6 +250,35 @@ def test_an_attitude_that_ends_a_rate_is_sent_again_after_a_gap_in_which_all_wer
     assert [all(map(math.isfinite, one.q)) for one in manager.received] == [False, True]
 
 
+@pytest.mark.parametrize('places', [1, 2])
+def test_a_rate_gets_another_zero_after_a_place_that_is_not_answered(places: int) -> None:
+    rig = in_control()
+    manager = rig.managers[0]
+    turn(rig)
+    rig.run(0.1)
+    rig.managers.clear()
+    for _ in range(places):
+        rig.gimbal.set_roi(PLACE, rig.now, rig.done)
+        rig.run(0.1)
+    rig.component.link_closed(rig.now, 'cut')
+    rig.managers.append(manager)
+    rig.component.link_opened(rig.now)
+    rig.run(3.0)
+
+    assert rig.gimbal.reports.in_control
+    assert rates_of(manager.received[-1]) == STILL
+
+
+def test_a_place_without_an_answer_that_came_after_no_rate_is_not_ended() -> None:
+    rig = in_control()
+    rig.managers[0].answers = False
+    rig.gimbal.set_roi(PLACE, rig.now, rig.done)
+    rig.run(6.0)
+
+    assert [one.success for one in rig.results] == [False]
+    assert setpoints(rig) == []
+
+
 @pytest.mark.parametrize('follow', [
     lambda rig: set_neutral(rig.gimbal, rig.now, rig.done),
     lambda rig: rig.gimbal.set_roi(None, rig.now, rig.done),
