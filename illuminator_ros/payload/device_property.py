@@ -39,6 +39,7 @@ from .confirmed_command import (
     Result,
     Target,
 )
+from ..mavlink.retries import COMMAND
 
 S = TypeVar('S')
 # Callers that may wait for one value.
@@ -237,10 +238,12 @@ class Property(Generic[S]):
             self.fence_until(command.last_sent + FENCE)
         if now < self.fence and len(self._under_way) < MAX_VALUES:
             self._under_way[desired.value] = self.fence
-        if waiting and goes_on:
-            self._start(desired, waiting, now)
-        else:
-            callers += waiting
+        # The others have no time to wait for an acknowledgement of another command.
+        in_time = [one for one in waiting
+                   if goes_on and now + COMMAND.first <= one.asked_at + desired.limit]
+        callers += [one for one in waiting if one not in in_time]
+        if in_time:
+            self._start(desired, in_time, now)
         self.outcomes.append(Outcome(desired, result, status, tuple(callers)))
 
     # Known facts

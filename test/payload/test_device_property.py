@@ -162,6 +162,17 @@ def test_callers_who_ask_at_one_time_share_a_command_and_are_answered_in_that_or
     assert bench.tries == [0.0]
 
 
+def test_a_caller_whose_time_is_over_gets_the_outcome_of_the_command_before() -> None:
+    bench = PropertyBench(executes=[]).report()
+    first = bench.want(3, limit=0.9)
+    bench.run(0.015)
+    second = bench.want(3, limit=0.9)
+    bench.run(1.0)
+    bench.outcomes()
+    assert len(first) == len(second) == 1
+    assert 'not confirmed: MAV_RESULT_ACCEPTED' in first[0].message == second[0].message
+
+
 def test_the_time_of_the_last_try_is_kept_when_the_command_ends() -> None:
     bench = PropertyBench(0, *[None] * 9).report()
     bench.want(3)
