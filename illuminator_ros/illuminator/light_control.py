@@ -86,6 +86,8 @@ class LightControl:
         self.sources = LightSources(settings.sources)
         self.was_commanded = False
         self.version = 0
+        # The holder, if the calls under way have refused an OFF of it, else ''.
+        self._refused_off = ''
         self._address = target.address
         self._commands = target.commands
         self._liveness = liveness
@@ -204,6 +206,9 @@ class LightControl:
         elif is_off and not held:
             # An OFF ends the ON that is remembered, though it may fail.
             sources.forget_switch(source)
+        if is_off and held and source == sources.holder:
+            # A call under way refuses it, and may fail.
+            self._refused_off = source
         sent = is_off and not held and self._send_unheard_off()
         if sent:
             self.switch.property.note_sent(OFF, now)
@@ -347,11 +352,11 @@ class LightControl:
                 self._forget_silenced(now)
                 self.switch.silence.requested_at = now
                 self.sources.remember(caller.source, _wish(outcome))
-            elif (holder := self.sources.holder) and self.sources.desired.enabled is False:
-                # It may have been refused while this call was under way.
-                self._send_remembered(holder, now)
         if not self.sources.are_calling:
             self.switch.silence.called_at = -math.inf
+            refused, self._refused_off = self._refused_off, ''
+            if refused and refused == self.sources.holder:
+                self._send_remembered(refused, now)
         answer(outcome.callers, result, now)
 
     # The end of the process

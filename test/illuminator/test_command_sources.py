@@ -375,6 +375,19 @@ def test_an_off_that_a_call_under_way_refuses_is_sent_when_the_call_has_failed()
     assert (shared.light.fields['enable'], shared.holder) == (0, 'autonomy')
 
 
+def test_a_call_that_fails_repeats_no_off_that_another_sender_has_undone() -> None:
+    shared = Shared(timeout=60.0)
+    shared.pair.settle()
+    assert shared.pair.wait_for(shared.enable('autonomy', False)).success
+    shared.light.fields['enable'] = 1
+    shared.pair.run(1.0)
+    shared.light.results[CONFIGURE] = mavlink.MAV_RESULT_DENIED
+    assert not shared.pair.wait_for(shared.pair.ask_configure(brightness=30.0)).success
+    shared.pair.run(1.0)
+
+    assert (shared.light.fields['enable'], shared.holder) == (1, 'autonomy')
+
+
 def test_an_off_of_the_next_source_is_sent_when_the_light_is_heard_again() -> None:
     shared = Shared(timeout=4.0)
     shared.pair.settle()
