@@ -284,7 +284,10 @@ class LightControl:
             is_known_off = (self._liveness.connected and self.switch.enabled is False
                             and not self.may_be_on(now))
             if self._settings.off_on_release and not is_known_off:
-                self.switch.require_off(f'on_release: {change.before} no longer holds it', now)
+                reason = f'on_release: {change.before} no longer holds it'
+                self.switch.require_off(reason)
+                if self.switch.is_pending(ON) and not self.sources.are_calling:
+                    self.switch.cancel(reason, now, superseded=True)
         elif change.cause is not Cause.CLAIM:
             self._end_requests(f'held by {change.after}', now)
             self._send_remembered(change.after, now)
@@ -301,7 +304,7 @@ class LightControl:
         if self._commands.refusal or not self._liveness.connected:
             if desired.enabled is False:
                 # It is sent when the light is heard again.
-                self.switch.require_off(reason, now)
+                self.switch.require_off(reason)
             return
         caller = Caller(
             _reported_failure(self._emit, self._address, source), now, source, True, reason)

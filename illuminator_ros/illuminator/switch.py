@@ -145,11 +145,9 @@ class Switch:
         """Switch the light on or off; the light must be connected."""
         self._want(Desired(SWITCHES[on]), now, caller)
 
-    def require_off(self, reason: str, now: float) -> None:
-        """Switch the light off until it shows that, or a later request switches it on."""
+    def require_off(self, reason: str) -> None:
+        """Switch the light off until it shows that, or a request switches it on."""
         self._required = Desired(OFF, reason, insists=True)
-        if self.is_pending(ON):
-            self.cancel(reason, now, superseded=True)
 
     def cancel(self, message: str, now: float, *, superseded: bool = False) -> None:
         """End the command under way; an automatic OFF is sent again by the next update."""

@@ -328,10 +328,11 @@ def test_a_light_that_may_go_on_after_its_release_goes_off_where_release_is_off(
     assert 0.0 in shared.sent(ON_OFF, released_at)
 
 
-@pytest.mark.parametrize('is_stream', [True, False])
-@pytest.mark.parametrize('end', [
-    lambda shared: shared.release('operator'), lambda shared: shared.pair.run(TIMEOUT)],
-    ids=['release', 'source_timeout'])
+@pytest.mark.parametrize(('end', 'is_stream'), [
+    (lambda shared: shared.release('operator'), True),
+    (lambda shared: shared.release('operator'), False),
+    (lambda shared: shared.pair.run(TIMEOUT), True),
+], ids=['release', 'release during a call', 'source_timeout'])
 def test_an_on_under_way_ends_with_the_hold_of_its_source_where_release_is_off(
     end: Callable[[Shared], None], is_stream: bool,
 ) -> None:
@@ -346,6 +347,21 @@ def test_an_on_under_way_ends_with_the_hold_of_its_source_where_release_is_off(
 
     assert not answer.result.success
     assert (shared.light.fields['enable'], shared.holder) == (0, '')
+
+
+def test_an_on_of_a_call_goes_on_when_the_hold_of_a_lower_source_ends() -> None:
+    shared = Shared(off_on_release=True)
+    shared.pair.settle()
+    shared.enable('autonomy', False)
+    shared.pair.run(TIMEOUT - 0.1)
+    shared.light.results[ON_OFF] = None
+    answer = shared.call('operator', True)
+    shared.pair.run(0.5)
+    assert shared.holder == ''
+    shared.light.results.clear()
+
+    assert shared.pair.wait_for(answer).success
+    assert (shared.light.fields['enable'], shared.holder) == (1, 'operator')
 
 
 def test_a_call_whose_source_releases_the_light_meanwhile_claims_it_no_more() -> None:
