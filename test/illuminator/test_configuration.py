@@ -151,6 +151,23 @@ def test_a_light_that_reports_the_period_of_its_sync_signal_gets_one_within_its_
     assert sent(pair)[-1][:3] == pytest.approx((2, 40, sent_period))
 
 
+def test_a_setpoint_is_sent_though_the_parameters_do_not_follow_a_changing_light(
+    fake: FakeLight, faked: Pair,
+) -> None:
+    for number in range(6):
+        fake.fields['brightness'] = 80.0 if number % 2 else 20.0
+        faked.run(1.0)
+    agreed = confirmed(faked).brightness
+    fake.fields['brightness'] = 100.0 - agreed
+    faked.run(1.0)
+    assert faked.snapshot.states_are_changing
+    assert confirmed(faked).brightness == agreed
+    faked.light.control.set_brightness(agreed, faked.now)
+    faked.run(1.0)
+
+    assert fake.fields['brightness'] == agreed
+
+
 def test_before_the_first_status_only_a_complete_set_is_sent() -> None:
     pair = Pair(mute()).settle()
     assert pair.snapshot.configuration is None
