@@ -58,6 +58,8 @@ NOT_OPEN = 'link not open: '
 PEER_ERRORS = (errno.ECONNREFUSED, errno.ECONNRESET, errno.ETIMEDOUT, errno.EHOSTUNREACH,
                errno.ENETUNREACH, errno.EPIPE)
 FIND_TIMEOUT = 10.0
+# s; the longest time until a signal is handled.
+SIGNAL_DELAY = 0.2
 # Signals of a fault of the process: a handler would return to the fault.
 FAULTS = {signal.SIGSEGV, signal.SIGBUS, signal.SIGFPE, signal.SIGILL}
 
@@ -251,7 +253,14 @@ class Conformance:
                 self._texts.put(None)
 
         self._link.call(lambda now: self._session.runner.run(until_end()))
-        while (text := self._texts.get()) is not None:
+        while True:
+            try:
+                # A signal that comes just before the wait does not end it.
+                text = self._texts.get(timeout=SIGNAL_DELAY)
+            except queue.Empty:
+                continue
+            if text is None:
+                return
             self._write_line(text)
 
     def _link_state(self) -> LinkSnapshot:
