@@ -392,12 +392,8 @@ class LightConfiguration:
             self.brightness_is_switch = status.brightness == 0.0
         was_busy, late = self.property.command is not None, self.property.unconfirmed(now)
         self.property.reported(status, now)
-        if self.agreed or status.complete:
-            reported = status.configuration(self.agreed or NOTHING)
-            if not was_busy:
-                self._compare(status, reported, now, late=late, can_follow=can_follow,
-                              switched_at=switched_at)
-            self._keep_limits(reported, now)
+        self._compare(status, now, was_busy=was_busy, late=late, can_follow=can_follow,
+                      switched_at=switched_at)
 
     def restarted(self, status: Status, now: float) -> None:
         """Take the first status after a restart: the configuration may be lost."""
@@ -413,34 +409,35 @@ class LightConfiguration:
             self._required.drop(self._required.with_reason(Reason.LIMIT))
         self._limited_at = -math.inf
         self.property.restarted(status, now)
-        if self.agreed or status.complete:
-            reported = status.configuration(self.agreed or NOTHING)
-            if under_way is None:
-                self._compare(status, reported, now, late=None, can_follow=True,
-                              switched_at=-math.inf)
-            self._keep_limits(reported, now)
+        self._compare(status, now, was_busy=under_way is not None)
 
     def _compare(
-        self, status: Status, reported: Configuration, now: float, *,
-        late: Change[Status] | None, can_follow: bool, switched_at: float,
+        self, status: Status, now: float, *, was_busy: bool, late: Change[Status] | None = None,
+        can_follow: bool = True, switched_at: float = -math.inf,
     ) -> None:
         """
-        Compare a status that no command under way has caused with what was agreed and is required.
+        Compare a status with the limits and, if it is not the effect of a command, with the rest.
 
+        :param was_busy: whether a command was under way.
         :param late: the change of ours that may have a late effect, None if there is none.
         """
-        _, goal, instead = self._failure
-        # It was applied late, or another sender has replaced it.
-        if goal is not None and instead is not None and (
-                not _differ(goal, status) or _differ(instead.configuration(NOTHING), status)):
-            self._failure = NO_FAILURE
-        if self.agreed is None:
-            self._adopt(reported, events.ChangeCause.FIRST_STATUS)
-            self._required.retries.due = min(self._required.retries.due, now)
-        if self._required.fields:
-            self._drop_shown(status, reported)
-        if can_follow and reported != self.agreed:
-            self._follow(status, reported, now, late=late, switched_at=switched_at)
+        if self.agreed is None and not status.complete:
+            return
+        reported = status.configuration(self.agreed or NOTHING)
+        if not was_busy:
+            _, goal, instead = self._failure
+            # It was applied late, or another sender has replaced it.
+            if goal is not None and instead is not None and (
+                    not _differ(goal, status) or _differ(instead.configuration(NOTHING), status)):
+                self._failure = NO_FAILURE
+            if self.agreed is None:
+                self._adopt(reported, events.ChangeCause.FIRST_STATUS)
+                self._required.retries.due = min(self._required.retries.due, now)
+            if self._required.fields:
+                self._drop_shown(status, reported)
+            if can_follow and reported != self.agreed:
+                self._follow(status, reported, now, late=late, switched_at=switched_at)
+        self._keep_limits(reported, now)
 
     def _drop_shown(self, status: Status, reported: Configuration) -> None:
         """Drop the required values that a status shows; overrides are sent once nevertheless."""

@@ -197,8 +197,7 @@ class LightControl:
         if closed := self._commands.refusal:
             caller.done(Result(False, closed, superseded=True), now)
             return False
-        if change := sources.poll(now):
-            self._take_holder(change, now)
+        self._take_holder(sources.poll(now), now)
         self.was_commanded = True
         late, held = '' if is_off else self._commands.lateness(now), sources.refusal(source)
         if caller.is_stream and not late:
@@ -334,7 +333,7 @@ class LightControl:
             if self._liveness.connected:
                 # First the configuration, so that an ON finds it.
                 configuration.update(now, is_off_pending=switch.is_pending(OFF))
-                if switch.is_off_due(now):
+                if configuration.brightness_is_switch is not False and switch.is_off_due(now):
                     self._prepare_off(now)
                 switch.update(now)
             has_outcomes = bool(switch.property.outcomes or configuration.property.outcomes)

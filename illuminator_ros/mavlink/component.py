@@ -45,11 +45,12 @@ HEARTBEAT_INTERVAL = 1.0
 CONFLICT_MEMORY = 10.0
 
 
-def poll_each(polls: Sequence[Callable[[float], None]], now: float) -> None:
+def call_each(functions: Sequence[Callable[..., None]], *arguments: object) -> None:
     """Call functions in their order; raise the exception of one once all have been called."""
     with contextlib.ExitStack() as calls:
-        for poll in reversed(polls):
-            calls.callback(poll, now)
+        # The stack calls the last one first.
+        for function in reversed(functions):
+            calls.callback(function, *arguments)
 
 
 class MessageHandler(ABC):
@@ -303,7 +304,7 @@ class Component(Endpoint):
 
     def poll(self, now: float) -> None:
         """See :meth:`Endpoint.poll`."""
-        poll_each(self._polls, now)
+        call_each(self._polls, now)
 
     def next_deadline(self) -> float:
         """See :meth:`Endpoint.next_deadline`."""

@@ -96,7 +96,7 @@ class DecoderCounters:
     """
     Frames that a :class:`Decoder` has read since it was made.
 
-    :ivar foreign: those that are only counted.
+    :ivar foreign: the frames that are only counted.
     """
 
     foreign: int = 0

@@ -24,7 +24,6 @@ from __future__ import annotations
 
 from collections import deque
 from collections.abc import Iterable
-import contextlib
 from dataclasses import dataclass
 import math
 from typing import Generic, NamedTuple, TypeVar
@@ -39,6 +38,7 @@ from .confirmed_command import (
     Result,
     Target,
 )
+from ..mavlink.component import call_each
 from ..mavlink.retries import COMMAND
 
 S = TypeVar('S')
@@ -84,10 +84,7 @@ class Outcome(Generic[S]):
 
 def answer(callers: Iterable[Caller], result: Result, now: float) -> None:
     """Answer callers, even if one of them raises an exception."""
-    with contextlib.ExitStack() as answers:
-        # The stack calls the last one first.
-        for caller in reversed([*callers]):
-            answers.callback(caller.done, result, now)
+    call_each([caller.done for caller in callers], result, now)
 
 
 class Property(Generic[S]):

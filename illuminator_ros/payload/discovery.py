@@ -27,7 +27,7 @@ import math
 from typing import Generic, Protocol, TypeVar
 
 from .device_events import DeviceEvent, DeviceForgotten, DeviceFound
-from ..mavlink.component import poll_each
+from ..mavlink.component import call_each
 
 # Devices of one kind; one more is ignored, so that memory is bounded.
 MAX_DEVICES = 128
@@ -167,7 +167,7 @@ class Discovery(Generic[K, D]):
                 self._drop(key, now)
             elif now >= device.next_deadline():
                 due.append(device.poll)
-        poll_each(due, now)
+        call_each(due, now)
 
     def next_deadline(self) -> float:
         """Return when :meth:`poll` is due, infinity if never."""
