@@ -1,18 +1,7 @@
 # Copyright 2026 The illuminator_ros developers
-#
-# Licensed under the Apache License, Version 2.0 (the "License");
-# you may not use this file except in compliance with the License.
-# You may obtain a copy of the License at
-#
-#     http://www.apache.org/licenses/LICENSE-2.0
-#
-# Unless required by applicable law or agreed to in writing, software
-# distributed under the License is distributed on an "AS IS" BASIS,
-# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
-# See the License for the specific language governing permissions and
-# limitations under the License.
+# SPDX-License-Identifier: Apache-2.0
 
-"""The linters of ROS; each is skipped where it is not installed."""
+"""The linters of ROS, each skipped where it is not installed, and of the file headers."""
 
 import hashlib
 from importlib.metadata import distributions
@@ -26,7 +15,7 @@ import pytest
 ROOT = Path(__file__).parents[2]
 # xmllint loads its schemas from the network where the system has no copy.
 LINTERS = [pytest.param(name, marks=[pytest.mark.linter, getattr(pytest.mark, name)])
-           for name in ('copyright', 'flake8', 'pep257', 'xmllint')]
+           for name in ('flake8', 'pep257', 'xmllint')]
 
 
 def digests() -> dict[str, str]:
@@ -55,3 +44,12 @@ def test_linter_finds_nothing(name: str, cache: pytest.Cache) -> None:
 
     assert outcome.returncode == 0, outcome.stdout
     cache.set(key, [*files])
+
+
+def test_each_file_names_its_copyright_and_licence() -> None:
+    pytest.importorskip('reuse')
+
+    outcome = subprocess.run([sys.executable, '-m', 'reuse', 'lint'], cwd=ROOT, text=True,
+                             timeout=100, stdout=subprocess.PIPE, stderr=subprocess.STDOUT)
+
+    assert outcome.returncode == 0, outcome.stdout
