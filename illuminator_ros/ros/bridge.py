@@ -19,11 +19,12 @@ from typing import NamedTuple
 from rclpy.clock import Clock, ClockType
 from rclpy.duration import Duration
 from rclpy.exceptions import InvalidHandle
-from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
+from rclpy.executors import ExternalShutdownException
 from rclpy.node import Node
 
 from .diagnostics import SIGNING_NEEDED
 from .diagnostics_publisher import DiagnosticsPublisher
+from .executor import make_executor, SPIN_LIMIT
 from .graph import shared_names, unheard_publishers
 from .ignored_parameters import ignored_parameters
 from .link_call import ENDING
@@ -120,19 +121,20 @@ class Bridge:
         steady = Clock(clock_type=ClockType.STEADY_TIME)
         # Runs once after each reset.
         self._check = node.create_timer(CHECK_INTERVAL, self._work, clock=steady)
-        self._executor = SingleThreadedExecutor(context=node.context)
+        self._executor = make_executor(node.context, self.log)
         self._nodes = NodeManager(
             node, arguments, self.log, self._executor, self._wake)
         self._diagnostics = DiagnosticsPublisher(
             node, self.link, self._component, urls=tuple(parameters.urls),
             period=parameters.diagnostics_period)
         self._served: list[_Served] = []
+        for own in nodes:
+            self._executor.add_node(own)
         for own, kind, client, value in zip(nodes, kinds, clients, values, strict=True):
             log = self.log if own is node else NodeLog(own.get_logger())
             self._served.append(_Served(own, log, kind.serve(client, Host(
                 own, self.link, log, frame_log, self._nodes, self._diagnostics, value,
                 self._wake))))
-            self._executor.add_node(own)
         specs = itertools.chain(LINK_PARAMETERS, *(kind.parameters for kind in kinds))
         for warning in ignored_parameters(
                 arguments, nodes, {spec.name for spec in specs if spec.restricts},
@@ -170,6 +172,7 @@ class Bridge:
         for payload in self._served:
             payload.payload.close()
         self._await_acknowledgements()
+        self._executor.shutdown()
         # The first one last, since the others use its publisher of parameter events.
         for node in reversed(self.nodes):
             node.destroy_node()
@@ -183,7 +186,7 @@ class Bridge:
                 publisher.wait_for_all_acked(
                     Duration(seconds=max(deadline - time.monotonic(), 0.0)))
 
-    def _spin_once(self, timeout: float | None = None) -> None:
+    def _spin_once(self, timeout: float = SPIN_LIMIT) -> None:
         try:
             self._executor.spin_once(timeout)
         except ExternalShutdownException:

@@ -122,10 +122,11 @@ class NodeManager:
                 request.name, first=self._first, namespace=self._first.get_namespace(),
                 cli_args=self._arguments)
             stack.callback(node.destroy_node)
+            self._executor.add_node(node)
+            stack.callback(self._executor.remove_node, node)
             log = NodeLog(node.get_logger())
             request.serve(node, log)
             stack.pop_all()
-        self._executor.add_node(node)
         request.node, request.log = node, log
 
 
