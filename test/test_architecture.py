@@ -34,7 +34,8 @@ TIME = {'time', 'datetime'}
 THREADS = {'threading', 'queue', 'multiprocessing', 'concurrent'}
 # The modules of mavlink/ that do I/O, run a thread or read a clock; all others must not.
 MAVLINK_IO = {
-    'transport', 'line', 'lines', 'link', 'link_thread', 'connector', 'sender', 'signing_files'}
+    'transport', 'line', 'lines', 'link', 'link_thread', 'listener', 'connector', 'sender',
+    'serial_search', 'signing_files'}
 PAYLOAD_WORD = re.compile('illuminator|gimbal|camera|rededge|winch|lamp', re.IGNORECASE)
 # A message that several payloads receive.
 SHARED_NAMES = {'GimbalDeviceAttitudeStatus', 'gimbal_device_id'}

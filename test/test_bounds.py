@@ -13,7 +13,6 @@ from types import SimpleNamespace
 from typing import Any, NamedTuple
 from unittest.mock import Mock
 
-from illuminator_ros.cli.discover.port import Port
 from illuminator_ros.gimbal.manager_state import MAX_OTHER_DEVICES
 from illuminator_ros.illuminator.light_control import LightSettings
 from illuminator_ros.illuminator.mount_orientation import MAX_MOUNTS, MountOrientations
@@ -29,6 +28,7 @@ from illuminator_ros.mavlink.component import Component, Endpoint
 from illuminator_ros.mavlink.duplicate_filter import MAX_FRAMES
 from illuminator_ros.mavlink.forward_queue import ForwardQueue, MAX_QUEUED
 from illuminator_ros.mavlink.forwarded_commands import MAX_COMMANDS
+from illuminator_ros.mavlink.listener import Listener
 from illuminator_ros.mavlink.messages import Address, CommandLong, heartbeat, Message
 from illuminator_ros.mavlink.receiver import MAX_DECODERS
 from illuminator_ros.mavlink.routing_table import MAX_ROUTES
@@ -178,7 +178,7 @@ def simulator(message: Message) -> object:
 
 def discovered() -> object:
     channel = Network().port('port')
-    port = Port(MemoryUrl('port'), 'port', 10.0, lambda: 0.0)
+    port = Listener(MemoryUrl('port'), 'port', lambda: 0.0)
     port.listen(FakeSelector(), lambda url: channel)
     for source in senders():
         channel.take(('127.0.0.1', 14550), frame_of(heartbeat(6), 0, source))
@@ -298,7 +298,7 @@ ROWS = {
         {**LINK, 'SimulatedComponents.peers': simulated.MAX_PEERS,
          'SimulatedComponent.delayed': simulated.MAX_DELAYED}, SENT),
     'components of discover': Row(
-        discovered, {'Port.components': MAX_SOURCES, 'Traffic.sources': MAX_SOURCES},
+        discovered, {'Listener.components': MAX_SOURCES, 'Traffic.sources': MAX_SOURCES},
         {'RoutingTable.routes': MAX_ROUTES}),
     'requests of ROS': Row(functools.partial(ros_requests, 64), {'SimpleNamespace.link': 64}),
     'devices of the monitor': Row(monitored, {'Graph.devices': 256}),

@@ -104,6 +104,7 @@ connection URLs, with their meanings in MAVROS, MAVSDK and pymavlink:
   udp://[BIND][:PORT]@[HOST][:PORT]   udpin://BIND:PORT   udpout://HOST:PORT
   tcp://HOST:PORT   tcp-l://[BIND][:PORT]   tcpin://BIND:PORT   tcpout://HOST:PORT
   serial:///dev/ttyACM0:57600   /dev/ttyUSB0,57600   udpin:HOST:PORT
+  serial://auto: the serial port on which the device is heard (doc/links.md)
 
 {variable}parameters that are fixed at the start, with their defaults:
 {fixed}

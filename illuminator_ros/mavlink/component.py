@@ -96,8 +96,10 @@ class Endpoint(MessageHandler):
 
     :ivar inspect: called with the frame and the class of a message before that is received.
     :ivar outgoing: messages to send, each with the address that sends it.
+    :ivar address: of a component that has one only.
     """
 
+    address = Address(1, mavlink.MAV_COMP_ID_ONBOARD_COMPUTER)
     inspect: Callable[[Frame, type[Message]], None] | None = None
 
     def __init__(self) -> None:

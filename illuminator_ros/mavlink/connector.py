@@ -64,15 +64,18 @@ class Connector:
     Every try counts as failed until ``backoff.succeeded()`` is called: a channel that can be
     opened may be lost at once.
 
+    :param opener: opens it in place of :func:`~.transport.open_channel`, until the event is set.
     :param report: called in that thread with the open channel, never after :meth:`stop`; with the
         reason after each failure; with None if the thread ends without a channel.
     """
 
     def __init__(
         self, url: Url, report: Callable[[Channel | str | None], None], *,
+        opener: Callable[[threading.Event], Channel] | None = None,
         backoff: Backoff | None = None, clock: Callable[[], float] = time.monotonic,
     ) -> None:
         self._url = url
+        self._opener = opener
         self._report = report
         self.backoff = backoff or Backoff()
         self._clock = clock
@@ -110,7 +113,8 @@ class Connector:
         self.backoff.failed()
         begun = self._clock()
         try:
-            channel = open_channel(self._url)
+            channel = (
+                self._opener(self._stopping) if self._opener else open_channel(self._url))
         except OSError as error:
             self._report(error.strerror or str(error))
         except Exception as error:

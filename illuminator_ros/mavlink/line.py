@@ -14,6 +14,7 @@ import functools
 import logging
 import math
 import selectors
+import threading
 
 from .connector import Connector
 from .frame import Frame
@@ -80,12 +81,13 @@ class Line:
 
     :param label: its name while there is no transport.
     :param call: calls a function in that thread, given the time, s; callable from any thread.
+    :param opener: see :class:`~.connector.Connector`.
     """
 
     def __init__(
         self, url: Url, user: LineUser, receiver: Receiver, *, label: str, faults: FaultLog,
         selector: selectors.BaseSelector, call: Callable[[Callable[[float], None]], None],
-        clock: Callable[[], float],
+        clock: Callable[[], float], opener: Callable[[threading.Event], Channel] | None = None,
     ) -> None:
         self.status = LinkStatus(label, clock())
         self.receiver = receiver
@@ -97,7 +99,8 @@ class Line:
         self._selector = selector
         self._clock = clock
         self._connector = Connector(
-            url, lambda outcome: call(functools.partial(self._connector_reports, outcome)))
+            url, lambda outcome: call(functools.partial(self._connector_reports, outcome)),
+            opener=opener)
         # When to connect, s; infinity while the connector tries, and while there is a channel.
         self._connect_at = -math.inf
         self._channel: Channel | None = None

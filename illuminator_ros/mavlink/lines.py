@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections import deque
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
+import copy
 import logging
 import math
 import selectors
@@ -24,10 +25,11 @@ from .messages import Address
 from .receiver import Receiver
 from .routing_table import grouped, Router
 from .sender import Sender
+from .serial_search import SerialSearch
 from .signing import Signing
 from .statistics import RECENT, SequenceCounter
 from .transport import Peer
-from .url import Url
+from .url import AutoUrl, Url
 
 # Each frame in a line, at DEBUG, with the ``address`` of the other component.
 _frame_log = logging.getLogger('illuminator_ros')
@@ -78,7 +80,10 @@ class Lines(LineUser):
         self._lines = [
             Line(url, self, Receiver(signing, self._classes, writer, wall_clock, sources,
                                      self._duplicates, index),
-                 label=label, faults=faults, selector=selector, call=call, clock=clock)
+                 label=label, faults=faults, selector=selector, call=call, clock=clock,
+                 opener=SerialSearch(
+                     url, FrameWriter(copy.copy(signing), mavlink_version), endpoint.address).open
+                 if isinstance(url, AutoUrl) else None)
             for index, (label, url) in enumerate(urls)]
         self._sources = sources
         self._router = Router([line.receiver.routes for line in self._lines], writer.sequences)

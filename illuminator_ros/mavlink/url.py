@@ -14,6 +14,9 @@ import ipaddress
 import re
 from typing import Literal, NamedTuple, NoReturn
 
+from .component_kinds import AUTOPILOT, GIMBAL, LIGHT, MANAGER, MICASENSE
+from .rate_scan import RATES
+
 MAVROS_UDP_BIND_PORT = 14555
 MAVROS_UDP_REMOTE_PORT = 14550
 MAVROS_TCP_PORT = 5760
@@ -75,6 +78,27 @@ class SerialUrl(NamedTuple):
     baud: int
     hardware_flow_control: bool = False
 
+    def __str__(self) -> str:
+        scheme = 'serial-hwfc' if self.hardware_flow_control else 'serial'
+        return f'{scheme}://{self.device}:{self.baud}'
+
+
+class AutoUrl(NamedTuple):
+    """
+    The serial port on which a device is heard.
+
+    :param rates: to try, Bd.
+    :param ports: pattern of the paths of the ports, '' for those of the machine.
+    :param serial: the serial number of the device, '' for any.
+    :param devices: the sets of kinds, one of which must be heard; see
+        :func:`~.component_kinds.kinds`.
+    """
+
+    rates: tuple[int, ...] = RATES
+    ports: str = ''
+    serial: str = ''
+    devices: tuple[frozenset[str], ...] = ()
+
 
 class PtyUrl(NamedTuple):
     """
@@ -92,7 +116,7 @@ class MemoryUrl(NamedTuple):
     name: str
 
 
-Url = UdpUrl | TcpUrl | SerialUrl | PtyUrl | MemoryUrl
+Url = UdpUrl | TcpUrl | SerialUrl | AutoUrl | PtyUrl | MemoryUrl
 
 
 def parse_url(text: str) -> Url:
@@ -128,6 +152,8 @@ class _Parser:
             self.fail(f'{bad.group()!r} is not allowed in a URL')
         if text.startswith('/'):
             return self.device(text)
+        if match := re.fullmatch(r'serial://auto(?::([^?]*))?(?:\?(.*))?', text):
+            return self.auto(*match.groups())
         if '?' in text:
             query = text[text.index('?'):]
             self.fail(f'{query!r}: options are not supported; set the parameters system_id '
@@ -247,6 +273,22 @@ class _Parser:
             return SerialUrl(rest, MAVROS_BAUD, hardware_flow_control)
         return SerialUrl(device, self.baud(baud), hardware_flow_control)
 
+    def auto(self, baud: str | None, query: str | None) -> Url:
+        url = AutoUrl() if baud is None else AutoUrl((self.baud(baud),))
+        for option in query.split('&') if query else ():
+            name, _, value = option.partition('=')
+            if not value or name not in ('ports', 'serial', 'kind'):
+                self.fail(f'{option!r} is not ports=PATTERN, serial=NUMBER or kind=KIND')
+            if name == 'kind':
+                if value not in _KINDS:
+                    self.fail(f'kind {value!r} is not one of {", ".join(_KINDS)}')
+                url = url._replace(devices=(frozenset({_KINDS[value]}),))
+            elif name == 'ports':
+                url = url._replace(ports=value)
+            else:
+                url = url._replace(serial=value)
+        return url
+
     def device(self, text: str) -> Url:
         """
         Read a bare path: ``/dev/x:baud`` of MAVROS or ``/dev/x,baud`` of pymavlink.
@@ -297,6 +339,8 @@ def _means_any(host: str) -> bool:
     return not host or _ip_version(host) > 0 and ipaddress.ip_address(host).is_unspecified
 
 
+_KINDS = {'light': LIGHT, 'gimbal': GIMBAL, 'gimbal_manager': MANAGER, 'camera': MICASENSE,
+          'autopilot': AUTOPILOT}
 _Reader = Callable[[_Parser, str], Url]
 
 _WITH_SLASHES: dict[str, _Reader] = {

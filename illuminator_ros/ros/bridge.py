@@ -310,7 +310,8 @@ def _link_parameters(node: Node, kinds: Sequence[RosPayload], url: str) -> LinkP
         raise ParameterError(f'connection_url: {given.value!r}, but the argument is {url!r}: '
                              'give one of them only')
     defaults = {**kinds[0].all_link_defaults, **({'connection_url': url} if url else {})}
-    parameters = declare_link_parameters(node, defaults)
+    parameters = declare_link_parameters(node, defaults, [
+        devices for kind in kinds for devices in kind.devices])
     needed = {kind.node_name: kind.mavlink_version for kind in kinds if kind.mavlink_version}
     if set(needed.values()) - {parameters.mavlink_version}:
         needs = ', '.join(f'{name} needs {version}' for name, version in needed.items())

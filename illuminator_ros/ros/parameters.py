@@ -23,7 +23,7 @@ from .throttled_log import NodeLog
 from ..mavlink.messages import Address
 from ..mavlink.signing import Signing, SigningMode
 from ..mavlink.signing_files import KeyFileError, load_signing, TimestampStore
-from ..mavlink.url import parse_url, resource, Url, UrlError
+from ..mavlink.url import AutoUrl, parse_url, resource, Url, UrlError
 
 T = TypeVar('T')
 # Values of parameters by name, each of the type of its default.
@@ -204,22 +204,27 @@ def declare_payloads(node: Node, default: str) -> tuple[str, ...]:
     return payloads
 
 
-def declare_link_parameters(node: Node, defaults: Values | None = None) -> LinkParameters:
+def declare_link_parameters(
+    node: Node, defaults: Values | None = None, devices: Iterable[frozenset[str]] = (),
+) -> LinkParameters:
     """
     Declare the other parameters of the link and return them.
 
     :param defaults: replace those of :data:`LINK_PARAMETERS`.
+    :param devices: to look for on a serial port, see :class:`~..mavlink.url.AutoUrl`.
     :raises ParameterError: if one is wrong.
     """
     values = dict(declare_given(
         node, [spec for spec in LINK_PARAMETERS if spec.name != 'payloads'], defaults))
     return LinkParameters(
-        urls=_urls(values.pop('connection_url'), values.pop('forward_urls')),
+        urls=_urls(values.pop('connection_url'), values.pop('forward_urls'), tuple(devices)),
         address=Address(values.pop('system_id'), values.pop('component_id')),
         signing_mode=SigningMode(values.pop('signing_mode')), **values)
 
 
-def _urls(first: str, further: list[str]) -> Mapping[str, Url]:
+def _urls(
+    first: str, further: list[str], devices: tuple[frozenset[str], ...],
+) -> Mapping[str, Url]:
     """Return the URLs by their texts; no two of them use the same port or device."""
     urls: dict[str, Url] = {}
     if len(further) > MAX_FURTHER:
@@ -232,7 +237,8 @@ def _urls(first: str, further: list[str]) -> Mapping[str, Url]:
         for other, used in urls.items():
             if resource(url) == resource(used):
                 raise ParameterError(f'{name}: {text!r} and {other!r} are the same link')
-        urls[text] = url
+        urls[text] = (url._replace(devices=devices)
+                      if isinstance(url, AutoUrl) and not url.devices else url)
     return urls
 
 

@@ -85,6 +85,8 @@ class RosPayload:
     :param summary: the device, for ``--help``.
     :param examples: commands, for ``--help``.
     :param link_defaults: defaults of the link's parameters where it is the first payload.
+    :param devices: the sets of kinds of components that show one of its devices, see
+        :class:`~..mavlink.url.AutoUrl`.
     :param mavlink_version: the version that its devices need, 1 or 2; None for any.
     """
 
@@ -97,6 +99,7 @@ class RosPayload:
     summary: str = ''
     examples: tuple[str, ...] = ()
     link_defaults: Values = field(default_factory=dict)
+    devices: tuple[frozenset[str], ...] = ()
     mavlink_version: int | None = None
 
     @property

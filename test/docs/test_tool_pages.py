@@ -13,14 +13,15 @@ from typing import Any
 from illuminator_ros.checks.report import as_json, RunReport
 from illuminator_ros.checks.requirement import CheckResult, CheckVerdict, Requirement
 from illuminator_ros.cli.conformance.run import parse
+from illuminator_ros.cli.discover import report as discovered
 from illuminator_ros.cli.discover import run as discover
-from illuminator_ros.cli.discover.port import Port
 from illuminator_ros.cli.payloads import PAYLOADS
 from illuminator_ros.cli.simulator.components import scenario
 from illuminator_ros.cli.simulator.options import parser, payload_types
 from illuminator_ros.gimbal.checks import device, manager
 from illuminator_ros.illuminator.checks.requirements import REQUIREMENTS
 from illuminator_ros.illuminator.simulated import SIMULATED
+from illuminator_ros.mavlink.listener import Listener
 from illuminator_ros.mavlink.url import parse_url
 from illuminator_ros.rededge.checks import REQUIREMENTS as CAMERA_REQUIREMENTS
 from payloads.winch import WINCH
@@ -132,13 +133,14 @@ def test_the_report_of_discover_on_the_page_is_as_the_program_prints_it() -> Non
             ('1/1', ['autopilot', 'ArduPilot'], 52.4), ('1/243', ['light'], 6.0))]
     report = {'port': url, 'url': url, 'trouble': '', 'components': heard,
               'run': [f'ros2 run illuminator_ros bridge {url}'], 'try': []}
-    silent = Port(parse_url('udpin://0.0.0.0:14590'), 'udpin://0.0.0.0:14590', 1.0, lambda: 0.0)
+    silent = discovered.report(Listener(
+        parse_url('udpin://0.0.0.0:14590'), 'udpin://0.0.0.0:14590', lambda: 0.0))
 
-    for one in (report, silent.report()):
-        assert '\n'.join(['', *discover.lines(one), '']) in page
+    for one in (report, silent):
+        assert '\n'.join(['', *discovered.lines(one), '']) in page
     keys = [re.findall('`(.+?)`', cell) for cell, _ in table(
         page, 'key of `--json`, for each port')]
-    assert [key for row in keys for key in row] == [*silent.report()] == [*report]
+    assert [key for row in keys for key in row] == [*silent] == [*report]
     [of_component] = [text for cell, text in table(page, 'key of `--json`, for each port')
                       if cell == '`components`']
     assert re.findall('`(.+?)`', of_component) == [*heard[0]]

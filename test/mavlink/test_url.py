@@ -8,6 +8,7 @@ from __future__ import annotations
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 from illuminator_ros.mavlink.url import (
+    AutoUrl,
     Broadcast,
     EXAMPLES,
     HostPort,
@@ -86,12 +87,19 @@ OURS: dict[str, Url] = {
     'tcp://[::1]': connect('::1', 5760),
     '/dev/x:20000000': SerialUrl('/dev/x', 20_000_000),
     '/dev/by-path/pci-0000:00-port0:1': SerialUrl('/dev/by-path/pci-0000:00-port0', 1),
+    'serial://auto': AutoUrl(),
+    'serial://auto:9600?serial=SIM-1-243&ports=/dev/ttyUSB*': AutoUrl(
+        (9600,), '/dev/ttyUSB*', 'SIM-1-243'),
+    'serial://auto?kind=gimbal_manager': AutoUrl(devices=(frozenset({'gimbal manager'}),)),
     'pty://': PtyUrl(),
     'pty:///tmp/ttyCAMERA': PtyUrl('/tmp/ttyCAMERA'),
     'memory://bench': MemoryUrl('bench')}
 # Wrong URL -> the wrong part, and the reason.
 WRONG: dict[str, tuple[str, str]] = {
     '': ('', 'it is empty'),
+    'serial://auto?kind=lamp': ('lamp', 'is not one of light, gimbal, gimbal_manager, '
+                                'camera, autopilot'),
+    'serial://auto?baud=9600': ('baud=9600', 'is not ports=PATTERN, serial=NUMBER or kind=KIND'),
     'udp://127.0.0.1': ("'127.0.0.1'", 'no port'),
     '/udp://localhost:99': ("'/udp://localhost:99'", 'not a device path'),
     'udp//localhost:99': ("'udp//localhost'", 'not a valid host name'),

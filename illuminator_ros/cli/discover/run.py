@@ -6,7 +6,7 @@
 from __future__ import annotations
 
 import argparse
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 import json
 import os
 import re
@@ -14,19 +14,20 @@ import selectors
 import signal
 import sys
 import time
-from typing import Any
 
-from .port import Port, RATES
-from .ports import serial_ports
+from .report import lines, report
 from ..arguments import invocation, option, Parser
 from ..entry_point import print_output
 from ...mavlink.link_thread import Waker
+from ...mavlink.listener import Listener
+from ...mavlink.rate_scan import RATES, SHARE
+from ...mavlink.transport.ports import serial_ports
 from ...mavlink.url import HostPort, parse_url, SerialUrl, UdpUrl, Url
 from ...simulation.settings import number
 
 UDP_PORTS = 14540, 14550, 14590
-# s to listen. A heartbeat comes once a second; each rate of a serial port has a quarter of it.
-DURATION = 10.0
+# s to listen, enough for each rate of a serial port.
+DURATION = 14.0
 # s between looks at the rates, and at incomplete frames.
 TICK = 0.25
 # Columns of the line that shows the progress.
@@ -35,8 +36,9 @@ CONSOLE = 'the console of this system, not opened (on a Raspberry Pi: raspi-conf
 NO_SERIAL = 'no serial port: plug its adapter in; a container needs --device'
 DESCRIPTION = f"""\
 Finds the port of a device, and prints the command to run. It listens to each serial port at
-{', '.join(map(str, RATES))} baud, to the UDP ports {', '.join(map(str, UDP_PORTS))}, and to the
-given URLs. It sends nothing."""
+{', '.join(map(str, RATES[:6]))},
+{', '.join(map(str, RATES[6:]))} baud, to the UDP ports
+{', '.join(map(str, UDP_PORTS))}, and to the given URLs. It sends nothing."""
 EPILOG = """\
 examples:
   {command}
@@ -51,42 +53,30 @@ wrong. Ctrl-C ends the listening before its time."""
 def ports_of(
     given: Sequence[tuple[str, Url]], duration: float, clock: Callable[[], float],
     serial: dict[str, bool],
-) -> list[Port]:
+) -> list[Listener]:
     """
     Return the ports to listen to; a given URL replaces a port of this machine.
 
     :param given: URLs by their texts.
-    :param serial: see :func:`~.ports.serial_ports`.
+    :param serial: see :func:`serial_ports`.
     """
     default: list[tuple[str, Url]] = [
         *((path, SerialUrl(path, RATES[0])) for path in serial),
         *((f'udpin://0.0.0.0:{port}', UdpUrl(HostPort('', port))) for port in UDP_PORTS)]
     listened = {_opened(url): (text, url) for text, url in (*default, *given)}
-    return [Port(url, text, duration, clock, CONSOLE if serial.get(text) else '')
+    return [Listener(url, text, clock, rates=_rates(url), share=max(duration / len(RATES), SHARE),
+                     trouble=CONSOLE if serial.get(text) else '')
             for text, url in listened.values()]
+
+
+def _rates(url: Url) -> Sequence[int]:
+    return [*dict.fromkeys((url.baud, *RATES))] if isinstance(url, SerialUrl) else (0,)
 
 
 def _opened(url: Url) -> object:
     """Return what two URLs would both open."""
     return (os.path.realpath(url.device) if isinstance(url, SerialUrl) else
             url.bind.port if isinstance(url, UdpUrl) and url.bind.port else url)
-
-
-def lines(report: dict[str, Any]) -> Iterator[str]:
-    """Return the lines on one port."""
-    trouble = report['trouble']
-    if not report['components']:
-        yield f'{report["port"]}: {trouble}'
-    else:
-        yield report['url']
-        for one in report['components']:
-            version = f'MAVLink {" and ".join(map(str, one["mavlink_versions"]))}'
-            yield (f'  {one["address"]:8} {", ".join(one["kinds"]) or "no HEARTBEAT":32} '
-                   f'{version + (", signed" if one["signed"] else ""):18} '
-                   f'{one["frames_per_s"]:7.1f} frames/s')
-        if trouble:
-            yield f'  {trouble}'
-    yield from (f'  {verb}: {command}' for verb in ('run', 'try') for command in report[verb])
 
 
 def parse(args: Sequence[str] | None) -> tuple[argparse.Namespace, list[tuple[str, Url]]]:
@@ -120,7 +110,7 @@ def run(args: Sequence[str] | None = None) -> int:
     serial = serial_ports()
     ports = ports_of(given, options.seconds, time.monotonic, serial)
     _listen(ports, options.seconds)
-    reports = sorted((port.report() for port in ports), key=lambda one: not one['run'])
+    reports = sorted((report(port) for port in ports), key=lambda one: not one['run'])
     if options.json:
         text = json.dumps(reports, indent=2)
     else:
@@ -130,7 +120,7 @@ def run(args: Sequence[str] | None = None) -> int:
     return 0 if written and any(one['run'] for one in reports) else 1
 
 
-def _listen(ports: Sequence[Port], duration: float) -> None:
+def _listen(ports: Sequence[Listener], duration: float) -> None:
     """Open the ports, and listen until the time is over or a signal comes."""
     selector, waker = selectors.DefaultSelector(), Waker()
     end = time.monotonic() + duration
@@ -159,7 +149,7 @@ def _listen(ports: Sequence[Port], duration: float) -> None:
     _show('')
 
 
-def _progress(ports: Sequence[Port], left: float) -> str:
+def _progress(ports: Sequence[Listener], left: float) -> str:
     heard = [str(address) for port in ports for address in port.components]
     rates = dict.fromkeys(f'{port.rate}' for port in ports if port.rate and not port.trouble)
     return (f'{left:.0f} s left; heard: {", ".join(heard) or "nothing yet"}'

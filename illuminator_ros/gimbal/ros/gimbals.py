@@ -16,6 +16,7 @@ from ..client import GimbalClient
 from ..events import GimbalEvent, GimbalKey
 from ..gimbal import GimbalSettings
 from ..setpoint_mixer import STEP_LIMIT
+from ...mavlink import component_kinds as kinds
 from ...payload.confirmed_command import Result
 from ...payload.device_events import DeviceConnected
 from ...ros.command_sources import SOURCE_PARAMETERS, source_settings
@@ -123,4 +124,5 @@ GIMBAL = RosPayload(
         'ros2 service call /gimbal/take_control std_srvs/srv/Trigger',
         'ros2 topic pub -1 /gimbal/cmd/angles geometry_msgs/msg/Vector3Stamped '
         '"{header: {frame_id: base_link_stabilized}, vector: {y: 0.785, z: 0.524}}"'),
+    devices=(frozenset({kinds.MANAGER}), frozenset({kinds.GIMBAL, kinds.AUTOPILOT})),
     mavlink_version=2)

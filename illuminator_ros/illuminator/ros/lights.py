@@ -18,6 +18,7 @@ from .. import events
 from ..client import enable_all, IlluminatorClient
 from ..light import Light
 from ...mavlink.command_sender import CommandSender
+from ...mavlink.component_kinds import LIGHT
 from ...mavlink.messages import Address
 from ...payload.confirmed_command import Done, Result
 from ...payload.device_events import DeviceConnected
@@ -192,4 +193,5 @@ ILLUMINATOR = RosPayload(
     summary='a MAVLink illuminator (searchlight, torch, strobe)', examples=(
         'ros2 service call /illuminator/enable std_srvs/srv/SetBool "{data: true}"',
         'ros2 param set /illuminator brightness 60'),
+    devices=(frozenset({LIGHT}),),
     mavlink_version=2)

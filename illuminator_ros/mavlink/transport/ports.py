@@ -9,11 +9,13 @@ import contextlib
 import os
 from pathlib import Path
 
-from ...mavlink.url import SerialUrl, UdpUrl, Url
+from ..url import SerialUrl, UdpUrl, Url
 
 # The longest command line of a program that is shown, characters.
 MAX_COMMAND = 80
 PTY_MAKERS = {'/dev/ptmx', '/dev/pts/ptmx'}
+IN_USE = 'in use by {}: end it, or share its link (doc/routers.md)'
+OTHER_USER = 'a program of another user, which root can see'
 
 
 def _read(path: Path) -> str:

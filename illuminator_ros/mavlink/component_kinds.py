@@ -7,8 +7,8 @@ from __future__ import annotations
 
 from collections.abc import Collection, Mapping
 
-from ..mavlink.dialect import mavlink, short_names
-from ..mavlink.messages import Address, Heartbeat
+from .dialect import mavlink, short_names
+from .messages import Address, Heartbeat
 
 AUTOPILOT, LIGHT, MANAGER, GIMBAL = 'autopilot', 'light', 'gimbal manager', 'gimbal'
 MICASENSE = 'MicaSense camera'

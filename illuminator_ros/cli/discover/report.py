@@ -1,0 +1,93 @@
+# Copyright 2026 The illuminator_ros developers
+# SPDX-License-Identifier: Apache-2.0
+
+"""The report on one port: what was heard on it, and the commands for it."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+import shlex
+from typing import Any
+
+from ..arguments import invocation
+from ...mavlink.component_kinds import AUTOPILOT, GIMBAL, LIGHT, MANAGER, MICASENSE
+from ...mavlink.listener import Listener, NOT_ASKED
+from ...mavlink.url import SerialUrl
+
+SERVED = {LIGHT, MANAGER, GIMBAL, MICASENSE}
+NOT_SERVED = ('none of these is a light, a gimbal or a MicaSense camera; an autopilot or router '
+              'may forward their frames only to a program that sends, unlike this one')
+
+
+def report(port: Listener) -> dict[str, Any]:
+    """Return what was heard, and the commands, for ``--json``."""
+    known, elapsed = port.kinds, max(port.elapsed, 1e-3)
+    components = [
+        {'address': str(address), 'kinds': known[address],
+         'mavlink_versions': sorted(one.versions), 'signed': one.signed,
+         'frames_per_s': round(one.frames / elapsed, 1),
+         'served': not SERVED.isdisjoint(known[address])}
+        for address, one in sorted(port.components.items())]
+    payloads = payloads_for({kind for one in known.values() for kind in one})
+    signed = any(one['served'] and one['signed'] for one in components)
+    trouble = port.trouble or (
+        port.silence() if not components else '' if payloads else NOT_SERVED)
+    return {
+        'port': port.label,
+        'url': url_of(port) if components else '',
+        'trouble': trouble,
+        'components': components,
+        'run': [_command(port, names, signed) for names in payloads],
+        'try': [_command(port, ['illuminator', 'gimbal'], False)]
+        if trouble in (NOT_SERVED, NOT_ASKED) else [],
+    }
+
+
+def url_of(port: Listener) -> str:
+    """Return the URL of a port for the nodes."""
+    if isinstance(port.url, SerialUrl):
+        return str(port.tuned_url)
+    if port.is_loopback:
+        # As the default URL of the bridge, it hears this machine only.
+        return port.label.replace('udpin://0.0.0.0:', 'udpin://127.0.0.1:')
+    return port.label
+
+
+def executable(payloads: list[str]) -> str:
+    """Return the command that serves payloads, in the form in which this program was run."""
+    name = 'bridge' if payloads[0] == 'illuminator' else payloads[0]
+    return invocation('discover').removesuffix('discover') + name
+
+
+def _command(port: Listener, payloads: list[str], signed: bool) -> str:
+    parameters = [f'payloads:="[{", ".join(payloads)}]"'] if payloads[1:] else []
+    if signed:
+        parameters += ['signing_mode:=sign', 'signing_key_file:=KEY_FILE']
+    return ' '.join([
+        executable(payloads), shlex.quote(url_of(port)),
+        *(['--ros-args'] if parameters else []), *(f'-p {one}' for one in parameters)])
+
+
+def payloads_for(found: set[str]) -> list[list[str]]:
+    """Return the payloads that serve kinds, by process: only a camera needs MAVLink 1."""
+    managed = MANAGER in found or {GIMBAL, AUTOPILOT} <= found
+    shared = [*(['illuminator'] if LIGHT in found else []),
+              *(['gimbal'] if managed else ['gimbal_manager'] if GIMBAL in found else [])]
+    return [*([shared] if shared else []), *([['rededge']] if MICASENSE in found else [])]
+
+
+def lines(report: dict[str, Any]) -> Iterator[str]:
+    """Return the lines on one port."""
+    trouble = report['trouble']
+    if not report['components']:
+        yield f'{report["port"]}: {trouble}'
+    else:
+        yield report['url']
+        for one in report['components']:
+            version = f'MAVLink {" and ".join(map(str, one["mavlink_versions"]))}'
+            yield (f'  {one["address"]:8} {", ".join(one["kinds"]) or "no HEARTBEAT":32} '
+                   f'{version + (", signed" if one["signed"] else ""):18} '
+                   f'{one["frames_per_s"]:7.1f} frames/s')
+        if trouble:
+            yield f'  {trouble}'
+    yield from (f'  {verb}: {command}' for verb in ('run', 'try') for command in report[verb])
