@@ -80,6 +80,9 @@ class MessageHandler(ABC):
     def receive(self, source: Address, message: Message, now: float) -> None:
         """Receive a message of one of the classes of ``messages``."""
 
+    def sent(self, message: Message, now: float) -> None:  # noqa: B027 - optional
+        """Note that a message of ``streams`` is sent; others have replaced those between."""
+
     def poll(self, now: float) -> None:  # noqa: B027 - optional
         """Do everything that is due."""
 
@@ -281,6 +284,11 @@ class Component(Endpoint):
             self.heartbeats[source] = message
         for payload in self._receivers.get(type(message), ()):
             payload.receive(source, message, now)
+
+    def sent(self, message: Message, now: float) -> None:
+        """See :meth:`Endpoint.sent`."""
+        for payload in self._payloads:
+            payload.sent(message, now)
 
     def _take_command(self, source: Address, command: AnyCommand, now: float) -> None:
         before = len(self.outgoing)

@@ -21,6 +21,9 @@ class ConflatingQueue:
 
     A slow line would otherwise carry them late, and other messages behind them.
 
+    The most urgent group is first, unless it was the last one: at any rate of its messages the
+    other groups have their turns.
+
     :param groups: the most urgent first.
     :ivar dropped: messages that were dropped for newer ones, or for their age.
     """
@@ -33,19 +36,26 @@ class ConflatingQueue:
         self._held: list[list[tuple[Address, Message]]] = [[] for _ in groups]
         # When the first message of each group was taken, s.
         self._since = [0.0 for _ in groups]
+        # The group that was taken last.
+        self._last = -1
 
     def __bool__(self) -> bool:
         return any(self._held)
 
     @property
+    def _next(self) -> int:
+        return min((place for place, held in enumerate(self._held) if held),
+                   key=lambda place: (place == self._last, place))
+
+    @property
     def is_urgent(self) -> bool:
-        """Return whether a message of the most urgent group is held."""
-        return bool(self._held and self._held[0])
+        """Return whether the most urgent group is next."""
+        return bool(self) and self._next == 0
 
     @property
     def first(self) -> Message:
-        """Return the first message of the most urgent group that has some."""
-        return next(held[0][1] for held in self._held if held)
+        """Return the first message of the next group."""
+        return self._held[self._next][0][1]
 
     def hold(self, source: Address, message: Message, now: float) -> bool:
         """Take a message, if it belongs to a stream; return whether it does."""
@@ -63,10 +73,11 @@ class ConflatingQueue:
         return True
 
     def take(self, now: float) -> list[tuple[Address, Message]]:
-        """Return the messages of the most urgent group that has some; none if they are old."""
-        place = next(place for place, held in enumerate(self._held) if held)
+        """Return the messages of the next group; none if they are old."""
+        place = self._next
         held, self._held[place] = self._held[place], []
         if now < self._since[place] + MAX_AGE:
+            self._last = place
             return held
         self.dropped += len(held)
         return []

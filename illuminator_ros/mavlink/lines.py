@@ -88,7 +88,7 @@ class Lines(LineUser):
         self._sources = sources
         self._router = Router([line.receiver.routes for line in self._lines], writer.sequences)
         self._sender = Sender(writer, endpoint.streams, self._lines, self._router, faults, clock,
-                              wall_clock)
+                              wall_clock, endpoint.sent)
 
     def __iter__(self) -> Iterator[Line]:
         return iter(self._lines)

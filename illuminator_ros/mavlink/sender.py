@@ -36,6 +36,7 @@ class Sender:
     A frame is the same on each line, so that a receiver behind two of them recognises the copy.
 
     :param streams: messages that newer ones replace while the line is busy.
+    :param sent: called with each message of a stream that is sent.
     :ivar answer_expected_until: s.
     :ivar is_holding: whether messages of streams are held.
     :ivar heartbeats: the last heartbeat frame of each of our addresses.
@@ -44,7 +45,7 @@ class Sender:
     def __init__(
         self, writer: FrameWriter, streams: Sequence[StreamGroup], lines: Sequence[Line],
         router: Router, faults: FaultLog, clock: Callable[[], float],
-        wall_clock: Callable[[], float],
+        wall_clock: Callable[[], float], sent: Callable[[Message, float], None],
     ) -> None:
         self.answer_expected_until = -math.inf
         self.is_holding = False
@@ -57,6 +58,7 @@ class Sender:
         self._faults = faults
         self._clock = clock
         self._wall_clock = wall_clock
+        self._sent = sent
 
     def send(self, messages: Sequence[tuple[Address, Message]], now: float) -> None:
         """Send messages, and those of streams for which the line has room."""
@@ -67,7 +69,10 @@ class Sender:
         self._send_now([one for one in messages if not self._streams.hold(*one, now)], now)
         self.is_holding = bool(self._streams)
         while self.is_holding and self.next_deadline() <= now:
-            self._send_now(self._streams.take(now), now)
+            taken = self._streams.take(now)
+            self._send_now(taken, now)
+            for _, message in taken:
+                self._faults.call(self._sent, message, now)
             self.is_holding = bool(self._streams)
         self._lines[0].receiver.traffic.frames_dropped += self._streams.dropped - dropped
 

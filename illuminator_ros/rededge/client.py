@@ -129,11 +129,13 @@ class RedEdgeClient(Payload):
     def link_opened(self, now: float) -> None:
         """See :meth:`Payload.link_opened`."""
         self._liveness.link_failure = ''
+        self.feeder.set_link(is_open=True)
 
     def link_closed(self, now: float, reason: str) -> None:
         """See :meth:`Payload.link_closed`."""
         failure = self._liveness.link_failure = f'link lost: {reason}'
         self._lose(failure, now)
+        self.feeder.set_link(is_open=False)
         self._pings.stop(failure)
         self._captures.stop(now, failure)
 
@@ -198,6 +200,10 @@ class RedEdgeClient(Payload):
                     if self._is_conflict(now) else '')
             self.events.emit(ImageTaken(message))
             self._captures.take_feedback(message, now, note)
+
+    def sent(self, message: Message, now: float) -> None:
+        """See :meth:`Payload.sent`."""
+        self.feeder.sent(message)
 
     def close(self, now: float) -> None:
         """See :meth:`Payload.close`."""

@@ -23,14 +23,17 @@ from .input_states import (
     InputSnapshot,
     InputState,
     InputStates,
+    PAIR,
     PositionSource,
     Stamp,
     TIME_REFERENCE_LIFETIME,
     VELOCITIES,
 )
+from .messages import GpsRawInt
 from .orientation_feeder import OrientationFeeder
 from ..mavlink.command_sender import format_seconds
 from ..mavlink.messages import Address, Message, time_boot_ms
+from ..payload.messages import Attitude, GlobalPositionInt
 from ..payload.rotation import Quaternion, Vector
 
 # s
@@ -104,6 +107,17 @@ class Feeder:
         return FeederSnapshot(
             self._inputs.snapshot(now), needed, self.orientation.why_no_pair(now))
 
+    def set_link(self, *, is_open: bool) -> None:
+        """Note whether messages can be sent."""
+        self._inputs.set_link(is_open=is_open)
+
+    def sent(self, message: Message) -> None:
+        """Note that a message is sent, since the line had room for it."""
+        if isinstance(message, (GpsRawInt, GlobalPositionInt)):
+            self._inputs.sent((Input.FIX,))
+        elif isinstance(message, Attitude):
+            self._inputs.sent(PAIR)
+
     # Position and time
 
     def take_fix(self, position: Position, stamp: Stamp, now: float) -> None:
@@ -117,6 +131,7 @@ class Feeder:
                 raise ValueError('no fix: its position is 0, 0')
             utc = self._utc(stamp) // 1000
             self._inputs.check(Input.FIX, stamp)
+            self._inputs.wait((Input.FIX,), now)
             if settings.position_source is PositionSource.RAW:
                 self._send(conversions.gps_raw_int(
                     position, utc, velocity, satellites, settings.geoid_separation))

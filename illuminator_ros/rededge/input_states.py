@@ -5,7 +5,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 import contextlib
 from dataclasses import dataclass
 from enum import Enum
@@ -37,6 +37,8 @@ class Input(Enum):
 
 # The inputs with a velocity, the preferred ones first.
 VELOCITIES = (Input.VELOCITY, Input.VELOCITY_WITH_COVARIANCE, Input.ODOMETRY)
+# The inputs of attitude and mount, which are sent as pairs.
+PAIR = (Input.IMU, Input.ATTITUDE, Input.MOUNT)
 # Inputs that are used with later messages of others, so that their ages count from their stamps.
 USED_LATER = (*VELOCITIES, Input.TIME_REFERENCE)
 
@@ -46,6 +48,7 @@ class InputState(Enum):
 
     MISSING = 'missing'
     OK = 'ok'
+    UNSENT = 'unsent'
     STALE = 'stale'
     REFUSED = 'refused'
 
@@ -83,8 +86,7 @@ class CameraSettings:
         """Return the age at which an input is stale, s."""
         if name is Input.TIME_REFERENCE:
             return TIME_REFERENCE_LIFETIME
-        return (self.attitude_timeout if name in (Input.IMU, Input.ATTITUDE, Input.MOUNT)
-                else self.position_timeout)
+        return self.attitude_timeout if name in PAIR else self.position_timeout
 
 
 class Stamp(NamedTuple):
@@ -122,21 +124,27 @@ class InputSnapshot:
 @dataclass
 class _Tracker:
     """
-    Tracks whether an input is missing, used, stale or refused.
+    Tracks whether an input is missing, sent, not sent in time, stale or refused.
 
     :param last: the stamp of the last accepted message by ROS time, ns; None after a jump of it.
+    :param waits_since: when the first message was accepted that no sent one has followed.
     """
 
     timeout: float
     last: int | None = None
     accepted_at: float = -math.inf
+    waits_since: float = math.inf
     refused_at: float = -math.inf
     refusal: str = ''
     refused: int = 0
 
+    def is_fresh(self, now: float) -> bool:
+        return now < self.accepted_at + self.timeout
+
     def state(self, now: float) -> InputState:
-        if now < self.accepted_at + self.timeout:
-            return InputState.OK
+        if self.is_fresh(now):
+            is_late = now >= self.waits_since + self.timeout
+            return InputState.UNSENT if is_late else InputState.OK
         if now < self.refused_at + self.timeout:
             return InputState.REFUSED
         if max(self.accepted_at, self.refused_at) > -math.inf:
@@ -153,12 +161,16 @@ class InputStates:
     """The states of all inputs."""
 
     def __init__(self, settings: CameraSettings) -> None:
+        self._link_is_open = False
         self._trackers = {name: _Tracker(settings.timeout(name)) for name in Input}
 
     @contextlib.contextmanager
     def take(self, name: Input, now: float, stamp: Stamp | None = None) -> Iterator[None]:
         """Take a message in the context, which raises ValueError with the reason to refuse it."""
         tracker = self._trackers[name]
+        if not tracker.is_fresh(now):
+            # What waited before a pause of the input has been dropped.
+            tracker.waits_since = math.inf
         try:
             yield
         except ValueError as error:
@@ -170,6 +182,23 @@ class InputStates:
             tracker.last = stamp.time
             if name in USED_LATER:
                 tracker.accepted_at -= max(0.0, stamp.age)
+
+    def wait(self, names: Sequence[Input], now: float) -> None:
+        """Note that a message of some inputs is sent once the line has room for it."""
+        for name in names if self._link_is_open else ():
+            tracker = self._trackers[name]
+            tracker.waits_since = min(tracker.waits_since, now)
+
+    def set_link(self, *, is_open: bool) -> None:
+        """Note whether messages can be sent; while they cannot, that is a state of the link."""
+        self._link_is_open = is_open
+        if not is_open:
+            self.sent(tuple(Input))
+
+    def sent(self, names: Sequence[Input]) -> None:
+        """Note that a message of some inputs is sent."""
+        for name in names:
+            self._trackers[name].waits_since = math.inf
 
     def check(self, name: Input, stamp: Stamp) -> None:
         """Raise ValueError if a stamp is old, in the future, or not newer than the last one."""
@@ -188,7 +217,7 @@ class InputStates:
 
     def is_fresh(self, name: Input, now: float) -> bool:
         """Return whether an input can be used."""
-        return self._trackers[name].state(now) is InputState.OK
+        return self._trackers[name].is_fresh(now)
 
     def snapshot(self, now: float) -> Mapping[Input, InputSnapshot]:
         """Return all inputs at this moment."""

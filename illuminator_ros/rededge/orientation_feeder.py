@@ -12,7 +12,7 @@ from typing import NamedTuple
 
 from . import conversions
 from .conversions import MountParent
-from .input_states import CameraSettings, Input, InputStates, Stamp, UNKNOWN
+from .input_states import CameraSettings, Input, InputStates, PAIR, Stamp, UNKNOWN
 from ..mavlink.messages import Address, Message, time_boot_ms
 from ..payload.rotation import Quaternion, Vector
 
@@ -167,6 +167,7 @@ class OrientationFeeder:
         self._pair_time, self._pair_sent_at = time, now
         interval = self._interval
         self._pair_due = max(self._pair_due + interval, now + interval / 2)
+        self._inputs.wait(PAIR, now)
         self._send(conversions.attitude(sample.rotation, sample.rates, time_boot_ms(now)))
         self._send_mount(angles, now)
 

@@ -37,8 +37,11 @@ def test_a_newer_message_replaces_its_whole_group_and_the_urgent_group_is_first(
 
     assert not queue.hold(SOURCE, heartbeat(18), 0.0)
     assert queue.dropped == 3
+    assert [message for _, message in queue.take(0.0)] == [position(3)]
+    # The other group has its turn, though the urgent one has a message again.
+    queue.hold(SOURCE, position(4), 0.0)
     assert [[message for _, message in queue.take(0.0)] for _ in range(2)] == [
-        [position(3)], [*pair(2)]]
+        [*pair(2)], [position(4)]]
     assert not queue
 
 
@@ -72,7 +75,11 @@ class Sender(Endpoint):
     def __init__(self, start: float) -> None:
         super().__init__()
         self.start = start
+        self.reported: list[tuple[float, Message]] = []
         self.due = [Stream(pair, 0.005), Stream(lambda number: [position(number)], 0.1)]
+
+    def sent(self, message: Message, now: float) -> None:
+        self.reported.append((now, message))
 
     def link_opened(self, now: float) -> None:
         self.outgoing.append((SOURCE, heartbeat(18)))
@@ -127,16 +134,28 @@ def test_on_a_slow_line_nothing_waits_and_whole_pairs_of_the_newest_are_sent() -
     assert 2 * 1990 - 2 <= dropped + len(others) <= 2 * 1991
 
 
+def test_positions_at_any_rate_leave_each_pair_its_turn_on_a_slow_line() -> None:
+    _, sent, size = run(RATE, 10.0, Stream(pair, 0.05), Stream(lambda n: [position(n)], 0.002))
+
+    assert len([one for _, one in sent if isinstance(one, Attitude)]) >= 199
+    assert len([one for _, one in sent if isinstance(one, GlobalPositionInt)]) > 80
+    assert size / 10.0 <= 1.01 * RATE
+
+
 def test_messages_that_a_blocked_line_has_held_for_long_are_dropped_and_counted() -> None:
     # The heartbeats occupy the line for more than 1 s.
     link, sent, _ = run(
         200.0, 10.0, Stream(lambda number: [*[heartbeat(18)] * 10, position(number)], 1e9))
 
     assert sent == []
+    assert isinstance(link.endpoint, Sender)
+    assert link.endpoint.reported == []
     assert link.snapshot(link.now).traffic.frames_dropped == 1
 
 
 def test_on_a_fast_link_each_message_is_sent() -> None:
     link, sent, _ = run(float('inf'), 1.0)
     assert len(sent) >= 2 * 200 + 10
+    assert isinstance(link.endpoint, Sender)
+    assert link.endpoint.reported == sent
     assert not link.snapshot(link.now).traffic.frames_dropped

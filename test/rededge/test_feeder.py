@@ -116,6 +116,41 @@ def test_each_fix_is_sent_at_once_and_only_once_re_13_re_29() -> None:
     assert classes(rig.fix()) == [GpsRawInt]
 
 
+@pytest.mark.parametrize(('take', 'names', 'timeout'), [
+    (Rig.fix, [Input.FIX], 1.0), (Rig.imu, [Input.IMU], 0.5)])
+def test_an_input_without_a_sent_message_within_its_timeout_is_lacking_re_29(
+        take: Callable[[Rig], list[Message]], names: list[Input], timeout: float) -> None:
+    rig = Rig(attitude_rate=100.0)
+    rig.feeder.set_link(is_open=True)
+
+    def states() -> list[InputState]:
+        snapshot = rig.feeder.snapshot(rig.now)
+        lacks = any(set(names) <= set(group) for group in snapshot.lacking)
+        found = [snapshot.inputs[name].state for name in names]
+        assert lacks is (found != [InputState.OK])
+        return found
+
+    for after, expected in ((0.0, InputState.OK), (timeout - 0.1, InputState.OK),
+                            (0.2, InputState.UNSENT)):
+        rig.run(after)
+        newest = take(rig)
+        assert states() == [expected]
+    for message in newest:
+        rig.feeder.sent(message)
+    assert states() == [InputState.OK]
+
+    # A pause of the input is not one of the line, and a closed link has its own report.
+    take(rig)
+    rig.run(2 * timeout)
+    take(rig)
+    assert states() == [InputState.OK]
+    rig.feeder.set_link(is_open=False)
+    for _ in range(5):
+        rig.run(timeout / 2)
+        take(rig)
+    assert states() == [InputState.OK]
+
+
 def test_speed_and_satellites_are_sent_while_they_are_fresh_re_15_re_30() -> None:
     rig = Rig()
     rig.velocity(3.0, 4.0, 0.0)

@@ -108,7 +108,7 @@ def input_findings(feeder: FeederSnapshot, graph: Topics) -> list[Finding]:
         states = {feeder.inputs[name].state: name for name in reversed(group)}
         if InputState.OK in states:
             continue
-        for state in (InputState.REFUSED, InputState.STALE):
+        for state in (InputState.UNSENT, InputState.REFUSED, InputState.STALE):
             if state in states:
                 name = states[state]
                 findings.append((WARN, why_unused(name, feeder.inputs[name])))
@@ -145,7 +145,10 @@ def shared_topics(graph: Topics) -> Iterable[str]:
 
 
 def why_unused(name: Input, snapshot: InputSnapshot) -> str:
-    """Return why an input that was received is refused or stale, for people."""
+    """Return why an input that was received is refused, stale or not sent, for people."""
+    if snapshot.state is InputState.UNSENT:
+        return (f'~/{name.value}: received, and not sent, since the link has no room: lower the '
+                'rates of the inputs, or raise the baud rate')
     if snapshot.state is InputState.REFUSED or snapshot.age is None:
         return (f'~/{name.value} refused {format_seconds(snapshot.refused_age or 0.0)} ago: '
                 f'{snapshot.refusal}')

@@ -17,7 +17,8 @@ from ...ros.monitor_view import Device, Topic, trigger_key, UNKNOWN
 # The inputs, as /diagnostics names them, and the styles of their states.
 INPUTS = ('fix', 'velocity', 'velocity_with_covariance', 'odometry', 'satellites', 'imu',
           'attitude', 'mount', 'time_reference')
-STYLES = {'ok': 'green', 'missing': 'yellow', 'stale': 'yellow', 'refused': 'bold red'}
+STYLES = {'ok': 'green', 'missing': 'yellow', 'stale': 'yellow', 'unsent': 'bold red',
+          'refused': 'bold red'}
 
 
 def place(device: Device) -> str:
