@@ -65,6 +65,7 @@ class GimbalClient(Payload):
     messages = (Heartbeat, GimbalManagerInformation, GimbalManagerStatus, GimbalDeviceInformation,
                 GimbalDeviceAttitudeStatus)
     sends = (GimbalManagerSetAttitude,)
+    streams = (sends,)
 
     def __init__(self, commands: CommandSender, settings: GimbalSettings) -> None:
         self.events: Listeners[GimbalEvent] = Listeners()

@@ -101,6 +101,7 @@ class GimbalManager(Payload):
     sends = (gimbal.GimbalManagerInformation, gimbal.GimbalManagerStatus,
              gimbal.GimbalDeviceInformation, gimbal.GimbalDeviceSetAttitude,
              GimbalDeviceAttitudeStatus, gimbal.AutopilotStateForGimbalDevice)
+    streams = ((gimbal.GimbalDeviceSetAttitude,),)
 
     def __init__(
         self, commands: CommandSender, settings: ManagerSettings,

@@ -36,6 +36,7 @@ class ManagerWithClient(Payload):
 
     messages = (*GimbalManager.messages, mav.CommandAck)
     sends = (*GimbalManager.sends, *GimbalClient.sends)
+    streams = (*GimbalManager.streams, *GimbalClient.streams)
 
     def __init__(
         self, commands: CommandSender, settings: ManagerSettings, client: GimbalSettings,

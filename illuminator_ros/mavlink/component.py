@@ -51,7 +51,8 @@ class MessageHandler(ABC):
         the command protocol, may be left out.
     :ivar streams: groups of classes of messages that newer ones replace, the most urgent first. A
         group is sent as one when the line has room, and dropped where it has none for
-        :data:`~.conflating_queue.MAX_AGE`; all other messages are sent at once.
+        :data:`~.conflating_queue.MAX_AGE`. All other messages are sent at once, after those of
+        streams for the same target.
     """
 
     messages: Sequence[type[Message]]

@@ -66,7 +66,12 @@ class Sender:
             self._send_now(messages, now)
             return
         dropped = self._streams.dropped
-        self._send_now([one for one in messages if not self._streams.hold(*one, now)], now)
+        at_once: list[tuple[Address, Message]] = []
+        for source, message in messages:
+            if not self._streams.hold(source, message, now):
+                # Messages to one target keep their order.
+                at_once += [*self._streams.take_for(target_of(message)), (source, message)]
+        self._send_now(at_once, now)
         self.is_holding = bool(self._streams)
         while self.is_holding and self.next_deadline() <= now:
             taken = self._streams.take(now)

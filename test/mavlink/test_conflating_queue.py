@@ -5,14 +5,17 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
+from math import nan as NAN
 from typing import Any
 
+from illuminator_ros.gimbal.messages import GimbalManagerSetAttitude
 from illuminator_ros.mavlink.component import Endpoint
-from illuminator_ros.mavlink.conflating_queue import ConflatingQueue
+from illuminator_ros.mavlink.conflating_queue import ConflatingQueue, StreamGroup
 from illuminator_ros.mavlink.dialect import decode
 from illuminator_ros.mavlink.frame import Decoder
-from illuminator_ros.mavlink.messages import Address, heartbeat, Message
+from illuminator_ros.mavlink.messages import Address, CommandLong, heartbeat, Message
 from illuminator_ros.payload.messages import Attitude, GlobalPositionInt, SystemTime
 from support.simulated_link import SimulatedLink
 
@@ -54,6 +57,39 @@ def test_a_pair_replaces_the_second_half_that_was_held_alone() -> None:
     assert queue.dropped == 1
 
 
+def rate(device_id: int, yaw: float, system: int = 1) -> Message:
+    return GimbalManagerSetAttitude(system, 1, 0, device_id, [NAN] * 4, 0.0, 0.0, yaw)
+
+
+def test_setpoints_replace_those_for_their_own_gimbal_only_and_gimbals_take_turns() -> None:
+    queue = ConflatingQueue(((GimbalManagerSetAttitude,),))
+    devices = [(1, 1), (2, 1), (1, 2)]
+    found = []
+    for turn in range(6):
+        for device, system in devices:
+            queue.hold(SOURCE, rate(device, turn, system), 0.0)
+        [(_, sent)] = queue.take(0.0)
+        assert isinstance(sent, GimbalManagerSetAttitude)
+        found.append((sent.gimbal_device_id, sent.target_system, sent.angular_velocity_z))
+
+    assert found == [(*device, turn) for turn, device in enumerate(devices * 2)]
+
+
+def test_a_command_follows_the_setpoints_for_its_target_on_a_busy_line() -> None:
+    command = CommandLong(1, 1, 1000, 0, *[0.0] * 7)
+
+    def make(number: int) -> list[Message]:
+        return [rate(1, 1.0), rate(1, 0.0), command] if number == 20 else [rate(1, number)]
+
+    classes = (GimbalManagerSetAttitude, CommandLong)
+    _, sent, _ = run(RATE, 0.5, Stream(make, 0.005), groups=(classes[:1],), classes=classes)
+    messages = [message for _, message in sent]
+
+    before = messages[messages.index(command) - 1]
+    assert isinstance(before, GimbalManagerSetAttitude)
+    assert before.angular_velocity_z == 0.0
+
+
 @dataclass
 class Stream:
     """Sends a message, or several, again and again."""
@@ -70,7 +106,7 @@ class Sender(Endpoint):
     """Makes a pair each 5 ms, twice the capacity of the line, and 10 positions a second."""
 
     messages = ()
-    streams = GROUPS
+    streams: Sequence[StreamGroup] = GROUPS
 
     def __init__(self, start: float) -> None:
         super().__init__()
@@ -99,19 +135,22 @@ class Sender(Endpoint):
 
 def run(
     rate: float, seconds: float, *streams: Stream,
+    groups: Sequence[StreamGroup] = GROUPS,
+    classes: Sequence[type[Message]] = (GlobalPositionInt, Attitude, SystemTime),
 ) -> tuple[SimulatedLink, list[tuple[float, Message]], int]:
     """Return what a link of a rate sends, when, and how many bytes."""
     sent: list[tuple[float, bytes]] = []
     sender = Sender(1000.0)
+    sender.streams = groups
     sender.due = list(streams) or sender.due
     link = SimulatedLink(sender, lambda data, peer: sent.append((link.now, data)))
     link.udp.rate = rate
     link.udp.heard(('127.0.0.1', 14550), link.now)
     link.run(seconds)
-    classes = {cls.id: cls for group in GROUPS for cls in group}
+    by_id = {cls.id: cls for cls in classes}
     return link, [
-        (at, decode(classes[frame.message_id], frame.payload))
-        for at, data in sent for frame in Decoder().feed(data) if frame.message_id in classes
+        (at, decode(by_id[frame.message_id], frame.payload))
+        for at, data in sent for frame in Decoder().feed(data) if frame.message_id in by_id
     ], sum(len(data) for _, data in sent)
 
 
