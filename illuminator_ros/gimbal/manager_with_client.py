@@ -45,7 +45,8 @@ class ManagerWithClient(Payload):
         self._reports: deque[mav.Message] = deque()
         self.manager = GimbalManager(commands, settings, reported=self._reports.append)
         self._commands = commands
-        own = CommandSender(commands.address, commands.timeout, commands.retries)
+        own = CommandSender(
+            commands.address, commands.timeout, commands.retries, commands.clock_fault)
         self.client = GimbalClient(own, client)
         # It is given no messages: it would drop those of its own address.
         self._component = Component(own, [self.client])

@@ -141,7 +141,8 @@ class CommandResult(NamedTuple):
     :param tries: how often it was sent.
     :param elapsed: s, from the first sending.
     :param progress: %, the last that was reported, None where unknown.
-    :param closed: why the sender was closed, for people, '' if it was not.
+    :param reason: for people: why the sender was closed, or what may have kept the target from an
+        answer; '' if that is not known.
     """
 
     status: CommandStatus
@@ -149,7 +150,7 @@ class CommandResult(NamedTuple):
     tries: int = 0
     elapsed: float = 0.0
     progress: int | None = None
-    closed: str = ''
+    reason: str = ''
 
     @property
     def accepted(self) -> bool:
@@ -168,8 +169,10 @@ class CommandResult(NamedTuple):
         last = '' if self.result is None else f', last answer {messages.result_name(self.result)}'
         if self.progress is not None:
             last += f' at {self.progress} %'
-        closed = self.status is CommandStatus.CLOSED and self.closed
-        return f'{closed or self.status.value}{last}'
+        if self.status is CommandStatus.CLOSED and self.reason:
+            return f'{self.reason}{last}'
+        unheard = self.status is CommandStatus.NO_ANSWER and self.reason
+        return f'{self.status.value}{f" ({unheard})" if unheard else ""}{last}'
 
     def describe_failure(self) -> str:
         """Return why it was not accepted, for people."""
@@ -271,6 +274,8 @@ class CommandSender:
     :param address: our own address, which acknowledgements are matched against.
     :param timeout: s, > 0: the wait for the acknowledgement of the first try.
     :param retries: resends after the first try, >= 0.
+    :param clock_fault: returns why a target may ignore our signed frames, for people; '' in
+        general.
     :ivar outgoing: messages to send, each with the address that sends it.
     :ivar unanswering: the targets whose last command got no acknowledgement, at most
         :data:`MAX_TARGETS`.
@@ -283,6 +288,7 @@ class CommandSender:
     address: Address
     timeout: float = COMMAND.first
     retries: int = int(COMMAND.tries) - 1
+    clock_fault: Callable[[], str] = str
     outgoing: deque[tuple[Address, Message]] = field(default_factory=deque)
     counters: CommandCounters = field(default_factory=CommandCounters)
     unanswering: dict[Address, None] = field(default_factory=dict)
@@ -367,7 +373,7 @@ class CommandSender:
                                self.retries if retries is None else retries,
                                command.position is not None, follow_up)
         if self._is_refused(command):
-            done(CommandResult(CommandStatus.CLOSED, closed=self.refusal), now)
+            done(CommandResult(CommandStatus.CLOSED, reason=self.refusal), now)
         elif now >= deadline:
             done(CommandResult(CommandStatus.OUT_OF_TIME), now)
         else:
@@ -497,7 +503,7 @@ class CommandSender:
             _keep(self.unanswering, pending.command.target, None)
         pending.done(CommandResult(
             status, pending.result, pending.tries, now - pending.first_sent, pending.progress,
-            self.refusal), now)
+            self.refusal or self.clock_fault()), now)
 
 
 def _keep(values: dict[Address, V], target: Address, value: V) -> None:

@@ -32,6 +32,9 @@ NEW_STREAM_TICKS = 60 * TICKS_PER_SECOND
 # battery may start some years behind; a receiver that ignores the rollover of GPS weeks is 19.6
 # years off.
 FOLLOWED_TICKS = 10 * 365 * 86_400 * TICKS_PER_SECOND
+# The clock of a computer without a battery starts in 1970, and is followed at any distance.
+CLOCK_UNSET = ('the clock of this computer is before 2015, so components may refuse our '
+               'signatures until it is set')
 # A clock that is behind the time stamps of this link by less than this counts as correct: another
 # clock was ahead. A clock further behind has no battery.
 CLOCK_TOLERANCE_TICKS = 86_400 * TICKS_PER_SECOND
@@ -125,6 +128,10 @@ class Signing:
         """Whether sent frames are signed."""
         return self.mode is not SigningMode.OFF
 
+    def clock_fault(self, unix_time: float) -> str:
+        """Return why components may ignore our frames, for people; '' in general."""
+        return CLOCK_UNSET if self.signs and unix_time < EPOCH else ''
+
     def sign(self, frame: bytes, unix_time: float) -> bytes:
         """Return the frame with its signature. Its signed flag must already be set."""
         self.timestamp = min(max(self.timestamp + 1, ticks(unix_time)), MAX_TICKS)
@@ -168,8 +175,8 @@ class Signing:
             return False
         self._streams[stream] = stamp
         # A peer with a better clock, or a longer memory, is followed; but not an implausible
-        # clock, after which correct time stamps would count as too old.
-        if stamp <= ticks(unix_time) + FOLLOWED_TICKS:
+        # clock, after which correct time stamps would count as too old. Before 2015 ours is wrong.
+        if unix_time < EPOCH or stamp <= ticks(unix_time) + FOLLOWED_TICKS:
             self.timestamp = max(self.timestamp, stamp)
         return True
 

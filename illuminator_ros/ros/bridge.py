@@ -98,12 +98,13 @@ class Bridge:
         parameters = _link_parameters(node, kinds, url)
         values = [declare_given(own, kind.parameters)
                   for own, kind in zip(nodes, kinds, strict=True)]
+        signing, store = parameters.signing()
         commands = CommandSender(
-            parameters.address, parameters.command_timeout, parameters.command_retries)
+            parameters.address, parameters.command_timeout, parameters.command_retries,
+            lambda: signing.clock_fault(time.time()))
         clients = [kind.make_client(commands, value)
                    for kind, value in zip(kinds, values, strict=True)]
         self._component = Component(commands, clients)
-        signing, store = parameters.signing()
         try:
             (label, first), *further = parameters.urls.items()
             self.link = Link(
@@ -293,6 +294,7 @@ class Bridge:
         self.log.write_conditions(
             [f'{SIGNING_NEEDED}: set signing_mode and signing_key_file'] if needs_signing else [],
             'signing')
+        self.log.write_conditions(filter(None, [self._component.commands.clock_fault()]), 'clock')
         self.log.write_conditions(self._diagnostics.loops(now), 'loop')
         for one in self._served:
             one.payload.poll(now)

@@ -126,6 +126,7 @@ class LinkDiagnostics:
     :param loops: the texts on copies of frames that come over each line.
     :param address_conflict: see :meth:`~..mavlink.component.Component.address_conflict`.
     :param unanswering: the devices whose last command got no acknowledgement.
+    :param clock_fault: see :class:`~..mavlink.command_sender.CommandSender`.
     :param values: the values of the status of each line that are the same for all devices.
     :param devices: values of single devices, by address.
     :param heartbeats: see :attr:`~..mavlink.component.Component.heartbeats`.
@@ -137,6 +138,7 @@ class LinkDiagnostics:
     address: Address
     address_conflict: str
     unanswering: frozenset[Address]
+    clock_fault: str
     values: Sequence[Mapping[str, Value]]
     devices: Mapping[Address, Mapping[str, Value]]
     heartbeats: Mapping[Address, Heartbeat]
@@ -226,7 +228,8 @@ def link_diagnostics(
         lines, [[text for (_, second), text in texts.items() if second == index]
                 for index in range(len(lines))], now, component.address,
         component.address_conflict(now), frozenset(commands.unanswering),
-        [{**values[0], **own}, *values[1:]], devices, {**component.heartbeats})
+        commands.clock_fault(), [{**values[0], **own}, *values[1:]], devices,
+        {**component.heartbeats})
 
 
 def _line_values(
@@ -331,6 +334,8 @@ def link_report(
             ERROR if waited > DISCOVERY_GRACE else WARN,
             f'no {kind} connected for {format_seconds(waited)}'
             + (f': {absence}' if not link.failure else '')))
+    if link.clock_fault:
+        findings.append((WARN, link.clock_fault))
     if device in link.unanswering and link.state.signing.unchecked:
         findings.append((WARN, SIGNING_NEEDED))
     counts = link.state.traffic.sources.get(device) if device else None

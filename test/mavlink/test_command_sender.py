@@ -90,6 +90,16 @@ def test_command_ends_as_its_answers_say(
     assert rig.sender.next_deadline() == math.inf
 
 
+def test_a_command_without_an_answer_names_a_clock_that_is_not_set() -> None:
+    rig = Rig(clock_fault=lambda: 'the clock is wrong')
+    unanswered, refused = rig.start(), rig.start(command=406)
+    rig.ack(DENIED, 406)
+    rig.run()
+
+    assert str(unanswered.outcome) == 'no acknowledgement (the clock is wrong) (4 tries, 2.75 s)'
+    assert 'clock' not in str(refused.outcome)
+
+
 @pytest.mark.parametrize('result', range(256))
 def test_each_result_but_three_ends_a_command_at_once(result: int) -> None:
     rig = Rig()

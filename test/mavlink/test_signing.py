@@ -188,6 +188,18 @@ def test_our_time_stamps_follow_a_peer_that_is_ahead_by_less_than_10_years(
     assert stamp_signed(signing, NOW) == (STAMP + ahead + 1 if followed else STAMP)
 
 
+def test_a_clock_before_2015_follows_a_peer_at_any_distance_and_names_itself() -> None:
+    signing = checker()
+    assert signing.clock_fault(NOW) == ''
+    assert 'clock of this computer is before 2015' in signing.clock_fault(86_400.0)
+
+    assert stamp_signed(signing, 86_400.0) == 1
+    assert signing.accepts(signed(STAMP), 86_400.0)
+    assert stamp_signed(signing, 86_401.0) == STAMP + 1
+    # Old frames of other streams are not valid, though the clock would accept them.
+    assert not signing.accepts(signed(STAMP - 61 * SECOND, link_id=9), 86_401.0)
+
+
 @pytest.mark.parametrize(('ahead', 'accepted'), [(3600, True), (2 * 86_400, False)])
 def test_clock_that_is_right_again_accepts_streams_unless_it_was_not_set(
         ahead: int, accepted: bool) -> None:

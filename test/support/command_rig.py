@@ -5,7 +5,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 import heapq
 import math
@@ -50,10 +50,11 @@ class Rig:
     :ivar frames: everything sent, with the time.
     """
 
-    def __init__(self, *answers: Sequence[int], timeout: float = 0.25, retries: int = 3) -> None:
+    def __init__(self, *answers: Sequence[int], timeout: float = 0.25, retries: int = 3,
+                 clock_fault: Callable[[], str] = str) -> None:
         self.now = 1000.0
         self.frames: list[tuple[float, Any]] = []
-        self.sender = command_sender.CommandSender(OURS, timeout, retries)
+        self.sender = command_sender.CommandSender(OURS, timeout, retries, clock_fault)
         self.runs: list[Run] = []
         self._answers = iter(answers)
         self._acks: list[tuple[float, int, int]] = []
