@@ -68,7 +68,8 @@ def main() -> None:
     rclpy.init(signal_handler_options=SignalHandlerOptions.NO)
     light = Searchlight()
     if not light.enable.wait_for_service(4.0):
-        sys.exit(f'{light.enable.service_name}: no such service')
+        sys.exit(f'{light.enable.service_name}: no such service; nodes in the ROS domain '
+                 f'{light.context.get_domain_id()}: {", ".join(light.get_node_names())}')
     for number in (signal.SIGINT, signal.SIGTERM):
         signal.signal(number, light.stop)
     try:

@@ -45,7 +45,9 @@ class Survey(Node):
 
     def name_missing(self) -> None:
         if not self.capture.service_is_ready():
-            self.get_logger().warning(f'{self.capture.service_name}: no such service')
+            self.get_logger().warning(
+                f'{self.capture.service_name}: no such service; nodes in the ROS domain '
+                f'{self.context.get_domain_id()}: {", ".join(self.get_node_names())}')
         if not self.count_publishers(FIX):
             self.get_logger().warning(f'{self.resolve_topic_name(FIX)}: no publisher')
 

@@ -35,7 +35,7 @@ THREADS = {'threading', 'queue', 'multiprocessing', 'concurrent'}
 # The modules of mavlink/ that do I/O, run a thread or read a clock; all others must not.
 MAVLINK_IO = {
     'transport', 'line', 'lines', 'link', 'link_thread', 'listener', 'connector', 'sender',
-    'serial_search', 'signing_files'}
+    'serial_search', 'signing_files', 'silent_port'}
 PAYLOAD_WORD = re.compile('illuminator|gimbal|camera|rededge|winch|lamp', re.IGNORECASE)
 # A message that several payloads receive.
 SHARED_NAMES = {'GimbalDeviceAttitudeStatus', 'gimbal_device_id'}

@@ -170,6 +170,12 @@ def own_arguments(name: str, arguments: Sequence[str]) -> list[str]:
         raise Refusal(refusal)
     if '--ros-args' not in arguments:
         return list(arguments)
+    ros = arguments[arguments.index('--ros-args'):]
+    for option, value in zip(ros, ros[1:], strict=False):
+        # rcl's own error is "Expected lexeme type (22) not found".
+        if option in ('-p', '--param', '-r', '--remap') and ':=' not in value:
+            first, _, second = value.partition('=')
+            raise Refusal(f'{option} {value}: write {option} {first}:={second or "VALUE"}')
     # Slow to import.
     from rclpy.utilities import remove_ros_args
     with refusing(_wrong_arguments(name)):

@@ -23,6 +23,7 @@ from .link_thread import FaultLog
 from .messages import Address
 from .receiver import Receiver
 from .retries import RESOURCE
+from .silent_port import SilentPort
 from .transport import Channel, Peer
 from .url import Url
 
@@ -104,6 +105,8 @@ class Line:
         # When to connect, s; infinity while the connector tries, and while there is a channel.
         self._connect_at = -math.inf
         self._channel: Channel | None = None
+        self._watch = functools.partial(SilentPort, call=call)
+        self._silent: SilentPort | None = None
         # When the channel is proved without a frame, s.
         self._proven_at = math.inf
         self._announce_at = math.inf
@@ -112,6 +115,11 @@ class Line:
     def is_open(self) -> bool:
         """Return whether there is a channel."""
         return self._channel is not None
+
+    @property
+    def silence(self) -> str:
+        """Return why no frame comes over an open serial port, '' if that is unknown."""
+        return self._silent.reason if self._silent else ''
 
     def stop(self) -> None:
         """Open nothing any more; callable from any thread."""
@@ -126,12 +134,14 @@ class Line:
             receiver.traffic.snapshot(now), copy.copy(receiver.counters),
             copy.copy(receiver.signing.counters),
             self._forwarded,
-            self._not_forwarded + channel.not_forwarded if channel else self._not_forwarded)
+            self._not_forwarded + channel.not_forwarded if channel else self._not_forwarded,
+            self.silence)
 
     def opened(self, channel: Channel, now: float) -> None:
         """Use a channel from now on."""
         self._channel = channel
         self.receiver.leads_to = channel.leads_to
+        self._silent = self._watch(channel.serial, channel) if channel.serial else None
         self._proven_at = now + PROOF_TIME
         self._announce_at = now + ANNOUNCE_INTERVAL
         try:
@@ -210,6 +220,8 @@ class Line:
         if now >= self._announce_at:
             self._announce_at = now + ANNOUNCE_INTERVAL
             self._user.silent(self, now)
+            if self._silent:
+                self._silent.poll(self.receiver.traffic.frames_received, now)
 
     def next_deadline(self) -> float:
         """Return when :meth:`poll` is due."""
@@ -229,7 +241,7 @@ class Line:
 
     def close(self) -> None:
         """Close the channel."""
-        channel, self._channel = self._channel, None
+        channel, self._channel, self._silent = self._channel, None, None
         if channel is None:
             return
         for key in list(self._selector.get_map().values()):
@@ -279,10 +291,15 @@ class Line:
                 channel.writable(handle)
             if events & selectors.EVENT_READ and not self._user.is_behind:
                 for peer, data in channel.receive(handle):
+                    if self._silent and self._silent.is_away:
+                        self._silent.take(data)
+                        continue
                     now = self._clock()
                     frames = self.receiver.take(peer, data, now)
                     if frames is not None:
                         self._handle(channel, peer, frames, now)
+                    elif self._silent:
+                        self._silent.take(data)
                     if (self.receiver.is_behind and channel.has_clients
                             and peer not in channel.peers(now)):
                         self._user.behind(self, peer, now)

@@ -106,6 +106,7 @@ class LinkSnapshot(NamedTuple):
     :param peers: how many have sent an authenticated frame within 10 s.
     :param forwarded: frames of others that were sent, or wait to be sent, over this line.
     :param not_forwarded: frames of others that were then replaced or dropped, by message id.
+    :param silence: why no frame comes over a serial port, for people; '' if that is unknown.
     """
 
     state: LinkState
@@ -119,6 +120,7 @@ class LinkSnapshot(NamedTuple):
     signing: SigningCounters
     forwarded: int
     not_forwarded: Mapping[int, int]
+    silence: str = ''
 
     @property
     def is_open(self) -> bool:

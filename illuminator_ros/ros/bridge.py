@@ -46,6 +46,7 @@ from ..mavlink.component import Component
 from ..mavlink.link import Link
 from ..mavlink.link_state import LinkEvent
 from ..mavlink.retries import RESOURCE
+from ..mavlink.transport.ports import unusual_rate
 from ..payload.payload_type import PayloadType
 
 # s; SIGINT and SIGTERM end the process within 1 s, including these limits and the exit of ROS.
@@ -140,6 +141,8 @@ class Bridge:
         for warning in ignored_parameters(
                 arguments, nodes, {spec.name for spec in specs if spec.restricts},
                 self._of_further_node):
+            self.log.warning(warning)
+        for warning in filter(None, map(unusual_rate, parameters.urls.values())):
             self.log.warning(warning)
         # A period is a whole number of ticks, otherwise some periods would be a tick too long.
         self._tick = parameters.diagnostics_period / math.ceil(
@@ -296,6 +299,8 @@ class Bridge:
             'signing')
         self.log.write_conditions(filter(None, [self._component.commands.clock_fault()]), 'clock')
         self.log.write_conditions(self._diagnostics.loops(now), 'loop')
+        self.log.write_conditions(
+            [line.silence for line in self.link.lines if line.silence], 'silence')
         for one in self._served:
             one.payload.poll(now)
 

@@ -286,6 +286,8 @@ def why_nothing_is_heard(link: LinkDiagnostics, device: str) -> str:
 
     :param device: such as ``a light``.
     """
+    if silence := next((line.silence for line in link.lines if line.silence), ''):
+        return silence
     signing, frames, bytes_ = link.state.signing, link.frames_received, link.bytes_received
     if link.address_conflict:
         return _clash(link)
@@ -306,9 +308,9 @@ def why_nothing_is_heard(link: LinkDiagnostics, device: str) -> str:
         return (f'{frames} frames from {described(link.state.traffic.sources, link.heartbeats)}, '
                 f'none from {device}: check that it is on, and that routers forward its frames')
     if bytes_:
-        return f'{bytes_} bytes received, no valid frame; check the baud rate'
+        return f'{bytes_} bytes received, no valid frame; check the baud rate (discover)'
     return ('nothing is received: check that the device is on, and that it, or a router, sends '
-            'to this address or line')
+            'to this address or line; on a serial line, that TX and RX are not swapped')
 
 
 def link_report(

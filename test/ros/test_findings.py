@@ -208,9 +208,9 @@ UNADDRESSABLE = frame_of(heartbeat(mavlink.MAV_TYPE_ILLUMINATOR), 0, Address(0, 
 
 @pytest.mark.parametrize(('mode', 'received', 'reason'), [
     (SigningMode.OFF, [], 'nothing is received: check that the device is on, and that it, or a '
-     'router, sends to this address or line'),
+     'router, sends to this address or line; on a serial line, that TX and RX are not swapped'),
     (SigningMode.OFF, [bytes(range(90)), spoilt(FOREIGN)],
-     '111 bytes received, no valid frame; check the baud rate'),
+     r'111 bytes received, no valid frame; check the baud rate \(discover\)'),
     (SigningMode.OFF, [FOREIGN, frame_of(heartbeat(mavlink.MAV_TYPE_GCS), 0, Address(255, 190))],
      r'2 frames from 1/1 \(autopilot, PX4\) and 255/190 \(ground station\), none from a light: '
      'check that it is on, and that routers forward its frames'),

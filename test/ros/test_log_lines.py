@@ -186,3 +186,13 @@ def test_tcp_server_that_closes_each_connection_after_a_frame_causes_no_flood_of
             periods = 1 + int(elapsed() / PERIOD)
             assert 0 < bridge.count('link lost') <= periods * (BURST + 1)
             assert len(bridge.lines) < periods * 40
+
+
+def test_a_fraction_as_limit_and_an_unusual_baud_rate_are_warned_of(
+    own_ros: Ros, port: int,
+) -> None:
+    with running_bridge(own_ros.domain, port, max_brightness=0.5, until=(
+            'max_brightness is 0.5 %: it is a percentage, not a fraction'),
+            forward_urls=['serial:///dev/ttyNONE:56700']) as bridge:
+        bridge.wait_for('56700 baud is unusual: is the rate of /dev/ttyNONE 57600?')
+        bridge.wait_for('cannot open /dev/ttyNONE: there is no such port: if it has another name')

@@ -44,7 +44,8 @@ def test_port_in_use_is_named(scheme: str, loopback: str) -> None:
       for scheme in ('udpin', 'udpout', 'tcpin', 'tcpout')
       for name in ('no-such-host.invalid', f'{"x" * 70}.invalid')),
     ('tcp://127.0.0.1:{port}', 'cannot connect to 127.0.0.1:{port}: Connection refused'),
-    ('serial://{path}/nothing:57600', 'cannot open {path}/nothing: No such file or directory'),
+    ('serial://{path}/nothing:57600',
+     'cannot open {path}/nothing: there is no such port: .* discover finds it, .*'),
     ('serial://{path}/file:57600', 'cannot open {path}/file: it is not a serial port'),
     ('serial://{path}:57600', 'cannot open {path}: Is a directory'),
     ('serial://{path}/others:57600', 'cannot open {path}/others: no permission; join its group.+')
@@ -76,7 +77,8 @@ def test_old_pyserial_is_named_with_its_version_and_the_remedy(
 def test_serial_device_is_closed_for_other_programs_while_it_is_open(device: PtyDevice) -> None:
     ours = open_channel(parse_url(f'serial://{device.path}:57600'))
     assert reason(f'serial://{device.path}:57600') == (
-        f'cannot open {device.path}: it is in use by another program')
+        f'cannot open {device.path}: it is in use by a program of another user, which root can '
+        'see: end it, or share its link (doc/routers.md)')
     ours.close()
     open_channel(parse_url(f'serial://{device.path}:57600')).close()
 

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import argparse
 from collections.abc import Callable, Sequence
+from importlib.util import find_spec
 import json
 import os
 import re
@@ -33,6 +34,7 @@ TICK = 0.25
 # Columns of the line that shows the progress.
 WIDTH = 78
 CONSOLE = 'the console of this system, not opened (on a Raspberry Pi: raspi-config, Serial Port)'
+NO_ROS = 'these commands need ROS 2 on the machine that runs them (doc/ros.md)'
 NO_SERIAL = 'no serial port: plug its adapter in; a container needs --device'
 DESCRIPTION = f"""\
 Finds the port of a device, and prints the command to run. It listens to each serial port at
@@ -115,7 +117,8 @@ def run(args: Sequence[str] | None = None) -> int:
         text = json.dumps(reports, indent=2)
     else:
         text = '\n'.join([*(line for one in reports for line in lines(one)),
-                          *([] if serial else [NO_SERIAL])])
+                          *([] if serial else [NO_SERIAL]),
+                          *([] if find_spec('rclpy') else [NO_ROS])])
     written = print_output(_complain, text)
     return 0 if written and any(one['run'] for one in reports) else 1
 

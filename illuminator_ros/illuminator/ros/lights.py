@@ -65,6 +65,8 @@ class Lights(ServedPayload):
             lambda node, log: LightNode(node, host, log, client, geometry.declare(node), limits,
                                         transforms=transforms),
             LightNode.bind)
+        if 0.0 < (limit := host.values['max_brightness']) < 1.0:
+            host.log.warning(f'max_brightness is {limit:g} %: it is a percentage, not a fraction')
         self._second_reported = False
         self._names_due = math.inf
         client.events.subscribe(self._take)

@@ -18,7 +18,7 @@ from typing import cast
 
 from ..forward_queue import ForwardQueue
 from ..frame import Frame
-from ..url import HostPort
+from ..url import HostPort, SerialUrl
 
 # The origin of received bytes, to which an answer can be sent.
 Peer = Hashable
@@ -42,10 +42,18 @@ FORWARD_AHEAD = 0.002
 FORWARD_SHARE = 0.95
 
 
-def cannot_listen(address: HostPort, error: OSError) -> OSError:
-    """Return an error that says why a socket cannot listen, with the remedy if it is in use."""
-    remedy = (' (doc/routers.md: several programs on one link)'
-              if error.errno == errno.EADDRINUSE else '')
+def cannot_listen(
+    address: HostPort, error: OSError, users: Callable[[], str] = str,
+) -> OSError:
+    """
+    Return an error that says why a socket cannot listen, with the remedy if it is in use.
+
+    :param users: returns the programs that use it, for people.
+    """
+    remedy = ''
+    if error.errno == errno.EADDRINUSE:
+        by = users()
+        remedy = f'{by and " by "}{by} (doc/routers.md: several programs on one link)'
     return OSError(error.errno, f'cannot listen on {address}: {error.strerror}{remedy}')
 
 
@@ -62,6 +70,7 @@ class Channel(ABC):
     :ivar more: whether the last read may have left bytes.
     :ivar rate: of the line, bytes/s; infinity where it is not known.
     :ivar free_at: when the line will have sent all written bytes, s.
+    :ivar serial: of a serial port, its URL.
     :ivar has_clients: whether its peers do not hear each other.
     :ivar not_forwarded: frames of others that were replaced or dropped, by message id.
     """
@@ -71,6 +80,7 @@ class Channel(ABC):
     more: bool = False
     rate: float = math.inf
     free_at: float = -math.inf
+    serial: SerialUrl | None = None
     has_clients: bool = False
 
     def __init__(self) -> None:

@@ -8,7 +8,9 @@ from __future__ import annotations
 import contextlib
 import os
 from pathlib import Path
+import termios
 
+from ..rate_scan import RATES
 from ..url import SerialUrl, UdpUrl, Url
 
 # The longest command line of a program that is shown, characters.
@@ -36,6 +38,14 @@ def serial_ports(root: Path = Path('/')) -> dict[str, bool]:
         if os.path.exists(device) and _read(root / 'sys/class/tty' / name / 'type') != '0':
             ports[stable.get(os.path.realpath(device), device)] = name in consoles
     return ports
+
+
+def unusual_rate(url: Url) -> str:
+    """Return a warning of a baud rate that few devices have, such as 56700; '' for others."""
+    if not isinstance(url, SerialUrl) or hasattr(termios, f'B{url.baud}'):
+        return ''
+    nearest = min(RATES, key=lambda rate: abs(rate - url.baud))
+    return f'{url.baud} baud is unusual: is the rate of {url.device} {nearest}?'
 
 
 def users_of(url: Url) -> str:

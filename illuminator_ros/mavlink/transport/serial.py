@@ -20,13 +20,15 @@ import tty
 from typing import Any
 
 from .base import Channel, Peer, StreamChannel
+from .ports import IN_USE, OTHER_USER, users_of
 from ..url import MAVROS_BAUD, PtyUrl, SerialUrl
 
 # 8N1: a start bit, 8 data bits, a stop bit.
 BITS_PER_BYTE = 10
 # Why a port cannot be opened, where the system's own text is wrong or has no remedy.
 REASONS = {
-    **dict.fromkeys((errno.EAGAIN, errno.EBUSY), 'it is in use by another program'),
+    errno.ENOENT: 'there is no such port: if it has another name now, discover finds it, and '
+                  'serial://auto does so by itself',
     errno.ENOTTY: 'it is not a serial port',
     errno.EACCES: 'no permission; join its group, as in "sudo usermod -a -G dialout $USER", and '
                   'log in again',
@@ -58,6 +60,8 @@ def open_serial(url: SerialUrl) -> Channel:
         # The reason why a device cannot be configured is only in the context of its error.
         number = error.errno or (error.__context__ or error).args[0]
         reason = REASONS.get(number) or os.strerror(number) if number in errno.errorcode else error
+        if number in (errno.EAGAIN, errno.EBUSY):
+            reason = f'it is {IN_USE.format(users_of(url) or OTHER_USER)}'
         raise OSError(error.errno, f'cannot open {url.device}: {reason}') from None
     except (ValueError, OSError) as error:
         raise OSError(f'cannot open {url.device} at {url.baud} baud: {error}') from None
@@ -140,7 +144,7 @@ class _SerialChannel(_LineChannel):
 
     def __init__(self, url: SerialUrl, port: Any) -> None:
         # pyserial has no types.
-        self._url, self._port = url, port
+        self.serial, self._device, self._port = url, url.device, port
         super().__init__(port.fileno(), f'serial {url.device} at {url.baud} baud', port.close,
                          rate=url.baud / BITS_PER_BYTE)
 
@@ -150,6 +154,6 @@ class _SerialChannel(_LineChannel):
             self._port.baudrate = baud
             termios.tcflush(self._descriptor, termios.TCIFLUSH)
         except (ValueError, OSError, termios.error) as error:
-            raise OSError(f'{self._url.device} has no {baud} baud: {error}') from None
-        self.name = f'serial {self._url.device} at {baud} baud'
+            raise OSError(f'{self._device} has no {baud} baud: {error}') from None
+        self.name = f'serial {self._device} at {baud} baud'
         self.rate = baud / BITS_PER_BYTE

@@ -14,6 +14,7 @@ import selectors
 import socket
 
 from .base import cannot_listen, Channel, ChannelLost, Peer, resolve, Serve, SocketName
+from .ports import users_of
 from ..url import HostPort, UdpUrl
 
 # Peers that a listening socket sends to. A new peer never replaces a live one.
@@ -70,7 +71,7 @@ class UdpChannel(Channel):
             self._socket.bind(bind)
         except OSError as error:
             self._socket.close()
-            raise cannot_listen(url.bind, error) from None
+            raise cannot_listen(url.bind, error, lambda: users_of(url)) from None
         self.name = 'udp ' + ' to '.join(filter(None, (
             str(HostPort(*self._socket.getsockname()[:2])), str(url.remote or ''))))
 
