@@ -6,8 +6,8 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-import re
 import os
+import re
 import socket
 import threading
 

@@ -64,7 +64,7 @@ def test_a_device_with_another_rate_is_named_with_the_url() -> None:
     assert port.run(5.0).endswith(
         'no valid frame at 57600 baud; MAVLink is heard at 115200: use serial:///dev/ttyUSB0:'
         '115200')
-    # It comes back to the rate of the link, and stays there.
+    # Then it keeps the rate of the link.
     assert [rate for _, rate in port.rates] == [115200, 57600]
     port.run(300.0)
     assert len(port.rates) == 2
