@@ -32,6 +32,8 @@ PEERS = Path(__file__).with_name('peers')
 PATIENCE = 60.0
 # The QoS of the state topics.
 STATE = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
+# Each client of a service receives the answers to all clients, and rclpy's queue of 10 loses some.
+ANSWERS = QoSProfile(depth=100)
 _numbers = itertools.count()
 
 
@@ -142,7 +144,8 @@ class Client(SpunNode):
     def client(self, service: str, type_: type[Any] = SetBool) -> RosClient:
         """Return the client of a service, whether the service exists or not."""
         if service not in self._clients:
-            self._clients[service] = self.node.create_client(type_, service)
+            self._clients[service] = self.node.create_client(
+                type_, service, qos_profile=ANSWERS)
         return self._clients[service]
 
     def call(

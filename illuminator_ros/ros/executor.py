@@ -7,6 +7,8 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from importlib.metadata import version
+import os
+import sys
 import threading
 
 from rclpy.context import Context
@@ -26,7 +28,9 @@ def make_executor(context: Context, log: NodeLog) -> Executor:
     Return rclpy's EventsExecutor, or the SingleThreadedExecutor where rclpy has none.
 
     The EventsExecutor makes no wait set of all entities of the process for each callback. It takes
-    no guard conditions, and it has one thread for each clock that timers use.
+    no guard conditions, and has one thread for each clock that timers use. After an exception in
+    the callback of the first of several waiting messages, it leaves the others until the next ones
+    come (rclpy 7.1.6 and 9.1.2), so a callback must raise none.
     """
     try:
         from rclpy.experimental import EventsExecutor
@@ -34,6 +38,9 @@ def make_executor(context: Context, log: NodeLog) -> Executor:
         log.info(f'rclpy {version("rclpy")} has no EventsExecutor, as 7.1.4 and newer have: '
                  'requests take longer and need more CPU')
         return SingleThreadedExecutor(context=context)
+    # It enables faulthandler, which refuses a closed stderr.
+    if sys.stderr is None:
+        sys.stderr = os.fdopen(os.open(os.devnull, os.O_WRONLY), 'w')
     return EventsExecutor(context=context)
 
 

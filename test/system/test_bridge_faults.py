@@ -120,6 +120,13 @@ def test_reason_is_printed_if_ros_itself_ends_the_start() -> None:
     assert "'rmw_missing_cpp'" in program.log
 
 
+def test_bridge_serves_while_standard_error_is_closed(own_ros: ros.Ros, port: int) -> None:
+    with ended(Program(
+            'sh', '-c', f'exec {sys.executable} -m {BRIDGE} "$@" 2>&-', 'sh',
+            *ros.bridge_arguments(port), env={'ROS_DOMAIN_ID': str(own_ros.domain)})):
+        assert 'no light connected' in own_ros.enable().message
+
+
 @pytest.mark.parametrize(('name', 'descriptors'), [
     *(('bridge', number) for number in (8, 14, 18, 20)), ('monitor', 14)])
 def test_too_few_descriptors_end_the_start_without_a_traceback(
