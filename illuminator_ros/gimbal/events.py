@@ -87,12 +87,26 @@ class ControlChanged(GimbalEvent):
     :param after: None if it is unknown.
     :param ours: whether this component has primary control.
     :param was_lost: whether this component had primary control and has not released it.
+    :param may_turn: whether the gimbal may then still turn at a rate of this component.
     """
 
     before: Control | None
     after: Control | None
     ours: bool
     was_lost: bool
+    may_turn: bool = False
+
+
+@dataclass(frozen=True)
+class RateStopped(GimbalEvent):
+    """
+    A rate has ended 1 s ago and the gimbal may still turn, or such a gimbal stands.
+
+    :param turns: whether the attitudes show that it turns, None if none has come since.
+    """
+
+    stands: bool
+    turns: bool | None
 
 
 @dataclass(frozen=True)
@@ -135,6 +149,9 @@ class GimbalSnapshot:
     :param status_at: when the last GIMBAL_MANAGER_STATUS came, s; -inf if none has.
     :param enforces_control: False if the manager is known to obey components without control.
     :param setpoints_sent: since the gimbal was found, with repetitions.
+    :param unstopped_since: when a rate of this component has ended, if no attitude shows that the
+        gimbal stands, s; None if it stands or another component has control.
+    :param turns: whether the attitudes since then show that it turns, None if they do not tell.
     :param holder: the source of commands that holds it, '' if none does; None without sources.
     :param held_since: when it got this holder, s.
     """
@@ -156,5 +173,7 @@ class GimbalSnapshot:
     status_at: float
     enforces_control: bool
     setpoints_sent: int
+    unstopped_since: float | None
+    turns: bool | None
     holder: str | None = None
     held_since: float = 0.0

@@ -25,11 +25,12 @@ from ..payload.confirmed_command import Done, Result
 from ..payload.device_events import DeviceHeld
 from ..payload.device_property import answer
 from ..payload.messages import GeoPoint, GimbalDeviceAttitudeStatus
-from ..payload.mount_attitude import Wxyz, YawFrame
+from ..payload.mount_attitude import STILL, Wxyz, YawFrame
 from ..payload.rotation import Quaternion, Vector
 
-# s for which a release of control waits until the attitude shows that the gimbal stands.
-STOP_LIMIT = 0.45
+# s for which a release of control waits until an attitude shows that the gimbal stands; and at the
+# end of the process, which has less than a second.
+STOP_LIMIT, STOP_LIMIT_AT_END = 5.0, 0.45
 
 
 @dataclass(frozen=True)
@@ -61,6 +62,7 @@ class Gimbal:
     :param manager: has announced it.
     :param emit: takes its events.
     :ivar was_commanded: whether a user has ever sent it a request or a setpoint.
+    :ivar setpoints: of this component.
     :ivar reports: of its managers and its device; :meth:`update` follows each change of them.
     """
 
@@ -76,9 +78,10 @@ class Gimbal:
         self._settings = settings
         self._emit = emit
         self._requests = GimbalRequests(key, manager, commands)
-        self._setpoints = SetpointStream(
-            self._message, commands.send, settings.setpoint_timeout)
-        self._yaw_lock = YawLock(self._setpoints.hold)
+        self.setpoints = SetpointStream(
+            self._message, commands.send, settings.setpoint_timeout,
+            lambda stands: emit(events.RateStopped(key, stands, self.setpoints.rate_stop.turns)))
+        self._yaw_lock = YawLock(self.setpoints.hold)
         # Whether control must be taken as soon as no component has it.
         self._take_due = False
         # Whether a request for control is under way, or was neither refused nor confirmed.
@@ -113,7 +116,7 @@ class Gimbal:
 
     def take_attitude(self, status: GimbalDeviceAttitudeStatus, now: float) -> None:
         """Take GIMBAL_DEVICE_ATTITUDE_STATUS of the device."""
-        device, setpoints = self.reports.device, self._setpoints
+        device, setpoints = self.reports.device, self.setpoints
         if not device.take_status(status, now):
             return
         self.update(now)
@@ -121,16 +124,15 @@ class Gimbal:
         requests.pose.reported(status, now)
         self._settle(now)
         self._yaw_lock.reported(status, now)
-        setpoints.reported(status, now, may_send=(
-            self.reports.in_control and not (requests.pose.desired or requests.place.desired)))
-        if requests.is_releasing and setpoints.forget_zero():
+        setpoints.reported(status, now)
+        if not setpoints.may_turn:
             requests.release_due = -math.inf
         self._emit(events.AttitudeReceived(
             self.key, device.attitude, device.flags, device.errors))
 
     def update(self, now: float) -> None:
         """Follow changes of the manager, of the connection, and of control."""
-        reports, setpoints = self.reports, self._setpoints
+        reports, setpoints = self.reports, self.setpoints
         if reports.choose(now):
             self._requests.cancel('the manager was lost', now)
             self._settle(now)
@@ -138,18 +140,19 @@ class Gimbal:
         if reports.connect(now):
             self._take_due = self._settings.auto_take_control
         is_first = reports.last_control is None
-        if not reports.update_control(now, is_releasing=self._requests.is_releasing):
+        if not reports.update_control(now, is_releasing=self._requests.is_releasing,
+                                      may_turn=setpoints.may_have_rate):
             return
         if not reports.in_control:
             self._yaw_lock.cancel(self.unavailable(now), now)
         if reports.control is None:
             # The manager that had shown this component in control takes the zero.
             manager = reports.manager
-            setpoints.control_unknown(now, is_heard=manager.liveness.is_heard(now), can_send=(
+            setpoints.control_unknown(now, can_send=(
                 not reports.link_problem and manager.control is not None
                 and manager.control.primary == self._commands.address))
         elif is_first or not reports.in_control:
-            setpoints.control_changed(is_lost=not reports.in_control)
+            setpoints.control_changed(now, is_lost=not reports.in_control)
 
     # Control
 
@@ -183,15 +186,22 @@ class Gimbal:
             self._request_control(True, now, done)
 
     def release_control(self, now: float, done: Done) -> None:
-        """Stop, and release control; succeed only if GIMBAL_MANAGER_STATUS shows it."""
+        """
+        Stop, and release control.
+
+        It succeeds only if an attitude shows that the gimbal stands, and GIMBAL_MANAGER_STATUS
+        that control is released. The end of the process does not wait for that attitude.
+        """
         self._begin(now)
         # Nothing that comes after the zero may turn the gimbal, as ArduPilot would let it.
-        may_turn = self._setpoints.may_turn
+        may_turn = self.setpoints.may_turn
         self._end_commands('superseded by a release of control', now, superseded=True)
-        if may_turn and self.reports.manager.liveness.is_heard(now):
+        reports = self.reports
+        if may_turn and reports.may_have_control and reports.manager.liveness.is_heard(now):
             # No command stops a gimbal everywhere: PX4 reads unset angles as 0.
-            self._setpoints.stop(now)
-            self._requests.release_due = now + STOP_LIMIT
+            self.setpoints.set_rates(STILL, now)
+            self._requests.release_due = now + (
+                STOP_LIMIT_AT_END if self._commands.refusal else STOP_LIMIT)
         self._request_control(False, now, done)
 
     def _request_control(self, take: bool, now: float, done: Done) -> None:
@@ -209,9 +219,8 @@ class Gimbal:
     def _released(self, result: Result) -> Result:
         """Take the result of a release of control."""
         self._requests.release_due = -math.inf
-        if result.success and self._setpoints.may_turn:
-            return result._replace(
-                message=f'{result.message}; no attitude shows that the gimbal stands')
+        if result.success and self.setpoints.may_turn:
+            return result._replace(message=f'{result.message}; {self.setpoints.lack_of_stop}')
         return result
 
     def _settle(self, now: float) -> None:
@@ -219,7 +228,7 @@ class Gimbal:
         for kind, outcome in self._requests.take_outcomes():
             result = outcome.result
             if kind is not None:
-                self._setpoints.request_ended(kind, result, now)
+                self.setpoints.request_ended(kind, result, now)
             else:
                 is_release = outcome.desired.change.params[0] == gimbal.REMOVE_SENDER
                 if result.success or result.refused and not is_release:
@@ -243,7 +252,7 @@ class Gimbal:
     def change_settings(self, settings: GimbalSettings, now: float) -> None:
         """Take other settings: ``setpoint_timeout`` and the time-out of ``sources`` may differ."""
         self._settings = settings
-        self._setpoints.change_timeout(settings.setpoint_timeout, now)
+        self.setpoints.change_timeout(settings.setpoint_timeout, now)
         if settings.sources:
             self.sources.set_lease(settings.sources.timeout)
             self._take_holder(self.sources.poll(now), now)
@@ -294,7 +303,7 @@ class Gimbal:
 
     def _end_commands(self, message: str, now: float, *, superseded: bool = False) -> None:
         """End the setpoint, and the requests that may turn the gimbal or stop it later."""
-        self._setpoints.end(now)
+        self.setpoints.end(now)
         self._requests.cancel_moves(message, now, superseded=superseded)
         self._yaw_lock.cancel(message, now, superseded=superseded)
         self._settle(now)
@@ -310,7 +319,7 @@ class Gimbal:
         elif flag.is_pose:
             requests.cancel_places(message, now, superseded=True)
             self._yaw_lock.cancel(message, now, superseded=True)
-            self._setpoints.suspend(now, SuspendedBy.POSE)
+            self.setpoints.suspend(now, SuspendedBy.POSE)
             requests.set_pose(flag, now, done)
         else:
             requests.cancel_moves(message, now, superseded=True)
@@ -329,7 +338,7 @@ class Gimbal:
         if reason := self.unavailable(now):
             done(Result(False, reason), now)
             return
-        self._setpoints.suspend(now, SuspendedBy.PLACE, is_place=place is not None)
+        self.setpoints.suspend(now, SuspendedBy.PLACE, is_place=place is not None)
         self._requests.set_place(place, now, done, is_stream=is_stream)
         self._settle(now)
 
@@ -350,7 +359,7 @@ class Gimbal:
         ) if frame is YawFrame.EARTH else '')
         if not reason:
             self._requests.cancel_moves('superseded by a setpoint', now, superseded=True)
-            self._setpoints.set_attitude(rotation, frame, now)
+            self.setpoints.set_attitude(rotation, frame, now)
         return reason
 
     def set_angles(self, angles: Vector, frame: YawFrame, now: float) -> str:
@@ -365,7 +374,7 @@ class Gimbal:
             self._begin(now)
             if reason := self.unavailable(now):
                 return reason
-            base, attitude = self._setpoints.attitude(frame), self.reports.device.attitude
+            base, attitude = self.setpoints.attitude(frame), self.reports.device.attitude
             if base is None and attitude is not None:
                 base = attitude.seen_from(frame)
             if base is None:
@@ -386,7 +395,7 @@ class Gimbal:
         reason = self.unavailable(now)
         if not reason:
             self._requests.cancel_moves('superseded by a setpoint', now, superseded=True)
-            self._setpoints.set_rates(rates, now)
+            self.setpoints.set_rates(rates, now)
         return reason
 
     def _message(
@@ -408,11 +417,15 @@ class Gimbal:
 
         self.update(now)
         self._take_holder(self.sources.poll(now), now)
+        if -math.inf < self._requests.release_due <= now and not self._commands.refusal:
+            self._requests.end_release(Result(
+                False, f'{self.setpoints.lack_of_stop}, {STOP_LIMIT:g} s after a rate of zero: '
+                'control is kept, and the zero is sent again'))
         self._requests.poll(now)
         self._yaw_lock.poll(now)
         self._settle(now)
         if self.reports.in_control:
-            self._setpoints.poll(now)
+            self.setpoints.poll(now, may_stop=not self._requests.may_turn)
         control = self.reports.control
         if self._take_due and self.reports.is_connected and control is not None:
             self._take_due = False
@@ -427,16 +440,20 @@ class Gimbal:
             return -math.inf
         return min(self.sources.next_deadline(), self._yaw_lock.next_deadline(),
                    self._requests.next_deadline(), reports.next_deadline(),
-                   self._setpoints.next_deadline() if self.reports.in_control else math.inf)
+                   self.setpoints.next_deadline(may_stop=not self._requests.may_turn)
+                   if reports.in_control else math.inf)
 
     def snapshot(self, now: float) -> events.GimbalSnapshot:
         """Return the gimbal at this moment."""
         reports, device, sources = self.reports, self.reports.device, self.sources
         manager, information = reports.manager, reports.manager.information
+        is_free = reports.control is None or reports.control.primary in (
+            None, self._commands.address)
         return events.GimbalSnapshot(
             self.key, reports.unreachable(now), reports.heard_managers, reports.capabilities,
             device.ranges or (known_ranges(information) if information else None),
             device.identity, device.attitude, device.attitude_at, device.problem, device.flags,
             device.errors, reports.control, reports.control_since, self.reports.in_control,
-            manager.status_at, manager.enforces_control, self._setpoints.sent,
+            manager.status_at, manager.enforces_control, self.setpoints.sent,
+            self.setpoints.unstopped_since if is_free else None, self.setpoints.rate_stop.turns,
             sources.shown_holder, sources.since)

@@ -263,11 +263,12 @@ class GimbalReports:
         self._emit(DeviceConnected(self._key, f'manager {self.manager.address}'))
         return True
 
-    def update_control(self, now: float, *, is_releasing: bool) -> bool:
+    def update_control(self, now: float, *, is_releasing: bool, may_turn: bool) -> bool:
         """
         Report a change of control; return whether it has changed.
 
         :param is_releasing: whether this component is releasing it.
+        :param may_turn: whether the gimbal may turn at a rate of this component.
         """
         before, control = self.last_control, self.manager.known_control(now)
         if control == self.control:
@@ -276,7 +277,8 @@ class GimbalReports:
         self.last_control = control or before
         was_lost = (before is not None and before.primary == self._us and control is not None
                     and not self.in_control and not is_releasing)
-        self._emit(events.ControlChanged(self._key, before, control, self.in_control, was_lost))
+        self._emit(events.ControlChanged(
+            self._key, before, control, self.in_control, was_lost, was_lost and may_turn))
         return True
 
     # Facts
@@ -324,6 +326,11 @@ class GimbalReports:
     def in_control(self) -> bool:
         """Whether this component has primary control, and the manager is heard."""
         return self.control is not None and self.control.primary == self._us
+
+    @property
+    def may_have_control(self) -> bool:
+        """Whether this component has primary control, unless it is known that it has not."""
+        return self.control is None or self.in_control
 
     def lack_of_control(self, now: float) -> str:
         """Return why this component does not control the gimbal, for people; '' if it does."""

@@ -75,7 +75,7 @@ class GimbalRequests:
         caller = Caller(done, now, detail='take control' if take else 'release control')
         message = f'superseded by {desired.change.goal}'
         if take:
-            self._end_release(Result(False, message, superseded=True))
+            self.end_release(Result(False, message, superseded=True))
             self.control.want(desired, now, caller)
         elif now < self.release_due:
             self.control.cancel(message, now, superseded=True)
@@ -88,14 +88,20 @@ class GimbalRequests:
         self.control.want(
             replace(self._release, is_last=bool(self._commands.refusal)), now, caller)
 
-    def _end_release(self, result: Result) -> None:
+    def end_release(self, result: Result) -> None:
         """End a release of control that waits."""
+        self.release_due = -math.inf
         if self._releasing:
             self.control.outcomes.append(
                 Outcome(self._release, result, None, tuple(self._releasing)))
             self._releasing = []
 
     # Poses and places
+
+    @property
+    def may_turn(self) -> bool:
+        """Whether a request is under way that may turn the gimbal."""
+        return bool(self.pose.desired or self.place.desired)
 
     def set_pose(self, flag: Flag, now: float, done: Done) -> None:
         """Turn the gimbal to a pose."""
@@ -135,7 +141,7 @@ class GimbalRequests:
 
     def cancel(self, message: str, now: float, *, superseded: bool = False) -> None:
         """End all requests."""
-        self._end_release(Result(False, message, superseded=superseded))
+        self.end_release(Result(False, message, superseded=superseded))
         self.control.cancel(message, now, superseded=superseded)
         self.cancel_moves(message, now, superseded=superseded)
 

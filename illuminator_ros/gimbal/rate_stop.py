@@ -10,13 +10,15 @@ import math
 
 from .axes import TURNING
 from .messages import rates_of
-from ..mavlink.retries import Retries, ZERO_RATE
+from ..mavlink.retries import Retries, STILL_TURNING, ZERO_RATE
 from ..payload.messages import GimbalDeviceAttitudeStatus
 from ..payload.mount_attitude import MountAttitude
 
 # s; the least time between two attitudes that show whether a device turns, since one may be a copy
 # of the other; and from a zero to the first attitude that counts. Many devices send one in 0.1 s.
 ATTITUDE_SPACING = 0.09
+# s after the end of a rate in which a message with the rate may still arrive.
+LATE_TIME = 1.5
 
 
 class TurningDetector:
@@ -54,19 +56,30 @@ class TurningDetector:
 
 class RateStop:
     """
-    Sends a rate of zero to a device that may turn, until an attitude shows that it stands.
+    Sends the message that ends a rate, until an attitude shows that the device stands.
 
-    The message may be lost, and nothing else would end the rate: the process ends, another manager
-    has the device, or the link was lost. No I/O; times are s.
+    The message may be lost, and nothing else would end the rate: its user is gone, the process
+    ends, another manager has the device, or the link was lost. No I/O; times are s.
 
-    :param ended: called with whether an attitude has shown that, before the time was over.
+    :param told: called with False when :data:`~..mavlink.retries.ZERO_RATE` is over and no
+        attitude has shown that the device stands, with True each time when one shows that.
+    :param lasts: whether it then goes on with :data:`~..mavlink.retries.STILL_TURNING`, and sends
+        the message again if the device turns within :data:`LATE_TIME` by a rate that was late.
+    :ivar is_running: whether the device may turn at the rate, or the rate may be late.
+    :ivar begun: when the rate ended.
+    :ivar turns: whether the device turns, by the attitudes since then; None if none has shown it.
     """
 
-    def __init__(self, ended: Callable[[bool], None]) -> None:
+    def __init__(self, told: Callable[[bool], None], *, lasts: bool = False) -> None:
+        self.is_running = False
+        self.begun = -math.inf
+        self.turns: bool | None = None
+        self._told = told
+        self._lasts = lasts
         self._retries = Retries(ZERO_RATE, math.inf)
-        self._ended = ended
-        self._send: Callable[[], None] = lambda: None
-        self._begun = -math.inf
+        # Whether it must be sent once, even if the device stands: it may end a place, too.
+        self._must_be_sent = False
+        self._send: Callable[[float], None] = lambda now: None
         self._detector = TurningDetector()
 
     @property
@@ -75,42 +88,64 @@ class RateStop:
         return self._retries.due
 
     @property
-    def is_running(self) -> bool:
-        """Whether the zero is being repeated."""
-        return self.due < math.inf
+    def may_turn(self) -> bool:
+        """Whether the device may turn at the rate: no attitude has shown that it stands."""
+        return self.is_running and self.turns is not False
 
-    def begin(self, send: Callable[[], None], now: float, *, was_sent: bool) -> None:
+    def begin(self, send: Callable[[float], None], now: float, *, was_sent: bool = False) -> None:
         """
-        Send the zero, and repeat it.
+        Send the message from now on.
 
         :param was_sent: whether it has just been sent for the first time.
         """
-        self._send, self._begun = send, now
+        self.cancel()
+        self.is_running, self._send, self.begun = True, send, now
+        self._must_be_sent = not was_sent
         self._retries = Retries(ZERO_RATE, now)
         if was_sent:
             self._retries.note_try(now)
+
+    def owe(self, send: Callable[[float], None], now: float) -> None:
+        """Send the message as soon as an attitude shows that the device turns."""
+        self.is_running, self._must_be_sent, self._send, self.begun = True, False, send, now
+        self._retries.stop()
+
+    def cancel(self) -> None:
+        """Send nothing: the device has another setpoint."""
+        self.is_running, self.turns = False, None
+        self._retries.stop()
         self._detector.reset()
-        self.poll(now)
 
     def reported(self, status: GimbalDeviceAttitudeStatus, now: float) -> None:
         """Take a status of the device."""
+        turns = self._detector.turns(status, now)
+        # An earlier status may be older than the message.
+        is_early = now < self.begun + ATTITUDE_SPACING or self._must_be_sent
+        if turns is None or not turns and is_early:
+            return
+        before, self.turns = self.turns, turns
         if not self.is_running:
             return
-        turns = self._detector.turns(status, now)
-        # An earlier status may be older than the zero.
-        if turns is False and now >= self._begun + ATTITUDE_SPACING:
-            self._end(True)
+        if turns:
+            if self.due == math.inf:
+                self._retries = Retries(ZERO_RATE, now)
+        else:
+            self._retries.stop()
+            self.is_running = self._lasts and now < self.begun + LATE_TIME
+            if before is not False:
+                self._told(True)
 
     def poll(self, now: float) -> None:
-        """Send the zero, or end, if that is due."""
+        """Send the message, or note that the time is over, if that is due."""
         if now < self.due:
             return
-        if self._retries.is_spent:
-            self._end(False)
-        else:
+        if not self._retries.is_spent:
             self._retries.note_try(now)
-            self._send()
-
-    def _end(self, stands: bool) -> None:
-        self._retries.stop()
-        self._ended(stands)
+            self._must_be_sent = False
+            self._send(now)
+            return
+        if self._lasts:
+            self._retries = Retries(STILL_TURNING, now)
+        else:
+            self.cancel()
+        self._told(False)

@@ -7,7 +7,6 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-import functools
 import math
 from typing import TypeAlias
 
@@ -134,7 +133,8 @@ class SetpointMixer:
         if zero is not None and zero.has_rates_only:
             zero = (zero if zero.frame is YawFrame.VEHICLE or self._device.accepts_earth_frame(now)
                     else zero.in_vehicle_frame(0.0))
-            self.rate_stop.begin(functools.partial(self._give, zero), now, was_sent=was_sent)
+            self.rate_stop.begin(lambda now: self._give(zero), now, was_sent=was_sent)
+            self.rate_stop.poll(now)
 
     def _rate_stopped(self, stands: bool) -> None:
         if stands:

@@ -11,7 +11,7 @@ from enum import Enum
 import math
 
 from .messages import GimbalManagerSetAttitude
-from .rate_stop import ATTITUDE_SPACING, TurningDetector
+from .rate_stop import RateStop
 from ..mavlink.dialect import mavlink
 from ..payload.confirmed_command import Result
 from ..payload.messages import GimbalDeviceAttitudeStatus
@@ -39,7 +39,7 @@ class SuspendedBy(Enum):
 
 
 class Kind(Enum):
-    """The kinds of setpoints: an ATTITUDE is repeated, and a ZERO if the device still turns."""
+    """The kinds of setpoints."""
 
     ATTITUDE = 'attitude'
     RATE = 'rate'
@@ -53,42 +53,15 @@ class _Setpoint:
     A setpoint that the gimbal may follow.
 
     :param message: None for a place, and for a zero that was not sent.
-    :param due: when it is sent again, s; of a rate or a place, when it ends with a zero.
-    :param ends_rate: whether it ends a rate, unless it is lost: an attitude, or a place until the
-        manager has accepted it.
+    :param due: when an attitude is sent again, or a rate ends with a zero, s.
     :param is_over: whether the gimbal follows a later request.
-    :param stands: whether the last attitude after a zero shows that the gimbal stands.
     """
 
     kind: Kind
     message: GimbalManagerSetAttitude | None = None
     attitude: tuple[Quaternion, YawFrame] | None = None
     due: list[float] = field(default_factory=list)
-    ends_rate: bool = False
     is_over: bool = False
-    stands: bool = False
-
-    @property
-    def moves(self) -> bool:
-        """Whether the gimbal turns until it gets another setpoint."""
-        return self.kind in (Kind.RATE, Kind.PLACE)
-
-    @property
-    def may_have_rate(self) -> bool:
-        """Whether the gimbal may turn at a rate, since the message that ends it may be lost."""
-        if self.kind is Kind.ZERO and not self.stands:
-            return True
-        return bool(self.due) and (self.kind is not Kind.ATTITUDE or self.ends_rate)
-
-    @property
-    def awaits_status(self) -> bool:
-        """
-        Whether it is sent again when the next status of the device comes.
-
-        A status shows that the line is not cut, so an attitude that ends a rate awaits one, too.
-        """
-        return self.kind is Kind.ZERO or (
-            self.kind is Kind.ATTITUDE and self.ends_rate and len(self.due) == 1)
 
 
 class SetpointStream:
@@ -102,23 +75,31 @@ class SetpointStream:
     :param make: returns the message of a setpoint.
     :param send: sends a message.
     :param timeout: from the last rate until a rate of zero is sent.
+    :param told: called with False when the gimbal may go on turning at a rate that has ended, with
+        True when it stands.
     :ivar sent: the number of messages.
+    :ivar rate_stop: sends the message that ends a rate, a zero or an attitude.
     """
 
     def __init__(
         self, make: Callable[[YawFrame, Wxyz, Vector], GimbalManagerSetAttitude],
         send: Callable[[GimbalManagerSetAttitude], None], timeout: float,
+        told: Callable[[bool], None],
     ) -> None:
         self.sent = 0
+        self.rate_stop = RateStop(self._stop_told, lasts=True)
         self._make = make
         self._send_message = send
         self._timeout = timeout
+        self._told = told
+        # Whether it was told that the gimbal may go on turning.
+        self._has_told = False
         self._last: _Setpoint | None = None
-        # The setpoint that the last request of each kind has suspended, and its place.
-        self._suspended: dict[SuspendedBy, tuple[_Setpoint | None, _Setpoint]] = {}
+        # The setpoint that the last request of each kind has suspended, and the place of the
+        # request, None if it has none.
+        self._suspended: dict[SuspendedBy, tuple[_Setpoint | None, _Setpoint | None]] = {}
         self._reported_frame = YawFrame.VEHICLE
         self._attitude_frame, self._attitude_at = YawFrame.VEHICLE, -math.inf
-        self._detector = TurningDetector()
 
     def change_timeout(self, timeout: float, now: float) -> None:
         """Replace the time-out; a rate that lasts ends after it at the latest."""
@@ -127,9 +108,31 @@ class SetpointStream:
             self._last.due = [min(due, now + timeout) for due in self._last.due]
 
     @property
+    def _kind(self) -> Kind | None:
+        return None if self._last is None else self._last.kind
+
+    @property
+    def may_have_rate(self) -> bool:
+        """Whether the gimbal may turn at a rate, since the message that ends it may be lost."""
+        return self._kind is Kind.RATE or self.rate_stop.may_turn
+
+    @property
     def may_turn(self) -> bool:
         """Whether the gimbal may turn at a rate, or towards a place."""
-        return self._last is not None and (self._last.moves or self._last.may_have_rate)
+        return self._kind is Kind.PLACE or self.may_have_rate
+
+    @property
+    def lack_of_stop(self) -> str:
+        """Return that the gimbal may turn, for people."""
+        return ('the gimbal still turns' if self.rate_stop.turns else
+                'no attitude shows that the gimbal stands')
+
+    @property
+    def unstopped_since(self) -> float | None:
+        """Return since when a rate has ended and no attitude shows that the gimbal stands, s."""
+        # A gimbal turns towards an attitude or a place, too.
+        is_stop = self._kind in (Kind.ZERO, None) and self.rate_stop.may_turn
+        return self.rate_stop.begun if is_stop else None
 
     def attitude(self, frame: YawFrame) -> Quaternion | None:
         """Return the last attitude, None if its yaw has another frame or it counts no longer."""
@@ -137,20 +140,37 @@ class SetpointStream:
         return attitude[0] if attitude and attitude[1] is frame else None
 
     def set_attitude(self, rotation: Quaternion, frame: YawFrame, now: float) -> None:
-        """Send an attitude, and send it again after :data:`REPEATS`."""
+        """Send an attitude, and again after :data:`REPEATS`; if it ends a rate, until it has."""
         self._attitude_frame, self._attitude_at = frame, now
-        self._set(_Setpoint(
+        # A rate that has ended may be late.
+        ends_rate = self._kind is Kind.RATE or self.rate_stop.is_running
+        self._last = setpoint = _Setpoint(
             Kind.ATTITUDE, self._make(frame, to_mavlink(rotation, frame), UNSET_VECTOR),
-            (rotation, frame), [now + delay for delay in REPEATS],
-            ends_rate=self._last is not None and self._last.may_have_rate))
+            (rotation, frame), [now + delay for delay in REPEATS])
+        self._send(setpoint)
+        if ends_rate:
+            self.rate_stop.begin(lambda now: self._send(setpoint), now, was_sent=True)
+        else:
+            self.rate_stop.cancel()
 
     def set_rates(self, rates: Vector, now: float) -> None:
         """Send rates, which leave the yaw lock as it is; a zero follows after the time-out."""
-        message = self._make(self._yaw_frame(now), UNSET_QUATERNION, flu_frd(rates))
         if rates == STILL:
-            self._set(_Setpoint(Kind.ZERO, message, due=[now + delay for delay in REPEATS]))
-        else:
-            self._set(_Setpoint(Kind.RATE, message, due=[now + self._timeout]))
+            self._send_zero(now)
+            self.rate_stop.begin(self._send_zero, now, was_sent=True)
+            return
+        self._last = _Setpoint(
+            Kind.RATE, self._make(self._yaw_frame(now), UNSET_QUATERNION, flu_frd(rates)),
+            due=[now + self._timeout])
+        self._has_told = False
+        self.rate_stop.cancel()
+        self._send(self._last)
+
+    def _send_zero(self, now: float) -> None:
+        # The yaw lock may have changed since the last one.
+        self._last = _Setpoint(
+            Kind.ZERO, self._make(self._yaw_frame(now), UNSET_QUATERNION, STILL))
+        self._send(self._last)
 
     def _yaw_frame(self, now: float) -> YawFrame:
         """Return the yaw frame that rates keep, which implies the yaw lock."""
@@ -165,16 +185,13 @@ class SetpointStream:
 
         :param is_place: whether the request points the gimbal at a place.
         """
-        before, place = self._last, _Setpoint(Kind.PLACE)
-        if before is not None and before.may_have_rate and before.kind is not Kind.ZERO:
+        if self.may_have_rate and self._kind in (Kind.RATE, Kind.ATTITUDE):
             self.set_rates(STILL, now)
-            before = self._last
-        elif before is not None and before.kind is Kind.ATTITUDE:
+        before, place = self._last, None
+        if before is not None and before.kind is Kind.ATTITUDE:
             before.due.clear()
         if is_place:
-            place.ends_rate = before is not None and (before.may_have_rate or (
-                before.kind is Kind.PLACE and before.ends_rate))
-            self._last = place
+            self._last = place = _Setpoint(Kind.PLACE)
         elif kind is SuspendedBy.POSE:
             # The flags of a pose clear the lock.
             self._attitude_frame, self._attitude_at = YawFrame.VEHICLE, now
@@ -187,27 +204,24 @@ class SetpointStream:
         """
         Take the result of the last request: the setpoint counts again if it was refused.
 
-        A zero follows a place without an answer that came after a rate, since the zero before it
-        may be lost, too.
+        The zero before a place without an answer, which may be lost, too, is sent again.
         """
         before, place = self._suspended.get(kind, (None, None))
         if result.refused and kind is SuspendedBy.POSE:
             self._attitude_at = -math.inf
-        if result.success and before is not None:
-            before.is_over = True
-        last = self._last
+        if result.success:
+            if kind is SuspendedBy.POSE or place is not None:
+                self.rate_stop.cancel()
+            if before is not None:
+                before.is_over = True
         # Without an answer the gimbal may follow the place.
-        if last is not None and last is place and not result.superseded:
-            if result.success:
-                last.ends_rate = False
-            elif result.refused:
-                last = self._last = before
-                # Another request may have suspended the place.
-                self._suspended = {
-                    one: (before if suspended is place else suspended, its_place)
-                    for one, (suspended, its_place) in self._suspended.items()}
-            if last is not None and last.kind is Kind.PLACE and last.ends_rate:
-                last.due = [now]
+        elif (place is not None and self._last is place and not result.superseded
+                and (result.refused or self.rate_stop.may_turn)):
+            self._last = before
+            # Another request may have suspended the place.
+            self._suspended = {
+                one: (before if suspended is place else suspended, its_place)
+                for one, (suspended, its_place) in self._suspended.items()}
         if self._last is not None and self._last.is_over:
             self._last = None
 
@@ -216,28 +230,15 @@ class SetpointStream:
         self._attitude_frame, self._attitude_at = frame, now
         self.set_rates(STILL, now)
 
-    def stop(self, now: float) -> None:
-        """Send a zero, whose first check is sooner, since control will be released."""
-        self.set_rates(STILL, now)
-        assert self._last is not None
-        self._last.due.insert(0, now + ATTITUDE_SPACING)
-
-    def forget_zero(self) -> bool:
-        """Forget the last zero if an attitude has shown since that the gimbal stands."""
-        has_arrived = self._last is not None and self._last.stands
-        if has_arrived:
-            self._last = None
-        return has_arrived
-
     def end(self, now: float) -> None:
         """Repeat no attitude, and end a rate or a place with a zero once it can be sent."""
-        last = self._last
-        if last is not None and last.kind is not Kind.ZERO:
-            if last.may_have_rate:
-                last.kind = Kind.RATE
-            last.due = [now] if last.moves else []
+        if self.may_turn and not (self._kind is Kind.ZERO and self.rate_stop.is_running):
+            self._last = _Setpoint(Kind.ZERO)
+            self.rate_stop.begin(self._send_zero, now)
+        elif self._last is not None:
+            self._last.due.clear()
 
-    def control_changed(self, *, is_lost: bool) -> None:
+    def control_changed(self, now: float, *, is_lost: bool) -> None:
         """
         Send nothing while another component has control; owe a zero to a gimbal that may turn.
 
@@ -247,75 +248,56 @@ class SetpointStream:
         """
         if not is_lost and self._last is not None:
             return
-        owes = not is_lost or self._last is not None and (
-            self._last.may_have_rate or self._last.ends_rate)
-        self._last = _Setpoint(Kind.ZERO, due=[-math.inf] * len(REPEATS)) if owes else None
+        owes = not is_lost or self.may_have_rate
+        self._last = None
+        if owes:
+            self.rate_stop.owe(self._send_zero, now)
+        else:
+            self.rate_stop.cancel()
 
-    def control_unknown(self, now: float, *, can_send: bool, is_heard: bool) -> None:
-        """
-        Repeat no attitude, and end a rate with a zero, now or when control is known again.
-
-        A manager that is not heard gets both: it may hear the first one.
-        """
-        last = self._last
-        if last is not None and last.may_have_rate:
-            last.kind, last.due = Kind.RATE, [now]
+    def control_unknown(self, now: float, *, can_send: bool) -> None:
+        """Repeat no attitude, and end a rate with a zero, now and when control is known again."""
+        if self.may_have_rate:
+            self._last = _Setpoint(Kind.ZERO)
+            self.rate_stop.begin(self._send_zero, now)
             if can_send:
-                self.set_rates(STILL, now)
-                if not is_heard:
-                    self._last = last
-        elif last is not None:
-            last.due.clear()
+                self.rate_stop.poll(now)
+        elif self._last is not None:
+            self._last.due.clear()
 
-    def reported(
-        self, status: GimbalDeviceAttitudeStatus, now: float, *, may_send: bool,
-    ) -> None:
-        """
-        Take a status of the device, and send a zero again if the device still turns.
+    def _stop_told(self, stands: bool) -> None:
+        """Pass on what is known of a rate that has ended."""
+        if stands is self._has_told and self._kind in (Kind.ZERO, None):
+            self._has_told = not stands
+            self._told(stands)
 
-        :param may_send: whether this component has control, and no request is under way, which may
-            turn the gimbal.
-        """
+    def reported(self, status: GimbalDeviceAttitudeStatus, now: float) -> None:
+        """Take a status of the device."""
         is_locked = status.flags & mavlink.GIMBAL_DEVICE_FLAGS_YAW_LOCK
         self._reported_frame = YawFrame.EARTH if is_locked else YawFrame.VEHICLE
-        last = self._last
-        if not may_send or last is None or not last.due or not last.awaits_status:
-            return
-        turns = self._detector.turns(status, now)
-        if now < last.due[0]:
-            return
-        if last.kind is Kind.ATTITUDE:
-            last.due.clear()
-            self._send(last)
-            return
-        if turns is not None:
-            last.stands = not turns
-            del last.due[0]
-            self._detector.reset()
-        if turns:
-            # The yaw lock may have changed since.
-            last.message = self._make(self._yaw_frame(now), UNSET_QUATERNION, STILL)
-            self._send(last)
+        self.rate_stop.reported(status, now)
 
-    def poll(self, now: float) -> None:
-        """Send what is due; this component must have control."""
+    def poll(self, now: float, *, may_stop: bool) -> None:
+        """
+        Send what is due; this component must have control.
+
+        :param may_stop: whether a zero may be sent again: no request is under way, which may turn
+            the gimbal.
+        """
         last = self._last
-        if last is not None and now >= self.next_deadline():
-            if last.moves:
+        if last is not None and last.due and now >= last.due[0]:
+            if last.kind is Kind.RATE:
                 self.set_rates(STILL, now)
             else:
                 del last.due[0]
                 self._send(last)
+        if may_stop:
+            self.rate_stop.poll(now)
 
-    def next_deadline(self) -> float:
+    def next_deadline(self, *, may_stop: bool) -> float:
         """Return when :meth:`poll` is due, infinity if never."""
-        last = self._last
-        return last.due[0] if last and last.due and not last.awaits_status else math.inf
-
-    def _set(self, setpoint: _Setpoint) -> None:
-        self._last = setpoint
-        self._detector.reset()
-        self._send(setpoint)
+        return min([*(self._last.due[:1] if self._last is not None else ()),
+                    *([self.rate_stop.due] if may_stop else ())], default=math.inf)
 
     def _send(self, setpoint: _Setpoint) -> None:
         assert setpoint.message is not None

@@ -80,10 +80,12 @@ MESSAGE = RetryPolicy('a message that a light acknowledges or refuses, and does 
 GIMBAL_MESSAGE = RetryPolicy('a message of a gimbal or its manager', 1.0, 60.0)
 DEVICE_INFORMATION = RetryPolicy('GIMBAL_DEVICE_INFORMATION, by `gimbal_manager`', 0.5, 5.0)
 ZERO_RATE = RetryPolicy('a rate of zero, until the gimbal stands', 0.1, 0.1, 10)
+STILL_TURNING = RetryPolicy('a rate of zero after these', 1.0, 1.0)
 PING = RetryPolicy('a PING that a service call asks for', 1.0, 1.0, 2)
 CONNECTION = RetryPolicy('the opening of a link, with half of the wait at random', 0.05, 0.5)
 RESOURCE = RetryPolicy('a node or a thread for which the system has no room', 0.5, 0.5)
 
 # In the order of the table in doc/links.md.
 POLICIES = (CONNECTION, COMMAND, REJECTED, STATUS, UNCONFIRMED, STILL_UNCONFIRMED, CLOSING,
-            REQUIRED, MESSAGE, GIMBAL_MESSAGE, DEVICE_INFORMATION, ZERO_RATE, PING, RESOURCE)
+            REQUIRED, MESSAGE, GIMBAL_MESSAGE, DEVICE_INFORMATION, ZERO_RATE, STILL_TURNING, PING,
+            RESOURCE)

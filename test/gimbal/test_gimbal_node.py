@@ -25,6 +25,7 @@ pytest.importorskip('rclpy')
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus  # noqa: E402, I100
 from geometry_msgs.msg import Quaternion as QuaternionMessage  # noqa: E402
 from geometry_msgs.msg import QuaternionStamped, Vector3, Vector3Stamped  # noqa: E402
+from illuminator_ros.gimbal.ros.diagnostics import device_findings  # noqa: E402, I100
 from illuminator_ros.gimbal.ros.gimbals import GIMBAL_PARAMETERS  # noqa: E402, I100
 from illuminator_ros.illuminator.ros.parameters import LIGHT_PARAMETERS  # noqa: E402
 from illuminator_ros.ros.parameters import LINK_PARAMETERS  # noqa: E402
@@ -32,7 +33,7 @@ from rclpy.qos import ReliabilityPolicy  # noqa: E402
 from sensor_msgs.msg import NavSatFix  # noqa: E402
 from std_msgs.msg import Bool, Header, String  # noqa: E402
 from std_srvs.srv import SetBool, Trigger  # noqa: E402
-from support.gimbals import FakeManager, NAN, OTHER, OURS, served_gimbals  # noqa: E402
+from support.gimbals import FakeManager, NAN, OTHER, OURS, Rig, served_gimbals  # noqa: E402
 from support.ports import free_port  # noqa: E402
 from support.processes import ended, Program, slow_python  # noqa: E402
 from support.ros import (  # noqa: E402
@@ -246,17 +247,54 @@ def test_rate_is_sent_and_a_zero_follows_after_a_timeout_that_may_be_set_while_t
         ros: Ros, gimbal: FakeManager) -> None:
     parameters = Parameters(ros, '/gimbal')
     assert parameters.set(setpoint_timeout=60)[0].successful
-    # A device that still turns gets the zero again.
     gimbal.rates = (0.0, 0.0, 0.0)
     take_control(ros, gimbal)
     publish(ros, 'cmd/rate', Vector3Stamped(vector=Vector3(y=0.2, z=-0.1)))
     eventually(lambda: len(gimbal.received) == 1)
 
     assert parameters.set(setpoint_timeout=0.2)[0].successful
-    eventually(lambda: len(gimbal.received) == 2)
+    eventually(lambda: len(gimbal.received) > 1)
 
-    assert [rates_of(one) for one in gimbal.received] == [
-        (0.0, pytest.approx(-0.2), pytest.approx(0.1)), (0.0, 0.0, 0.0)]
+    rate, *zeros = [rates_of(one) for one in gimbal.received]
+    assert rate[1:] == pytest.approx((-0.2, 0.1))
+    assert {*zeros} == {(0.0, 0.0, 0.0)}
+
+
+def test_a_gimbal_that_turns_after_its_rate_is_an_error_and_keeps_control_until_it_stands(
+        ros: Ros, gimbal: FakeManager, program: Program) -> None:
+    take_control(ros, gimbal)
+    gimbal.rates = (0.0, 0.0, 0.2)
+    publish(ros, 'cmd/rate', Vector3Stamped(vector=Vector3(z=-0.2)))
+
+    program.wait_for('gimbal 1/154 still turns, although its rate has ended')
+    status = report(ros, 'after the end of its rate')
+    assert (status.level, status.message.partition(' ')[0]) == (DiagnosticStatus.ERROR, 'turns')
+    answer = trigger(ros, 'release_control')
+    assert (answer.success, answer.message.partition(',')[0]) == (
+        False, 'the gimbal still turns')
+    assert gimbal.primary == OURS
+    gimbal.rates = (0.0, 0.0, 0.0)
+    program.wait_for('gimbal 1/154 stands')
+    assert trigger(ros, 'release_control').success
+
+
+def test_a_gimbal_whose_motion_after_a_rate_is_unknown_is_a_warning(
+        ros: Ros, gimbal: FakeManager) -> None:
+    take_control(ros, gimbal)
+    gimbal.device_reports = False
+    publish(ros, 'cmd/rate', Vector3Stamped(vector=Vector3(z=-0.2)))
+
+    assert report(ros, 'its motion is unknown').level == DiagnosticStatus.WARN
+
+
+def test_a_player_that_takes_control_of_a_gimbal_at_our_rate_is_named_with_that(
+        ros: Ros, gimbal: FakeManager, program: Program) -> None:
+    take_control(ros, gimbal)
+    publish(ros, 'cmd/rate', Vector3Stamped(vector=Vector3(z=-0.2)))
+    eventually(lambda: gimbal.received)
+    gimbal.primary = OTHER
+
+    program.wait_for('1/195 has taken primary control, and it may still turn at a rate of this')
 
 
 @pytest.mark.parametrize(('topic', 'message', 'text'), [
@@ -322,6 +360,16 @@ def test_diagnostics_name_flags_limits_identity_and_control(
     assert logged(program, 'none') == '[INFO]'
     gimbal.reports = False
     assert report(ros, 'no GIMBAL_MANAGER_STATUS for').level == DiagnosticStatus.WARN
+
+
+def test_a_status_that_comes_on_request_only_is_requested_before_it_is_missed() -> None:
+    rig = Rig(FakeManager(primary=OURS, streams=False)).run(4.0)
+    found = []
+    for _ in range(200):
+        rig.run(0.1)
+        found += device_findings(rig.gimbal.snapshot(rig.now), rig.now, interval=0.0)
+
+    assert found == []
 
 
 # Several gimbals, parameters, start and end

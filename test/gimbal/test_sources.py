@@ -18,7 +18,16 @@ from illuminator_ros.payload.confirmed_command import Result
 from illuminator_ros.payload.device_events import DeviceHeld
 from illuminator_ros.payload.mount_attitude import from_mavlink, YawFrame
 import pytest
-from support.gimbals import clear_roi, FakeManager, in_control, OURS, PLACE, Rig, set_neutral
+from support.gimbals import (
+    clear_roi,
+    FakeManager,
+    in_control,
+    OURS,
+    PLACE,
+    Rig,
+    set_neutral,
+    steps,
+)
 
 NAMES = ('safety', 'operator', 'default', 'autonomy')
 TIMEOUT = 2.0
@@ -88,7 +97,7 @@ def test_a_rate_or_a_place_ends_with_the_hold_of_its_source(
 
     # The gimbal stops where it points.
     assert holder(rig) == ''
-    assert [one.angular_velocity_z for one in rig.messages(GimbalManagerSetAttitude)] == [
+    assert steps(one.angular_velocity_z for one in rig.messages(GimbalManagerSetAttitude)) == [
         *sent, 0.0]
 
 

@@ -5,8 +5,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
+import itertools
 import math
 from typing import Any, TypeVar
 
@@ -46,6 +47,7 @@ class FakeManager:
     :ivar applies: whether it executes the commands that it accepts.
     :ivar beat: tenths of a second between its heartbeats.
     :ivar answers: whether it acknowledges commands.
+    :ivar hears: whether anything that is sent reaches it.
     :ivar device_reports: whether the device sends GIMBAL_DEVICE_ATTITUDE_STATUS.
     :ivar received: the received setpoints.
     """
@@ -61,6 +63,7 @@ class FakeManager:
     beat: int = 10
     applies: bool = True
     answers: bool = True
+    hears: bool = True
     alive: bool = True
     device_alive: bool = True
     device_reports: bool = True
@@ -113,7 +116,7 @@ class FakeManager:
         self, source: mav.Address, message: mav.Message,
     ) -> list[tuple[mav.Address, mav.Message]]:
         """Return the answers to a message."""
-        if not self.alive or getattr(message, 'target_system', None) is None:
+        if not (self.alive and self.hears) or getattr(message, 'target_system', None) is None:
             return []
         target = mav.Address(message.target_system, message.target_component)  # type: ignore
         if (isinstance(message, gm.GimbalManagerSetAttitude) and target == self.address
@@ -272,6 +275,11 @@ def served_gimbals(
 ) -> EndpointLink[GimbalEndpoint]:
     """Serve fake managers over UDP, by the clock of this machine unless the link has another."""
     return EndpointLink(f'udpout://127.0.0.1:{port}', GimbalEndpoint(managers), kind=link)
+
+
+def steps(values: Iterable[float]) -> list[float]:
+    """Return values without those that repeat the one before: a zero is sent again."""
+    return [value for value, _ in itertools.groupby(values)]
 
 
 def keys(rig: Rig) -> Sequence[GimbalKey]:

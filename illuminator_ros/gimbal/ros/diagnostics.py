@@ -12,6 +12,7 @@ import math
 from ..axes import CONDITIONS, other_signs
 from ..commands import Control
 from ..events import DeviceIdentity, GimbalKey, GimbalSnapshot
+from ..gimbal_reports import STATUS_REQUEST_DELAY
 from ...mavlink.command_sender import format_seconds
 from ...mavlink.dialect import entry_names, flag_names, mavlink
 from ...mavlink.messages import Address
@@ -19,8 +20,12 @@ from ...payload.mount_attitude import AXES
 from ...ros import diagnostics
 from ...ros.command_sources import HOLDER_VALUES, holder_values
 
-# s; a longer silence is reported: statuses and attitudes come about five times a second.
-SILENCE = 2.0
+# s; a longer silence of the device is reported: attitudes come about five times a second. A status
+# that does not come is requested first.
+ATTITUDE_SILENCE = 2.0
+STATUS_SILENCE = STATUS_REQUEST_DELAY + 1.5
+# s after the end of a rate after which a gimbal that turns is reported.
+STOP_TIME = 1.0
 # The values of the status of a gimbal, with their meanings for the pages. Angles have the signs of
 # ROS.
 DEVICE_VALUES = {
@@ -108,18 +113,25 @@ def device_findings(
     gimbal: GimbalSnapshot, now: float, interval: float,
 ) -> list[diagnostics.Finding]:
     """Return the findings on a gimbal."""
+    attitude_limit = max(ATTITUDE_SILENCE, 3 * interval)
+    findings: list[diagnostics.Finding] = []
+    if gimbal.unstopped_since is not None and now - gimbal.unstopped_since > STOP_TIME:
+        ago = f'{format_seconds(now - gimbal.unstopped_since)} after the end of its rate'
+        findings.append(
+            (diagnostics.ERROR, f'turns {ago}')
+            if gimbal.turns and now - gimbal.attitude_at <= attitude_limit else
+            (diagnostics.WARN, f'its motion is unknown {ago}: no attitude comes'))
     if gimbal.unreachable:
-        return [(diagnostics.ERROR, gimbal.unreachable)]
-    findings: list[diagnostics.Finding] = [
-        (diagnostics.WARN if flag & CONDITIONS else diagnostics.ERROR, name)
-        for flag, name in _single(gimbal.errors)]
+        return [(diagnostics.ERROR, gimbal.unreachable), *findings]
+    findings += [(diagnostics.WARN if flag & CONDITIONS else diagnostics.ERROR, name)
+                 for flag, name in _single(gimbal.errors)]
     if others := gimbal.managers[1:]:
         findings.append((
             diagnostics.WARN, f'managers {", ".join(map(str, others))} announce the gimbal too: '
             f'only {gimbal.managers[0]} is used'))
     for name, at, limit in (
-            ('GIMBAL_DEVICE_ATTITUDE_STATUS', gimbal.attitude_at, max(SILENCE, 3 * interval)),
-            ('GIMBAL_MANAGER_STATUS', gimbal.status_at, SILENCE)):
+            ('GIMBAL_DEVICE_ATTITUDE_STATUS', gimbal.attitude_at, attitude_limit),
+            ('GIMBAL_MANAGER_STATUS', gimbal.status_at, STATUS_SILENCE)):
         if now - at > limit:
             since = f' for {format_seconds(now - at)}' if math.isfinite(at) else ''
             findings.append((diagnostics.WARN, f'no {name}{since}'))

@@ -57,7 +57,8 @@ PUBLICATIONS = (
 REQUESTS: dict[Interface, Callable[[Gimbal, Any, float, Done], None]] = {
     Interface('take_control', Trigger, 'take primary control'):
         lambda gimbal, _, *asked: gimbal.take_control(*asked),
-    Interface('release_control', Trigger, 'stop, and release all control that this node has'):
+    Interface('release_control', Trigger, 'stop, and release all control that this node has once '
+              'the gimbal stands'):
         lambda gimbal, _, *asked: gimbal.release_control(*asked),
     Interface('neutral', Trigger, 'turn to the neutral position'):
         lambda gimbal, _, *asked: gimbal.set_flag(NEUTRAL, *asked),
@@ -78,7 +79,8 @@ CMD_ANGLES = Interface(
     ros_node.SWITCH_QOS)
 CMD_RATE = Interface(
     'cmd/rate', Vector3Stamped, 'rates of roll, pitch and yaw, rad/s; `frame_id` is not read. '
-    'Refused beyond 2 pi. Zero is sent once when no message comes for `setpoint_timeout`')
+    'Refused beyond 2 pi. When no message comes for `setpoint_timeout`, zero is sent until an '
+    'attitude shows that the gimbal stands')
 CMD_ROI = Interface(
     'cmd/roi', NavSatFix, 'a place to point at (MAV_CMD_DO_SET_ROI_LOCATION); its altitude is '
     'above the ellipsoid', ros_node.SWITCH_QOS)
@@ -173,11 +175,18 @@ class GimbalNode:
                 if after is not None and event.was_lost:
                     reason = (f'lost: {after.primary} has taken primary control' if after.primary
                               else 'ended: no component has primary control')
-                    warn(f'control of {name} {reason}; setpoints have stopped, ~/take_control '
-                         'takes it back', 'control')
+                    turns = ', and it may still turn at a rate of this node' * event.may_turn
+                    warn(f'control of {name} {reason}{turns}; setpoints have stopped, '
+                         '~/take_control takes it back', 'control')
                 elif after is not None and after != before:
                     self._log.info(f'control of {name}: {after}', 'control')
                 self._publish_control(after, event.ours)
+            case events.RateStopped(stands=True):
+                self._log.info(f'{name} stands', 'stop')
+            case events.RateStopped(turns=turns):
+                warn(f'{name} {"still turns" if turns else "may still turn: no attitude comes"}, '
+                     'although its rate has ended: a rate of zero is sent until an attitude shows '
+                     'that it stands', 'stop')
             case events.SecondManager(manager=manager, other=other):
                 warn(f'manager {other} announces {name} too: only {manager} is used, but both may '
                      'move it; disable one', 'manager')

@@ -108,13 +108,16 @@ class Gimbals(ServedPayload):
     def shut_down(self, now: float, report: ShutdownReport) -> None:
         """See :meth:`ServedPayload.shut_down`: release all gimbals under our control."""
         def done(key: GimbalKey, result: Result, now: float) -> None:
-            severity = logging.INFO if result.success else logging.ERROR
-            report(key, severity, f'gimbal {key}: {result.message}')
+            stands = result.success and not gimbals[key].setpoints.may_turn
+            report(key, logging.INFO if stands else logging.ERROR,
+                   f'gimbal {key}: {result.message}')
 
-        for gimbal in self._client.gimbals.values():
+        gimbals = self._client.gimbals
+        for gimbal in gimbals.values():
             if gimbal.has_any_control:
+                turns = '; it may still turn' * gimbal.setpoints.may_turn
                 report(gimbal.key, None, f'this node may still control gimbal {gimbal.key}: '
-                                         'no confirmation in time')
+                                         f'no confirmation in time{turns}')
                 gimbal.release_control(now, functools.partial(done, gimbal.key))
 
 
