@@ -181,7 +181,6 @@ BOTH = 'bridge URL --ros-args -p payloads:="[illuminator, gimbal]"'
     (Codec(), [(MOUNT, GIMBAL_BEAT), (AUTOPILOT, ARDUPILOT_BEAT)],
      {'1/1': 'autopilot, ArduPilot', '1/154': 'gimbal'}, ['gimbal URL']),
     (Codec(version=1), [(CAMERA, CAMERA_BEAT)], {'1/100': 'MicaSense camera'}, ['rededge URL']),
-    (Codec(version=1), [(LIGHT, LIGHT_BEAT)], {'1/243': 'light'}, ['bridge URL']),
 ])
 def test_each_component_has_its_kinds_and_the_port_its_command(
     tmp_path: Path, codec: Codec, sent: list[tuple[Address, Message]], kinds: dict[str, str],
@@ -213,6 +212,18 @@ def test_without_a_served_device_the_report_says_what_a_program_that_sends_may_f
         f'{line.url}:57600',
         '  1/1      autopilot, ArduPilot             MAVLink 2              2.0 frames/s',
         f'  {report["trouble"]}', f'  try: {report["try"][0]}']
+
+
+def test_a_light_on_a_line_of_mavlink_1_has_a_remedy_and_a_camera_beside_it_its_command(
+    tmp_path: Path,
+) -> None:
+    codec, line = Codec(version=1), Line(tmp_path)
+    report = line.listen(
+        lambda: frames(codec, (LIGHT, LIGHT_BEAT), (CAMERA, CAMERA_BEAT)))
+
+    assert report['run'] == [f'ros2 run illuminator_ros rededge {line.url}:57600']
+    assert report['try'] == [f'ros2 run illuminator_ros bridge {line.url}:57600']
+    assert report['trouble'].startswith('only MAVLink 1 is heard, which cannot carry')
 
 
 def test_noise_and_silence_have_their_likely_causes(tmp_path: Path) -> None:

@@ -14,9 +14,13 @@ from ...mavlink.component_kinds import AUTOPILOT, GIMBAL, LIGHT, MANAGER, MICASE
 from ...mavlink.listener import Listener, NOT_ASKED
 from ...mavlink.url import SerialUrl
 
+CAMERA = ['rededge']
 SERVED = {LIGHT, MANAGER, GIMBAL, MICASENSE}
 NOT_SERVED = ('none of these is a light, a gimbal or a MicaSense camera; an autopilot or router '
               'may forward their frames only to a program that sends, unlike this one')
+ONLY_VERSION_1 = ('only MAVLink 1 is heard, which cannot carry the messages of a light or a '
+                  'gimbal: set the device, or the router, to MAVLink 2 (ArduPilot: '
+                  'SERIALn_PROTOCOL 2). Some devices change to it once a program sends it')
 
 
 def report(port: Listener) -> dict[str, Any]:
@@ -29,17 +33,20 @@ def report(port: Listener) -> dict[str, Any]:
          'served': not SERVED.isdisjoint(known[address])}
         for address, one in sorted(port.components.items())]
     payloads = payloads_for({kind for one in known.values() for kind in one})
+    only_version_1 = all(one.versions == {1} for one in port.components.values())
+    unsure = [names for names in payloads if only_version_1 and names != CAMERA]
     signed = any(one['served'] and one['signed'] for one in components)
     trouble = port.trouble or (
-        port.silence() if not components else '' if payloads else NOT_SERVED)
+        port.silence() if not components else ONLY_VERSION_1 if unsure else
+        '' if payloads else NOT_SERVED)
     return {
         'port': port.label,
         'url': url_of(port) if components else '',
         'trouble': trouble,
         'components': components,
-        'run': [_command(port, names, signed) for names in payloads],
-        'try': [_command(port, ['illuminator', 'gimbal'], False)]
-        if trouble in (NOT_SERVED, NOT_ASKED) else [],
+        'run': [_command(port, names, signed) for names in payloads if names not in unsure],
+        'try': [_command(port, names, signed) for names in (
+            [['illuminator', 'gimbal']] if trouble in (NOT_SERVED, NOT_ASKED) else unsure)],
     }
 
 
@@ -73,7 +80,7 @@ def payloads_for(found: set[str]) -> list[list[str]]:
     managed = MANAGER in found or {GIMBAL, AUTOPILOT} <= found
     shared = [*(['illuminator'] if LIGHT in found else []),
               *(['gimbal'] if managed else ['gimbal_manager'] if GIMBAL in found else [])]
-    return [*([shared] if shared else []), *([['rededge']] if MICASENSE in found else [])]
+    return [*([shared] if shared else []), *([CAMERA] if MICASENSE in found else [])]
 
 
 def lines(report: dict[str, Any]) -> Iterator[str]:
