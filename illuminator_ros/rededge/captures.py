@@ -45,6 +45,13 @@ class _Capture:
     def due(self) -> float:
         return self.sent_at + CAPTURE_TIMEOUT
 
+    def described(self, now: float) -> str:
+        """Return how far it has come, for people."""
+        heard = ('the camera has not answered' if self.index is None else
+                 f'image {self.index} was triggered')
+        return (f'another capture is under way since {format_seconds(now - self.sent_at)}: '
+                f'{heard}; it ends within {format_seconds(max(self.due - now, 0.0))}')
+
 
 class Captures:
     """
@@ -69,7 +76,7 @@ class Captures:
     def request(self, shot: rededge.Shot, target: Address, now: float, done: PingDone) -> None:
         """Take an image; succeed only after its CAMERA_FEEDBACK."""
         if self._capture is not None:
-            done(False, 'another capture is under way')
+            done(False, self._capture.described(now))
             return
         self._capture = _Capture(now, done)
         # The manufacturer recommends 1 for session and zoom_pos.

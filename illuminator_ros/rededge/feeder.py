@@ -23,6 +23,7 @@ from .input_states import (
     InputSnapshot,
     InputState,
     InputStates,
+    NANO,
     PAIR,
     PositionSource,
     Stamp,
@@ -38,7 +39,6 @@ from ..payload.rotation import Quaternion, Vector
 
 # s
 GPS_STATUS_INTERVAL = 1.0
-NANO = 1_000_000_000
 ENU = Quaternion(1.0, 0.0, 0.0, 0.0)
 # The first ROS time, ns, whose seconds do not fit into the int32 of a stamp.
 END_OF_STAMPS = 2**31 * NANO

@@ -5,9 +5,10 @@
 
 from __future__ import annotations
 
+from collections import deque
 from collections.abc import Iterator, Mapping, Sequence
 import contextlib
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from enum import Enum
 import math
 from typing import NamedTuple
@@ -18,6 +19,9 @@ from ..payload.rotation import Vector
 
 # s for which the offset of UTC from ROS time holds.
 TIME_REFERENCE_LIFETIME = 60.0
+NANO = 1_000_000_000
+# The last messages of an input; most of them may be refused though it is not stale.
+RECENT_MESSAGES = 10
 UNKNOWN: Vector = (math.nan, math.nan, math.nan)
 
 
@@ -112,6 +116,7 @@ class InputSnapshot:
     :param refusal: why the last refused message was refused, '' if no message was.
     :param refused_age: the time since that message, s; None if no message was refused.
     :param refused: the number of refused messages.
+    :param refused_lately: how many of the last :data:`RECENT_MESSAGES`.
     """
 
     state: InputState
@@ -119,6 +124,7 @@ class InputSnapshot:
     refusal: str
     refused_age: float | None
     refused: int
+    refused_lately: int
 
 
 @dataclass
@@ -137,6 +143,8 @@ class _Tracker:
     refused_at: float = -math.inf
     refusal: str = ''
     refused: int = 0
+    # Whether each of the last messages was refused.
+    lately: deque[bool] = field(default_factory=lambda: deque(maxlen=RECENT_MESSAGES))
 
     def is_fresh(self, now: float) -> bool:
         return now < self.accepted_at + self.timeout
@@ -154,7 +162,8 @@ class _Tracker:
     def snapshot(self, now: float) -> InputSnapshot:
         accepted, refused = (now - at if at > -math.inf else None
                              for at in (self.accepted_at, self.refused_at))
-        return InputSnapshot(self.state(now), accepted, self.refusal, refused, self.refused)
+        return InputSnapshot(self.state(now), accepted, self.refusal, refused, self.refused,
+                             sum(self.lately))
 
 
 class InputStates:
@@ -176,7 +185,9 @@ class InputStates:
         except ValueError as error:
             tracker.refused += 1
             tracker.refused_at, tracker.refusal = now, str(error)
+            tracker.lately.append(True)
             return
+        tracker.lately.append(False)
         tracker.accepted_at = now
         if stamp is not None:
             tracker.last = stamp.time
@@ -208,7 +219,9 @@ class InputStates:
         if stamp.age < -tracker.timeout:
             raise ValueError(f'its stamp is {format_seconds(-stamp.age)} ahead of the ROS clock')
         if tracker.last is not None and stamp.time <= tracker.last:
-            raise ValueError('its stamp is not newer than the last')
+            whole = stamp.time % NANO == 0 and stamp.time == tracker.last
+            raise ValueError('its stamp is not newer than the last'
+                             + (', since its stamps are whole seconds' if whole else ''))
 
     def clock_jumped(self) -> None:
         """Compare no stamp with those from before a jump of ROS time."""

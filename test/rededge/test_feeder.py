@@ -151,6 +151,24 @@ def test_an_input_without_a_sent_message_within_its_timeout_is_lacking_re_29(
     assert states() == [InputState.OK]
 
 
+def test_fixes_stamped_in_whole_seconds_are_mostly_refused_with_the_reason() -> None:
+    rig = Rig()
+
+    def refused_lately() -> int:
+        return rig.feeder.snapshot(rig.now).inputs[Input.FIX].refused_lately
+
+    for _ in range(20):
+        rig.run(0.2)
+        rig.fix()
+    assert refused_lately() == 0
+    for _ in range(20):
+        rig.run(0.2)
+        rig.fix(age=(rig.clock + rig.now) % 1.0)
+    assert refused_lately() == 8
+    assert rig.state(Input.FIX)[1] == (
+        'its stamp is not newer than the last, since its stamps are whole seconds')
+
+
 def test_speed_and_satellites_are_sent_while_they_are_fresh_re_15_re_30() -> None:
     rig = Rig()
     rig.velocity(3.0, 4.0, 0.0)
@@ -229,6 +247,7 @@ def test_an_old_or_early_message_is_refused_and_one_that_another_has_overtaken_r
         assert found.refused_age == pytest.approx(limit)
 
     rig = Rig()
+    rig.clock += 0.5
     assert rig.state(name) == (InputState.MISSING, '')
     take(rig, 0.0)
     for age in (0.0, 0.1):

@@ -11,14 +11,19 @@ from typing import Any
 
 from builtin_interfaces.msg import Time
 from geometry_msgs.msg import Quaternion, Vector3
+from illuminator_ros.mavlink.messages import Address
 from illuminator_ros.rededge.conversions import Position
-from illuminator_ros.rededge.input_states import Stamp
+from illuminator_ros.rededge.feeder import Feeder
+from illuminator_ros.rededge.input_states import CameraSettings, Stamp
 from illuminator_ros.rededge.ros import inputs
+from illuminator_ros.rededge.ros.diagnostics import input_findings
 from illuminator_ros.rededge.ros.inputs import StampReader
 import pytest
 from rclpy.time import Time as RosTime
 from sensor_msgs.msg import Imu, NavSatFix, NavSatStatus
 from std_msgs.msg import Header
+
+EPOCH = 1_700_000_000_000_000_000
 
 
 class Clock:
@@ -114,3 +119,14 @@ def test_messages_tell_what_they_do_not_know() -> None:
     orientation, rates = inputs.orientation_and_rates(turned)
     assert orientation is None
     assert math.isnan(rates[0])
+
+
+def test_an_input_most_of_whose_messages_are_refused_is_a_warning_with_the_reason() -> None:
+    feeder = Feeder(CameraSettings(), lambda message: None, lambda: Address(1, 100))
+    here = Position(0, 47.0, 8.0, 500.0)
+    for refused in range(9):
+        feeder.take_fix(here, Stamp(EPOCH, 0.0), 0.0)
+        found = [text for _, text in input_findings(feeder.snapshot(0.0), {}) if '~/fix' in text]
+        assert found == ([] if refused < 6 else [
+            f'~/fix: {refused} of the last 10 messages were refused: its stamp is not newer than '
+            'the last, since its stamps are whole seconds'])

@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 from ..client import CameraSnapshot
 from ..feeder import FeederSnapshot
-from ..input_states import Input, InputSnapshot, InputState
+from ..input_states import Input, InputSnapshot, InputState, RECENT_MESSAGES
 from ...mavlink.command_sender import format_seconds
 from ...mavlink.dialect import mavlink
 from ...ros.diagnostics import (
@@ -107,6 +107,11 @@ def input_findings(feeder: FeederSnapshot, graph: Topics) -> list[Finding]:
     for group in (*feeder.needed, *((name,) for name in Input if name in optional)):
         states = {feeder.inputs[name].state: name for name in reversed(group)}
         if InputState.OK in states:
+            name = states[InputState.OK]
+            one = feeder.inputs[name]
+            if one.refused_lately > RECENT_MESSAGES / 2:
+                findings.append((WARN, f'~/{name.value}: {one.refused_lately} of the last '
+                                       f'{RECENT_MESSAGES} messages were refused: {one.refusal}'))
             continue
         for state in (InputState.UNSENT, InputState.REFUSED, InputState.STALE):
             if state in states:
