@@ -76,46 +76,53 @@ def ignored_parameters(
     Return a warning for each given section that matches no node, and parameter without effect.
 
     A section with a wildcard that has no parameter of ours is meant for other nodes: only names
-    that resemble one of ours count there.
+    that resemble one of ours count there. A file with another section that matches a node is for
+    several processes, whose sections need no warning unless they restrict something.
 
     :param nodes: those that exist at the start.
     :param restrictions: names of parameters that must not be ignored.
     :param of_further_node: returns the parameters of a node that is made later, given its name
         without namespace; None if no node may have that name.
-    :raises ParameterError: if a restriction is ignored, a connection URL is misspelt or given for
-        a wrong one of our nodes, or a file cannot be read. A section may be for the node of
-        another process with the same file: if it has restrictions, a section for one of our nodes
-        by its name must have them, too; its connection URL is that of another link.
+    :raises ParameterError: if a restriction is ignored that is not in a file for several
+        processes, a connection URL is misspelt or given for a wrong one of our nodes, or a file
+        cannot be read.
     """
     known = {node.get_fully_qualified_name(): frozenset(node.list_parameters([], 0).names)
              for node in nodes}
     namespace, ours = nodes[0].get_namespace().rstrip('/'), {node.get_name() for node in nodes}
     all_names = frozenset().union(*known.values())
     warnings: dict[str, None] = {}
-    sections = [*_sections(arguments)]
-    restricted_here = frozenset().union(*(
-        section.names for section in sections
-        if not section.has_wildcard and any(map(section.matches, known))))
-    for section in sections:
+
+    def declared_for(section: _Section) -> Set[str] | None:
+        """Return the parameters of the nodes that a section matches, None if it matches none."""
         found = [names for node, names in known.items() if section.matches(node)]
         last = ''.join(section.parts[-1:])
         further = of_further_node(last)
         if further is not None and section.matches(f'{namespace}/{last}'):
             found.append(_OF_RCLPY | further)
-        if not found:
-            here = f'the name here is {", ".join(known)}'
-            lost = restrictions & section.names - (
-                restricted_here if section.is_file else frozenset())
-            if lost:
+        return frozenset().union(*found) if found else None
+
+    def is_for_others(section: _Section, declared: Set[str]) -> bool:
+        return (section.is_file and section.has_wildcard
+                and declared.isdisjoint(section.names - _OF_RCLPY))
+
+    sections = [(section, declared_for(section)) for section in _sections(arguments)]
+    our_files = {section.place for section, declared in sections
+                 if section.is_file and declared is not None
+                 and not is_for_others(section, declared)}
+    for section, declared in sections:
+        if declared is None:
+            lost = ', '.join(sorted(restrictions & section.names))
+            where, here = f'{section.place} {section.pattern} matches no node', ', '.join(known)
+            is_ours = section.place in our_files
+            if lost and not is_ours:
                 raise ParameterError(
-                    f'{section.place} {section.pattern} matches no node; {here}, where '
-                    f'{", ".join(sorted(lost))} would have no effect')
-            warnings[f'{section.place} {section.pattern} matches no node and is ignored; '
-                     f'{here}'] = None
+                    f'{where}; the name here is {here}, where {lost} would have no effect')
+            if lost or not is_ours:
+                warnings[f'{where} and is ignored{lost and f", with its {lost}"}; the name here '
+                         f'is {here}'] = None
             continue
-        declared = frozenset().union(*found)
-        is_shared = (section.is_file and section.has_wildcard
-                     and declared.isdisjoint(section.names - _OF_RCLPY))
+        is_shared = is_for_others(section, declared)
         for name in sorted(section.names - declared):
             # A file may nest the node's name below ros__parameters instead of above it.
             head, _, rest = name.partition('.')
