@@ -106,9 +106,9 @@ class Report(NamedTuple):
                 text = f'{value:.6g}' if isinstance(value, float) else str(value)
                 values.append(KeyValue(
                     key=key, value=text.lower() if isinstance(value, bool) else text))
-        # The name leaves out the namespace.
+        # /diagnostics is one topic for all namespaces, and tools know a status by its name alone.
         return DiagnosticStatus(
-            level=self.level, name=f'{node.rpartition("/")[2]}: {self.name}',
+            level=self.level, name=f'{node.removeprefix("/")}: {self.name}',
             hardware_id=self.hardware_id,
             message='; '.join(text for _, text in worst_first) or self.fine, values=values)
 

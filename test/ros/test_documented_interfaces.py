@@ -10,6 +10,7 @@ from importlib import import_module
 import json
 from pathlib import Path
 import re
+import subprocess
 from typing import Any
 import xml.etree.ElementTree as ET
 
@@ -334,9 +335,25 @@ def groups(status: str) -> list[str]:
             if any(re.fullmatch(pattern, status) for pattern in one['regex'])]
 
 
+@pytest.mark.parametrize(('file', 'name'), [
+    ('bag_qos.yaml', '^/\\w+/'), ('foxglove_layout.json', '"/(?!diag)\\w+/'),
+    ('plotjuggler_layout.xml', '(?<=[";/])/?(?:illuminator|uav1/illuminator)[/:]')])
+def test_commands_of_the_ros_page_give_the_files_of_tools_for_a_namespace(
+        file: str, name: str) -> None:
+    [command] = re.findall(rf'^(sed .* {file}) >', (ROOT / 'doc/ros.md').read_text(), re.MULTILINE)
+    made = subprocess.run(command, shell=True, cwd=CONFIG, check=True, capture_output=True,
+                          text=True).stdout
+    before, after = (re.findall(name, text, re.MULTILINE)
+                     for text in ((CONFIG / file).read_text(), made))
+
+    assert len(before) == len(after) > 0
+    assert all('uav1/' in one for one in after)
+
+
 def test_aggregator_takes_each_status_of_all_devices_and_no_others(running: Running) -> None:
-    assert {group: {name for name in names if groups(name) == [group]}
-            for group, names in STATUSES.items()} == STATUSES
+    for namespace in ('', 'uav1/', 'fleet/uav1/'):
+        assert {group: {name for name in names if groups(namespace + name) == [group]}
+                for group, names in STATUSES.items()} == STATUSES
     assert all(map(groups, running.reported))
     assert set(ANALYZERS['lights']['expected']) <= STATUSES['lights']
     assert not any(map(groups, (

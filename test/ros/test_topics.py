@@ -173,7 +173,7 @@ def test_all_names_follow_namespace_node_name_and_remapping(
         array = recorder.wait(lambda array: len(array.status) == 2)
 
         eventually(lambda: set(remapped) <= foreign())
-        name = node.rpartition('/')[2]
+        name = node.removeprefix('/')
         assert [status.name for status in array.status] == [f'{name}: link', f'{name}: lamp']
         assert foreign() == {'/parameter_events', '/rosout', diagnostics, *remapped}
 

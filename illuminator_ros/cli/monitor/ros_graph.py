@@ -147,7 +147,6 @@ class GraphDevice(Device):
     def diagnose(self, status: DiagnosticStatus, values: dict[str, str]) -> None:
         """Take a status of the diagnostics."""
         self.heard_at = self.now
-        # The name of the status has the node's name without its namespace.
         kind = sane(status.name.rpartition(': ')[2])
         if kind in self.diagnoses or len(self.diagnoses) < MAX_DIAGNOSES:
             self.diagnoses[kind] = shared.Diagnosis(
