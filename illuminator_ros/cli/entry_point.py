@@ -18,6 +18,7 @@ from .termination import Termination
 _REMEDIES = {
     'rclpy': 'source the setup file of ROS 2, as in "source /opt/ros/jazzy/setup.bash"',
     'fastcrc': 'pip install fastcrc',
+    'pymavlink': "pip install 'pymavlink>=2.4.50'",
     **dict.fromkeys(('textual', 'textual_serve', 'aiohttp'),
                     "PIP_BREAK_SYSTEM_PACKAGES=1 pip install 'textual>=8' 'textual-serve>=1.1'"),
     # rclpy needs it.
@@ -91,20 +92,24 @@ def _missing_package(error: Exception) -> str:
 
 def _old_package() -> str:
     """Return which imported package is too old, with the remedy; '' if none is."""
+    return next((problem for module in OLDEST if module in sys.modules
+                 and 'too old' in (problem := package(module)[1])), '')
+
+
+def package(module: str) -> tuple[str, str]:
+    """Return a package of :data:`OLDEST` with its version, and why it does not do, or ''."""
+    name, oldest, remedy = OLDEST[module]
     # Slow to import, and impossible where descriptors are lacking.
     try:
         from importlib.metadata import PackageNotFoundError, version
+        found = version(name)
+    except PackageNotFoundError:
+        return name, f'{name} is not installed: {remedy}'
     except (ImportError, OSError):
-        return ''
-
-    def numbers(text: str) -> list[int]:
-        return [int(number) for number in re.findall(r'\d+', text)]
-
-    for module, (package, oldest, remedy) in OLDEST.items():
-        with contextlib.suppress(PackageNotFoundError, OSError):
-            if module in sys.modules and numbers(found := version(package)) < numbers(oldest):
-                return f'{package} {found} is too old; {oldest} or newer is needed: {remedy}'
-    return ''
+        return name, ''
+    versions = [[int(number) for number in re.findall(r'\d+', text)] for text in (found, oldest)]
+    return f'{name} {found}', '' if versions[0] >= versions[1] else (
+        f'{name} {found} is too old; {oldest} or newer is needed: {remedy}')
 
 
 def print_output(complain: Callable[[str], object], *texts: str, end: str = '\n') -> bool:

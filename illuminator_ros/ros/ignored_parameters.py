@@ -106,7 +106,7 @@ def ignored_parameters(
         return (section.is_file and section.has_wildcard
                 and declared.isdisjoint(section.names - _OF_RCLPY))
 
-    sections = [(section, declared_for(section)) for section in _sections(arguments)]
+    sections = [(section, declared_for(section)) for section in given_sections(arguments)]
     our_files = {section.place for section, declared in sections
                  if section.is_file and declared is not None
                  and not is_for_others(section, declared)}
@@ -139,7 +139,8 @@ def ignored_parameters(
     return list(warnings)
 
 
-def _sections(arguments: Sequence[str]) -> Iterator[_Section]:
+def given_sections(arguments: Sequence[str]) -> Iterator[_Section]:
+    """Return the parameters that arguments give, by section."""
     for option, value in zip(arguments, arguments[1:], strict=False):
         if option in ('-p', '--param'):
             node, colon, name = value.partition(':=')[0].rpartition(':')

@@ -111,7 +111,7 @@ def run(args: Sequence[str] | None = None) -> int:
     options, given = parse(args)
     serial = serial_ports()
     ports = ports_of(given, options.seconds, time.monotonic, serial)
-    _listen(ports, options.seconds)
+    listen(ports, options.seconds)
     reports = sorted((report(port) for port in ports), key=lambda one: not one['run'])
     if options.json:
         text = json.dumps(reports, indent=2)
@@ -123,7 +123,7 @@ def run(args: Sequence[str] | None = None) -> int:
     return 0 if written and any(one['run'] for one in reports) else 1
 
 
-def _listen(ports: Sequence[Listener], duration: float) -> None:
+def listen(ports: Sequence[Listener], duration: float) -> None:
     """Open the ports, and listen until the time is over or a signal comes."""
     selector, waker = selectors.DefaultSelector(), Waker()
     end = time.monotonic() + duration
