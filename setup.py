@@ -25,7 +25,8 @@ setup(
     version='0.1.0',
     packages=find_packages(include=[f'{package_name}*']),
     package_data={package_name: [
-        'py.typed', 'ros/fastdds.xml', 'cli/monitor/monitor.tcss', 'cli/monitor/page.html']},
+        'py.typed', 'ros/fastdds.xml', 'cli/monitor/monitor.tcss', 'cli/monitor/page.html',
+        'cli/discover/unit.service']},
     data_files=[
         ('share/ament_index/resource_index/packages', [f'resource/{package_name}']),
         (f'share/{package_name}', ['package.xml']),

@@ -140,3 +140,22 @@ def test_the_systemd_unit_is_installed_for_a_user_and_runs_two_lights(
             [verify, 'verify', str(ROOT / 'config' / 'illuminator@.service')],
             capture_output=True, text=True)
         assert (verified.returncode, verified.stderr) == (0, '')
+
+
+def test_the_unit_for_a_virtual_environment_is_verified_and_differs_in_its_command(
+    tmp_path: Path,
+) -> None:
+    def lines(name: str) -> list[str]:
+        return [line for line in (ROOT / 'config' / name).read_text().splitlines()
+                if not line.startswith('#')]
+
+    units = [lines(f'illuminator{kind}@.service') for kind in ('', '-venv')]
+    [command] = [one for one in units[1] if one not in units[0]]
+    assert command.startswith('ExecStart=/home/pilot/venv/bin/illuminator-bridge --ros-args ')
+    if verify := shutil.which('systemd-analyze'):
+        # It has to find the command.
+        unit = tmp_path / 'illuminator@.service'
+        unit.write_text('\n'.join(units[1]).replace(
+            '/home/pilot/venv/bin/illuminator-bridge', sys.executable))
+        verified = subprocess.run([verify, 'verify', str(unit)], capture_output=True, text=True)
+        assert (verified.returncode, verified.stderr) == (0, '')

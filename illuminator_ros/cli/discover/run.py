@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import argparse
 from collections.abc import Callable, Sequence
+import contextlib
 from importlib.util import find_spec
 import json
 import os
@@ -17,6 +18,7 @@ import sys
 import time
 
 from .report import lines, report
+from .setup import set_up, SIGNALS
 from ..arguments import invocation, option, Parser
 from ..entry_point import print_output
 from ...mavlink.link_thread import Waker
@@ -92,6 +94,10 @@ def parse(args: Sequence[str] | None) -> tuple[argparse.Namespace, list[tuple[st
     parser.add_argument('--seconds', type=option(number(1, 3600)), default=DURATION, metavar='S',
                         help='how long to listen (default: %(default)g)')
     parser.add_argument('--json', action='store_true', help='print the report as JSON')
+    parser.add_argument('--setup', action='store_true',
+                        help='then ask for what a node needs, and write its files')
+    parser.add_argument('--answer', action='append', default=[], metavar='KEY=VALUE',
+                        help='an answer for --setup, which it then does not ask for')
     options = parser.parse_args(args)
     try:
         # A serial port may be given without its rate; a name by path contains colons.
@@ -113,6 +119,12 @@ def run(args: Sequence[str] | None = None) -> int:
     ports = ports_of(given, options.seconds, time.monotonic, serial)
     listen(ports, options.seconds)
     reports = sorted((report(port) for port in ports), key=lambda one: not one['run'])
+    if options.setup:
+        for one in SIGNALS:
+            signal.signal(one, signal.default_int_handler)
+        with contextlib.suppress(KeyboardInterrupt):
+            return set_up(reports, options.answer)
+        return 1
     if options.json:
         text = json.dumps(reports, indent=2)
     else:
