@@ -83,6 +83,14 @@ def unreached(results: Iterable[CheckResult]) -> list[str]:
             for reason, count in reasons.items()]
 
 
+def remedies(results: Iterable[CheckResult], kind: str) -> list[str]:
+    """Return what a device must do instead, a line for each requirement that is not met."""
+    failed = [one.requirement for one in results if one.verdict is CheckVerdict.FAIL]
+    return [f'To change; a correct {kind} ...', *(
+        f'{"":8}{one.name:23}{one.title}: {one.specification.url}' for one in failed)
+    ] if failed else []
+
+
 def catalogue(requirements: Iterable[AnyRequirement], kind: str) -> list[str]:
     """Return all requirements on a kind of device, a line each."""
     notes = {(False, False): '', (True, False): f', changes the {kind}',

@@ -5,7 +5,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 import logging
 from typing import Generic
 
@@ -48,6 +48,7 @@ class CheckRunner(Generic[T]):
     :param checks: the checks of the payload.
     :param requirements: the requirements to check.
     :param on_result: called with each result.
+    :param left_out: the reasons for requirements that are not checked, by name.
     :ivar results: one for each requirement, in order, after the run.
     :ivar restored: the state in which the device was left, as text.
     :ivar changed: whether the state of the device may have been changed.
@@ -57,6 +58,7 @@ class CheckRunner(Generic[T]):
     def __init__(
         self, checks: PayloadChecks[T], session: T, requirements: Sequence[Requirement[T]],
         on_result: Callable[[CheckResult], None] = lambda result: None,
+        left_out: Mapping[str, str] = {},
     ) -> None:
         self.results: list[CheckResult] = []
         self.restored = 'nothing was changed'
@@ -66,6 +68,7 @@ class CheckRunner(Generic[T]):
         self._session = session
         self._requirements = requirements
         self._on_result = on_result
+        self._left_out = left_out
         # Why there is no device to check any more.
         self._lost = ''
         # The state to be restored, as text.
@@ -129,6 +132,8 @@ class CheckRunner(Generic[T]):
     async def _prepare(self, one: Requirement[T], missing: str) -> None:
         """Raise if the check cannot be made, or if the device could not be restored after it."""
         device = self._checks.device
+        if one.name in self._left_out:
+            raise Skipped(f'left out: {self._left_out[one.name]}')
         if missing:
             raise Failed(missing) if one.presence else _Unreached(f'no {device} was found')
         if self._lost and not one.whole_run:

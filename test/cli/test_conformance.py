@@ -59,16 +59,20 @@ def test_a_run_ends_with_its_verdict_and_its_reports_agree(
     simulate('--fault', 'refuse=failed')
     program = start(
         CONFORMANCE, f'udpout://{url}', '--only', 'brightness', '--only', 'on', '--only',
-        'address', '--junit', str(tmp_path / 'report.xml'), '--json',
-        str(tmp_path / 'report.json'))
+        'address', '--skip', 'uptime=fixed in 2.1', '--only', 'uptime', '--junit',
+        str(tmp_path / 'report.xml'), '--json', str(tmp_path / 'report.json'))
     assert program.wait() == 1
     assert 'FAIL    brightness ' in program.log
     # Without a terminal and without --yes the user cannot consent.
     assert 'switched on, it would shine at 100 %' in program.log
-    assert re.search(r'1 passed, 1 failed, 1 skipped .*', program.log), program.log
+    assert re.search(r'1 passed, 1 failed, 2 skipped .*', program.log), program.log
+    assert 'left out: fixed in 2.1' in program.log
+    assert 'To change; a correct light ...' in program.log
     assert json.loads((tmp_path / 'report.json').read_text())['passed'] is False
     suite = ElementTree.parse(tmp_path / 'report.xml').getroot()
-    assert len(suite.findall('testcase')) == 3
+    assert len(suite.findall('testcase')) == 4
+    assert [one.attrib['message'] for one in suite.findall('testcase/skipped')][-1] == (
+        'left out: fixed in 2.1')
     assert len(suite.findall('testcase/failure')) == 1
 
 
@@ -186,6 +190,8 @@ def test_without_a_light_or_a_link_the_reason_is_reported_with_its_status(
     ([], 'the connection URL is missing'),
     (['udp:x:y'], "port 'y' is not a number"),
     (['udpin://:1', '--only', 'nope'], "invalid choice: 'nope'"),
+    (['udpin://:1', '--skip', 'uptime'], '--skip uptime: it needs the name of a requirement and'),
+    (['udpin://:1', '--skip', 'nope=x'], '--skip nope: it needs the name of a requirement and'),
     (['udpin://:1', '--payload', 'nope'], "invalid choice: 'nope'"),
     (['udpin://:1', '--target', '1'], "'1' is "),
     (['udpin://:1', '--junit', '/nowhere/at/all.xml'], 'there is no such directory'),
@@ -196,7 +202,7 @@ def test_without_a_light_or_a_link_the_reason_is_reported_with_its_status(
     (['udpin://:1', '--mavlink-version', '1'], 'MAVLink 1 cannot carry ILLUMINATOR_STATUS'),
     # The name of a device in another encoding than UTF-8.
     (['serial:///nowhere/\udce4:1', '--wait', '0.1'],
-     'cannot open /nowhere/\\udce4: No such file or directory'),
+     'cannot open /nowhere/\\udce4: there is no such port'),
 ])
 def test_a_wrong_argument_is_named_in_one_line_with_status_2(
         arguments: list[str], reason: str) -> None:

@@ -42,6 +42,18 @@ def test_the_json_report_has_every_requirement_with_its_messages(report: RunRepo
     assert (content['light'], content['restored']) == (report.device, 'the light is as it was')
 
 
+def test_the_end_names_what_failed_and_what_a_correct_light_does(report: RunReport) -> None:
+    first, *each = reports.remedies(report.results, 'light')
+
+    assert first == 'To change; a correct light ...'
+    assert [line.split()[0] for line in each] == [
+        one.requirement.name for one in report.results if one.verdict is CheckVerdict.FAIL]
+    assert ('        not-a-number           rejects NaN and infinity in every parameter: '
+            'https://mavlink.io/en/messages/common.html') in each
+    assert reports.remedies([one for one in report.results if one.verdict is CheckVerdict.PASS],
+                            'light') == []
+
+
 def test_the_junit_report_has_counts_reasons_and_sections(report: RunReport) -> None:
     suite = ElementTree.fromstring(reports.as_junit(report))
     assert (suite.tag, suite.get('name')) == ('testsuite', 'illuminator conformance')

@@ -123,6 +123,13 @@ def test_each_rule_of_gimbals_is_listed_with_its_requirements_and_has_a_test_or_
     assert {rule: names for rule, names in listed.items() if names} == checked
 
 
+def test_each_requirement_on_a_light_is_once_in_the_page_for_makers() -> None:
+    page = (DOC / 'light.md').read_text()
+    named = re.findall('`(.+?)`', ' '.join(row[3] for row in table(page, 'a light')))
+
+    assert sorted([*named, 'checksums']) == sorted(one.name for one in REQUIREMENTS)
+
+
 def test_the_report_of_discover_on_the_page_is_as_the_program_prints_it() -> None:
     page = (DOC / 'links.md').read_text()
     url = 'serial:///dev/serial/by-id/usb-FTDI_FT232R_USB_UART_A50285BI-if00-port0:57600'

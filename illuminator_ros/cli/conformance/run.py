@@ -27,7 +27,7 @@ from ..payloads import DEFAULT_PAYLOAD, PAYLOADS
 from ..termination import ENDING
 from ...checks.components import names
 from ...checks.coroutines import Main
-from ...checks.report import as_json, as_junit, catalogue, lines, RunReport, unreached
+from ...checks.report import as_json, as_junit, catalogue, lines, remedies, RunReport, unreached
 from ...checks.requirement import AnyChecks, CheckResult, CheckVerdict
 from ...checks.runner import absence, CheckRunner
 from ...checks.session import Conditions, Session
@@ -98,6 +98,9 @@ def parse(
     add('--only', action='append', default=[], metavar='NAME',
         choices=[one.name for one in checks.requirements],
         help='check this requirement only; may be repeated')
+    add('--skip', action='append', default=[], metavar='NAME=REASON',
+        help='do not check this requirement, such as a known deviation; the reason is in the '
+             'report; may be repeated')
     for one in checks.options:
         add(f'--{one.name}', type=option(number(one.low, one.high)), default=one.default,
             metavar=one.metavar, help=f'{one.help} (default: %(default)g)')
@@ -116,6 +119,11 @@ def parse(
     options = parser.parse_args(args)
     if options.url is None and not options.list:
         parser.error('the connection URL is missing')
+    options.skip = dict(text.partition('=')[::2] for text in options.skip)
+    for name, reason in options.skip.items():
+        if not reason or name not in (one.name for one in checks.requirements):
+            parser.error(f'--skip {name}: it needs the name of a requirement and a reason, as in '
+                         f'--skip "{checks.requirements[0].name}=until firmware 2.1"')
     for path in (options.junit, options.json):
         # The checks take a minute, so refuse before them.
         if path is not None and (refusal := _report_refusal(os.path.abspath(path))):
@@ -185,7 +193,8 @@ class Conformance:
                           signing=signs, store=store,
                           mavlink_version=mavlink_version(
                               options.mavlink_version, {checks.device: checks.mavlink_version}))
-        self._runner = CheckRunner(checks, self._session, self._requirements, self._show)
+        self._runner = CheckRunner(checks, self._session, self._requirements, self._show,
+                                   options.skip)
         self._signals = 0
         self._written = True
         # Written by the link's thread before the main thread reads them.
@@ -217,8 +226,10 @@ class Conformance:
             tuple(runner.results), runner.restored, self._link.clock() - begun, runner.passed)
         # A failed check has already given the reason why there is no device.
         explained = missing and any(one.verdict is CheckVerdict.FAIL for one in report.results)
-        self._write_line(*unreached(report.results), '', *(() if explained else (report.device,)),
-                         report.summary)
+        self._write_line(
+            *unreached(report.results), '',
+            *(() if missing else remedies(report.results, checks.device)),
+            *(() if explained else (report.device,)), report.summary)
         for path, text in ((options.junit, as_junit(report)), (options.json, as_json(report))):
             try:
                 if path is not None:
