@@ -28,6 +28,9 @@ DECISION = 3.0
 PASS = 14.0
 # s between looks at the ports, and between requests for the identity of a device.
 TICK = 0.1
+# s until a port on which only others are heard is closed, since another search may look for these,
+# and until it is tried again.
+OTHERS, AGAIN = 5.0, 60.0
 INTERVAL = 1.0
 ANY = tuple(frozenset({kind}) for kind in (LIGHT, MANAGER, GIMBAL, MICASENSE))
 
@@ -60,8 +63,9 @@ class SerialSearch:
         self._clock = clock
         self._make_selector = make_selector
         self._selector: selectors.BaseSelector | None = None
-        # By path.
+        # By path; and when ports may be opened again, s.
         self._listeners: dict[str, Listener] = {}
+        self._again: dict[str, float] = {}
         # When something fitted first, and when ports and identities are due, s.
         self._first = self._due = 0.0
 
@@ -78,7 +82,7 @@ class SerialSearch:
             now = self._clock()
             if now >= self._due:
                 self._due = now + INTERVAL
-                self._find_ports()
+                self._find_ports(now)
                 self._ask(now)
             fitting = [one for one in self._listeners.values() if self._fits(one)]
             if not fitting:
@@ -97,8 +101,8 @@ class SerialSearch:
         self._close()
         raise OSError('stopped')
 
-    def _find_ports(self) -> None:
-        """Listen to new ports, and forget those that have gone."""
+    def _find_ports(self, now: float) -> None:
+        """Listen to new ports, and close those of others."""
         known = self._ports()
         stable = {os.path.realpath(path): path for path in known}
         paths = glob.glob(self._url.ports) if self._url.ports else known
@@ -107,8 +111,9 @@ class SerialSearch:
             name := stable.get(os.path.realpath(path), path))})
         for path in [*self._listeners]:
             # A port that was in use may be free now; another device may have this path.
-            if path not in wanted or (
-                    one := self._listeners[path]).channel is None and not one.scan.found:
+            one = self._listeners[path]
+            if path not in wanted or one.channel is None and not one.scan.found and (
+                    now >= self._again.get(path, 0.0)):
                 self._listeners.pop(path).close()
         for path in wanted:
             if path not in self._listeners:
@@ -117,9 +122,11 @@ class SerialSearch:
                     writer=self._writer)
                 assert self._selector is not None
                 one.listen(self._selector, self._opener)
-            elif self._listeners[path].scan.found:
+            elif (one := self._listeners[path]).channel and (one.scan.found or (
+                    one.components and one.elapsed >= OTHERS and not self._fits(one))):
                 # It is for another program.
-                self._listeners[path].close()
+                one.close()
+                self._again[path] = now + AGAIN
 
     def _fits(self, one: Listener) -> bool:
         """Return whether a device that is wanted is heard, with the serial number if one is."""

@@ -17,10 +17,8 @@ from .transport import Channel
 from .transport.ports import IN_USE, users_of
 from .url import SerialUrl
 
-# s without a frame until the reason is looked for, and between the parts of the search; other
-# baud rates in each part: the line is away for PART * SHARE s.
+# s without a frame until the reason is looked for, and between two other baud rates.
 SILENCE = 10.0
-PART = 2
 
 
 class SilentPort:
@@ -47,9 +45,8 @@ class SilentPort:
         self._data = b''
         self._received = 0
         self._due = math.inf
-        # The rates that were not tried yet, and the rates of this part of the search.
+        # The rates that were not tried yet.
         self._left: list[int] = []
-        self._part: list[int] = []
 
     @property
     def is_away(self) -> bool:
@@ -73,8 +70,7 @@ class SilentPort:
             self._left = [rate for rate in RATES if rate != self._url.baud]
             self._tune(self._url.baud, now)
         elif now >= self._due or self.is_away and len(self._data) >= ENOUGH:
-            (self._judge if self.is_away else self._begin_part)()
-            self._tune(self._part.pop(0) if self._part else self._url.baud, now)
+            self._tune(self._return() if self.is_away else self._next_rate(), now)
 
     def _tune(self, baud: int, now: float) -> None:
         if baud != self._baud:
@@ -84,24 +80,26 @@ class SilentPort:
         self._baud, self._data = baud, b''
         self._due = now + (SHARE if self.is_away else SILENCE)
 
-    def _begin_part(self) -> None:
+    def _next_rate(self) -> int:
+        """Judge the bytes at the rate of the link, and return the rate to listen at."""
         # A frame at the right rate was refused for its signature.
         if self.reason or self._has_frame():
-            return
+            return self._url.baud
         # A thread of its own: it reads the descriptors of all processes.
         with contextlib.suppress(RuntimeError):
             threading.Thread(target=self._find_users, daemon=True).start()
         if found := other_protocol(self._data):
             self._end(found)
-        elif self._data and self._left:
-            self._part = [self._left.pop(0) for _ in self._left[:PART]]
-        elif self._data:
+        elif self._data and not self._left:
             self._end(NOISE.format(self._received))
+        return self._left.pop(0) if self._data and self._left else self._url.baud
 
-    def _judge(self) -> None:
+    def _return(self) -> int:
+        """Look for a frame among the bytes at another rate, and return the rate of the link."""
         if self._has_frame():
             self._end(f'{self._received} bytes, no valid frame at {self._url.baud} baud; MAVLink '
                       f'is heard at {self._baud}: use {self._url._replace(baud=self._baud)}')
+        return self._url.baud
 
     def _has_frame(self) -> bool:
         decoder = Decoder()
@@ -109,7 +107,7 @@ class SilentPort:
 
     def _end(self, reason: str) -> None:
         self.reason = reason
-        self._left, self._part = [], []
+        self._left = []
 
     def _find_users(self) -> None:
         if users := self._users(self._url):

@@ -300,7 +300,8 @@ class Bridge:
         self.log.write_conditions(filter(None, [self._component.commands.clock_fault()]), 'clock')
         self.log.write_conditions(self._diagnostics.loops(now), 'loop')
         self.log.write_conditions(
-            [line.silence for line in self.link.lines if line.silence], 'silence')
+            [f'{line.status.label}: {line.silence}' for line in self.link.lines if line.silence],
+            'silence')
         for one in self._served:
             one.payload.poll(now)
 

@@ -65,8 +65,13 @@ def test_the_file_has_the_answers_and_the_command_is_printed(
         f'--ros-args -r __node:=bow --params-file {tmp_path}/bow.yaml\n')
 
 
-def test_a_gimbal_has_a_file_with_its_url_only(tmp_path: Path) -> None:
-    assert set_up(heard('gimbal manager'), answers(tmp_path, name='mount')) == 0
+@pytest.mark.parametrize('kind', ['gimbal manager', 'gimbal'])
+def test_a_gimbal_has_a_file_with_its_url_only_and_the_node_for_a_managed_one(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], kind: str,
+) -> None:
+    # An autopilot is on this port.
+    assert set_up(heard(kind), answers(tmp_path, name='mount')) == 0
+    assert 'gimbal --ros-args' in capsys.readouterr().out
 
     assert (tmp_path / 'mount.yaml').read_text() == (
         'mount:\n  ros__parameters:\n    connection_url: serial:///dev/x:57600\n')

@@ -8,6 +8,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 import contextlib
 from pathlib import Path
+import re
 import selectors
 import socket
 import threading
@@ -22,7 +23,7 @@ from illuminator_ros.mavlink.messages import (
     ComponentInformationBasic,
     heartbeat,
 )
-from illuminator_ros.mavlink.serial_search import DECISION, SerialSearch
+from illuminator_ros.mavlink.serial_search import AGAIN, DECISION, OTHERS, SerialSearch
 from illuminator_ros.mavlink.signing import Signing
 from illuminator_ros.mavlink.transport import Channel
 from illuminator_ros.mavlink.transport.base import StreamChannel
@@ -194,6 +195,24 @@ def test_without_the_device_the_reason_names_what_each_port_has(machine: Machine
     # A port that is plugged in later.
     with taken(search, machine.plug_in('light', LIGHT_BEAT)):
         pass
+
+
+def test_a_port_of_other_devices_is_closed_for_their_searches_and_tried_again(
+    machine: Machine,
+) -> None:
+    path = machine.plug_in('gimbal', GIMBAL_BEAT)
+    search = machine.search('serial://auto', LIGHT)
+    with pytest.raises(OSError, match=re.escape(f'no light: {path}: 1/243 (gimbal)')):
+        opened(search)
+    with pytest.raises(BrokenPipeError):
+        machine.lines[path].far.send(b'x')
+
+    machine.ports[path], begun = LIGHT_BEAT, machine.now
+    for _ in range(3):
+        with pytest.raises(OSError, match='no light'):
+            opened(search)
+    with taken(search, path):
+        assert machine.now - begun < OTHERS + AGAIN
 
 
 def test_only_ports_that_match_the_pattern_are_tried(machine: Machine, tmp_path: Path) -> None:

@@ -70,15 +70,15 @@ def test_a_device_with_another_rate_is_named_with_the_url() -> None:
     assert len(port.rates) == 2
 
 
-def test_each_rate_is_tried_and_the_line_is_away_for_less_than_3_s() -> None:
+def test_each_rate_is_tried_and_the_line_is_away_for_less_than_2_s() -> None:
     port = Port(1)
 
-    assert 'no valid frame: another baud rate, a bad wire or ground' in port.run(120.0)
+    assert 'no valid frame: another baud rate, a bad wire or ground' in port.run(130.0)
     assert {rate for _, rate in port.rates} == {
         57600, 115200, 921600, 38400, 9600, 19200, 230400, 460800, 500000, 1000000, 1500000}
-    begun = [at for at, rate in port.rates if rate != URL.baud][::2]
+    begun = [at for at, rate in port.rates if rate != URL.baud]
     ended = [at for at, rate in port.rates if rate == URL.baud]
-    assert max(end - begin for begin, end in zip(begun, ended, strict=True)) < 3.0
+    assert max(end - begin for begin, end in zip(begun, ended, strict=True)) < 2.0
     port.frames += 1
     assert port.run(1.0) == ''
 

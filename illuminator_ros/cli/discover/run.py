@@ -130,7 +130,8 @@ def run(args: Sequence[str] | None = None) -> int:
     else:
         text = '\n'.join([*(line for one in reports for line in lines(one)),
                           *([] if serial else [NO_SERIAL]),
-                          *([] if find_spec('rclpy') else [NO_ROS])])
+                          *([NO_ROS] if not find_spec('rclpy') and any(
+                              one['run'] for one in reports) else [])])
     written = print_output(_complain, text)
     return 0 if written and any(one['run'] for one in reports) else 1
 

@@ -25,6 +25,7 @@ from ...illuminator.light_control import LightSettings
 from ...illuminator.model import SafetyLimits
 from ...mavlink.command_sender import CommandSender
 from ...mavlink.component import Component
+from ...mavlink.component_kinds import AUTOPILOT
 from ...mavlink.link import Link
 from ...mavlink.messages import Address
 from ...mavlink.url import parse_url
@@ -90,15 +91,17 @@ def set_up(reports: Sequence[Mapping[str, Any]], given: Sequence[str]) -> int:
             except EOFError:
                 raise Refusal(f'no answer: give --answer {key}=VALUE') from None
 
-    found = [(one['url'], device) for one in reports for device in one['components']
+    found = [(one, device) for one in reports for device in one['components']
              if device['served']]
-    for index, (url, device) in enumerate(found, 1):
-        print(f'{index}: {device["address"]} ({", ".join(device["kinds"])}) on {url}')
+    for index, (one, device) in enumerate(found, 1):
+        print(f'{index}: {device["address"]} ({", ".join(device["kinds"])}) on {one["url"]}')
     if not found:
         return 1
-    url, device = found[int(ask('device', 'which device', '1', number(1, len(found)))) - 1]
+    report, device = found[int(ask('device', 'which device', '1', number(1, len(found)))) - 1]
     address = Address(*map(int, device['address'].split('/')))
-    payload = payloads_for({*device['kinds']})[0][0]
+    # An autopilot manages a gimbal.
+    others = {kind for one in report['components'] for kind in one['kinds']} & {AUTOPILOT}
+    payload, url = payloads_for({*device['kinds'], *others})[0][0], report['url']
     name = ask('name', 'name of its node', payload, matching('[A-Za-z][A-Za-z0-9_]*', 'a name'))
     values: dict[str, object] = {'connection_url': url}
     if payload == 'illuminator':
