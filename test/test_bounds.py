@@ -14,8 +14,8 @@ from typing import Any, NamedTuple
 from unittest.mock import Mock
 
 from illuminator_ros.gimbal.manager_state import MAX_OTHER_DEVICES
-from illuminator_ros.illuminator.light_control import LightSettings
 from illuminator_ros.illuminator.mount_orientation import MAX_MOUNTS, MountOrientations
+from illuminator_ros.illuminator.settings import LightSettings
 from illuminator_ros.illuminator.simulated import SimulatedIlluminator
 from illuminator_ros.illuminator.simulated_properties import (
     IlluminatorBehaviour,
@@ -36,9 +36,9 @@ from illuminator_ros.mavlink.signing import MAX_STREAMS, ticks
 from illuminator_ros.mavlink.statistics import MAX_SOURCES
 from illuminator_ros.mavlink.transport.udp import MAX_PEERS
 from illuminator_ros.mavlink.url import MemoryUrl
-from illuminator_ros.payload.device_property import MAX_CALLERS
 from illuminator_ros.payload.discovery import MAX_CANDIDATES, MAX_DEVICES, MAX_IGNORED
 from illuminator_ros.payload.messages import Attitude, GimbalDeviceAttitudeStatus
+from illuminator_ros.payload.requests import MAX_CALLS
 from illuminator_ros.rededge.client import RedEdgeClient
 from illuminator_ros.rededge.input_states import CameraSettings
 from illuminator_ros.rededge.messages import CameraFeedback
@@ -107,7 +107,7 @@ def requests() -> object:
     client = Client(OURS, LightSettings())
     link = linked(client, frame_of(status_message(100)))
     light = client.lights[LIGHT]
-    link.ask(lambda now: [light.control.enable(True, now, lambda result, now: None)
+    link.ask(lambda now: [light.enable(True, now, lambda result, now: None)
                           for _ in range(COUNT)])
     return link
 
@@ -245,7 +245,8 @@ LINK = {
     'Receiver.streams': MAX_DECODERS, 'Traffic.sources': MAX_SOURCES}
 SENT = {
     'LoopbackFilter.sent': frame_writer.MAX_FRAMES, 'CommandSender.round_trips': MAX_TARGETS,
-    'CommandSender.unanswering': MAX_TARGETS, 'CommandSender.pending': FOUND}
+    'CommandSender.unanswering': MAX_TARGETS, 'CommandSender.pending': FOUND,
+    'CommandSender.answers': MAX_TARGETS}
 STAMPS = {'LoopbackFilter.stamps': frame_writer.MAX_STAMPS}
 HEARTBEATS = {'Client.heartbeats': MAX_SOURCES}
 OTHERS = {'Component.heartbeats': MAX_SOURCES}
@@ -267,7 +268,7 @@ ROWS = {
         signed_streams, {**LINK, 'Signing.streams': MAX_STREAMS}, {**SENT, **STAMPS, **LIGHTS}),
     'own frames': Row(own_frames, {'LoopbackFilter.sent': frame_writer.MAX_FRAMES, **STAMPS}),
     'requests to a light': Row(requests, {
-        'Property.callers': MAX_CALLERS, 'LightSources.calling': MAX_CALLERS}),
+        'Requests.standing': MAX_CALLS}),
     'forwarded frames': Row(
         functools.partial(forwarded, MAX_FRAMES + COUNT, heartbeat(44)),
         {'DuplicateFilter.arrivals': MAX_FRAMES, 'RoutingTable.routes': MAX_ROUTES,

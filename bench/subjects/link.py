@@ -14,8 +14,8 @@ import tempfile
 import time
 
 from illuminator_ros.illuminator.events import LightEvent, StatusReceived
-from illuminator_ros.illuminator.light_control import LightSettings
 from illuminator_ros.illuminator.messages import IlluminatorStatus
+from illuminator_ros.illuminator.settings import LightSettings
 from illuminator_ros.mavlink.dialect import mavlink
 from illuminator_ros.mavlink.messages import Address, heartbeat
 from support.client import Client

@@ -12,10 +12,10 @@ import itertools
 from .commands import SWITCHES
 from .events import LightEvent
 from .light import Light
-from .light_control import LightSettings
 from .messages import IlluminatorStatus
 from .model import Status
 from .mount_orientation import MountOrientations
+from .settings import LightSettings
 from ..mavlink.command_sender import Command, CommandSender, CommandStatus
 from ..mavlink.component import Payload
 from ..mavlink.dialect import mavlink
@@ -26,10 +26,10 @@ from ..mavlink.messages import (
     Heartbeat,
     Message,
 )
-from ..payload.confirmed_command import Done, Result
 from ..payload.discovery import Discovery
 from ..payload.identity import Identity
 from ..payload.listeners import Listeners
+from ..payload.requests import Done, Result
 
 # How many lost lights are asked for a status when the link opens: more would fill a slow line.
 MAX_ASKED = 8
@@ -78,10 +78,10 @@ class IlluminatorClient(Payload):
         return [self.lights[address] for address in sorted(self.lights)]
 
     def change_settings(self, settings: LightSettings, now: float) -> None:
-        """Take other settings, see :meth:`.light_control.LightControl.change_settings`."""
+        """Take other settings, see :meth:`.light.Light.change_settings`."""
         self.settings = settings
         for light in self.discovery:
-            light.control.change_settings(settings, now)
+            light.change_settings(settings, now)
 
     def _make(self, address: Address) -> Light:
         def emit(event: LightEvent) -> None:
@@ -120,7 +120,7 @@ class IlluminatorClient(Payload):
         """See :meth:`Payload.receive`."""
         if isinstance(message, IlluminatorStatus):
             if light := self.discovery.hear(source, now, self._make, proved=True):
-                light.take_status(Status.from_message(message), now)
+                light.receive_status(Status.from_message(message), now)
         elif isinstance(message, Heartbeat) and message.type == mavlink.MAV_TYPE_ILLUMINATOR:
             if light := self.discovery.hear(source, now, self._make, proved=False):
                 light.heard(now)
@@ -135,7 +135,7 @@ class IlluminatorClient(Payload):
                 self.discovery.prove(source, now)
             elif isinstance(message, ComponentInformationBasic):
                 self.discovery.prove(source, now)
-                light.take_identity(Identity.from_message(message), now)
+                light.receive_identity(Identity.from_message(message), now)
 
     def may_send_at_end(self, sent: Command | Message) -> bool:
         """See :meth:`Payload.may_send_at_end`."""
@@ -153,7 +153,7 @@ class IlluminatorClient(Payload):
         """
         Switch off all lights, and those found later.
 
-        See :meth:`.light_control.LightControl.switch_off_finally`.
+        See :meth:`.light.Light.switch_off_finally`.
         """
         self._report_off = report
         for light in self.lights_by_address:
@@ -161,7 +161,7 @@ class IlluminatorClient(Payload):
 
     def _switch_off_finally(self, light: Light, now: float) -> None:
         if self._report_off is not None:
-            light.control.switch_off_finally(now, functools.partial(self._report_off, light))
+            light.switch_off_finally(now, functools.partial(self._report_off, light))
 
     def poll(self, now: float) -> None:
         """See :meth:`Payload.poll`."""
@@ -184,7 +184,7 @@ def enable_all(
         one light is connected and all connected lights succeeded; the message has the outcome of
         each light.
     :param name: returns the name of a light, for people.
-    :param detail: as for :meth:`.light_control.LightControl.enable`, and ``is_stream``.
+    :param detail: as for :meth:`.light.Light.enable`, and ``is_stream``.
     """
     connected = [light for light in lights if light.connected]
     outcomes: dict[Light, Result] = {}
@@ -197,8 +197,8 @@ def enable_all(
 
     # A lost light fails at once, but an OFF replaces a remembered ON.
     for light in lights:
-        light.control.enable(on, now, functools.partial(outcome, light), detail=detail,
-                             is_stream=is_stream)
+        light.enable(on, now, functools.partial(outcome, light), detail=detail,
+                     is_stream=is_stream)
 
 
 def _summary(

@@ -8,9 +8,16 @@ from __future__ import annotations
 from dataclasses import dataclass
 from functools import partial
 
-from .model import Configuration, DIMMING_FLAGS, flag_names, Status, unexpected_differences
+from .model import (
+    Configuration,
+    DIMMING_FLAGS,
+    FIELDS,
+    flag_names,
+    Status,
+    unexpected_differences,
+)
 from ..mavlink.dialect import mavlink
-from ..payload.confirmed_command import Change
+from ..payload.attempt import Change, Sending
 
 CONFIRMED = 'confirmed by ILLUMINATOR_STATUS'
 
@@ -46,7 +53,8 @@ def _switch_evidence(on: bool, status: Status) -> str:
 # Each switches all lights of a component; the command cannot select one of them. Made once, since
 # each request needs one before its command is sent.
 SWITCHES = {on: Change[Status](
-    mavlink.MAV_CMD_ILLUMINATOR_ON_OFF, (float(on),), 'on' if on else 'off', is_repeated=not on,
+    mavlink.MAV_CMD_ILLUMINATOR_ON_OFF, (float(on),), 'on' if on else 'off',
+    sending=Sending.UNTIL_ACKNOWLEDGED if on else Sending.UNTIL_OBEYED,
     shown_by=partial(_shows_switch, on), actual=_shown_switch,
     evidence=partial(_switch_evidence, on)) for on in (False, True)}
 
@@ -63,18 +71,30 @@ class Configure(Change[Status]):
     names: list[str]
 
     @classmethod
-    def of(cls, configuration: Configuration, names: list[str], note: str = '') -> Configure:
-        """Return the change that sets some fields of a configuration."""
+    def whole(cls, configuration: Configuration, names: list[str]) -> Configure:
+        """Return the change to a configuration: a status shows it only with all its fields."""
+        return cls._of(configuration, names, list(FIELDS))
+
+    @classmethod
+    def part(cls, configuration: Configuration, names: list[str], note: str = '') -> Configure:
+        """Return the change to some fields, which a status shows whatever the others are."""
+        return cls._of(configuration, names, names, note)
+
+    @classmethod
+    def _of(cls, configuration: Configuration, names: list[str], compared: list[str],
+            note: str = '') -> Configure:
         return cls(
             mavlink.MAV_CMD_DO_ILLUMINATOR_CONFIGURE, configuration.params(),
             configuration.describe(names), note=note, configuration=configuration, names=names,
-            shown_by=partial(_shows, configuration, names), actual=partial(_shown, configuration),
+            shown_by=partial(_shows, configuration, names, compared),
+            actual=partial(_shown, configuration, compared),
             evidence=partial(_evidence, configuration, names))
 
 
-def _missing(configuration: Configuration, status: Status) -> list[str]:
-    return unexpected_differences(
+def _missing(configuration: Configuration, compared: list[str], status: Status) -> list[str]:
+    return [name for name in unexpected_differences(
         configuration, status.configuration(configuration), status.error_flags, step=True)
+        if name in compared]
 
 
 def _hidden(configuration: Configuration, names: list[str], status: Status) -> list[str]:
@@ -83,15 +103,16 @@ def _hidden(configuration: Configuration, names: list[str], status: Status) -> l
     return [name for name in names if name in different or getattr(status, name) is None]
 
 
-def _shows(configuration: Configuration, names: list[str], status: Status) -> bool | None:
-    if _missing(configuration, status):
+def _shows(configuration: Configuration, names: list[str], compared: list[str],
+           status: Status) -> bool | None:
+    if _missing(configuration, compared, status):
         return False
     return None if _hidden(configuration, names, status) else True
 
 
-def _shown(configuration: Configuration, status: Status) -> str:
+def _shown(configuration: Configuration, compared: list[str], status: Status) -> str:
     reported = status.configuration(configuration)
-    return _with_flags(reported.describe(_missing(configuration, status)), status)
+    return _with_flags(reported.describe(_missing(configuration, compared, status)), status)
 
 
 def _evidence(configuration: Configuration, names: list[str], status: Status) -> str:

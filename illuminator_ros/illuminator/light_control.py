@@ -1,445 +1,325 @@
 # Copyright 2026 The illuminator_ros developers
 # SPDX-License-Identifier: Apache-2.0
 
-"""The requests to one light: its sources, its switch and its configuration."""
+"""The commands between what is wanted of a light and what it shows."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Callable, Iterable, Mapping
 import math
 
 from . import events
-from .command_sources import DesiredState, LightSources
-from .light_configuration import IMPLIED_TIME, LightConfiguration, requested
-from .model import Changes, SafetyLimits, Status
-from .switch import OFF, ON, Silence, Switch
-from ..mavlink.command_sender import Command
-from ..mavlink.messages import Address
-from ..payload.arbitration import Cause, HolderChanged
-from ..payload.command_sources import DEFAULT, SourceSettings
-from ..payload.confirmed_command import Done, Result, Target
-from ..payload.device_events import DeviceHeld
-from ..payload.device_property import answer, Caller, Outcome
-from ..payload.liveness import Liveness
+from .commands import Configure, SWITCHES
+from .decide import decide, Goals
+from .model import FIELDS, Status
+from .rules import Rules
+from .twin import Cause, Failure, IMPLIED_TIME, Twin
+from .user_requests import not_reported
+from ..payload.attempt import Change, Served, Target
+from ..payload.requests import Goal, Request, Requests, Result, WEAK, Why
+from ..payload.steered_property import Property
+
+ON, OFF = SWITCHES[True], SWITCHES[False]
 
 
-@dataclass(frozen=True)
-class LightSettings:
-    """
-    The settings of each light.
+def plan_switch(goal: Goal) -> tuple[Change[Status], Mapping[Request, Change[Status]]]:
+    """Return the command of a goal of the switch."""
+    change = SWITCHES[bool(goal.values)]
+    return change, dict.fromkeys(goal.serves, change)
 
-    :param heartbeat_timeout: s, > 0, without a heartbeat or status, after which a light is lost.
-    :param status_interval: s, >= 0, between statuses that the light is asked for; 0 leaves its
-        own.
-    :param restore_configuration: whether a light that has restarted gets its agreed configuration
-        again.
-    :param limits: apply to everything that is sent.
-    :param off_after_silence: s without a request after which a light that is on is switched off;
-        0 for never.
-    :param sources: the sources of commands, None if commands have no sources.
-    :param off_on_release: whether a light is switched off when no source holds it any more.
-    """
 
-    heartbeat_timeout: float = 3.0
-    status_interval: float = 0.0
-    restore_configuration: bool = True
-    limits: SafetyLimits = SafetyLimits()
-    off_after_silence: float = 0.0
-    sources: SourceSettings | None = None
-    off_on_release: bool = False
+def plan_configuration(goal: Goal) -> tuple[Change[Status], Mapping[Request, Change[Status]]]:
+    """Return the command of a goal of the configuration, and what each request asks of it."""
+    asked: dict[Request, list[str]] = {one: [
+        name for name in FIELDS if name in one.values
+        or goal.note and name == 'strobe_duty_cycle' and 'strobe_period' in one.values]
+        for one in goal.serves}
+    whole = [name for name in FIELDS if any(name in names for names in asked.values())]
+    return Configure.whole(goal.values, whole), {
+        one: Configure.part(goal.values, names, goal.note) for one, names in asked.items()}
 
 
 class LightControl:
     """
-    Switches and configures one light for its sources. No I/O; times are s.
+    Sends one light what is wanted of it, and ends the requests that it shows. Times are s.
 
-    Each method that may send ends with :meth:`update`, which sends what is desired now and answers
-    the callers whose requests have ended.
+    No I/O. :meth:`step` is the only method that sends what is wanted; to run it again changes
+    nothing.
 
-    :param liveness: of the light.
     :param emit: takes the events.
-    :ivar switch: the switch of the light, ``configuration`` its configuration, and ``sources`` the
-        sources of commands to it.
-    :ivar was_commanded: whether a user has ever sent it a command.
-    :ivar version: counts the updates, for those who keep a deadline of this.
+    :ivar switch: the switch of the light.
     """
 
     def __init__(
-        self, target: Target, liveness: Liveness, settings: LightSettings,
+        self, target: Target, requests: Requests, twin: Twin, rules: Rules,
         emit: Callable[[events.LightEvent], None],
     ) -> None:
-        self.switch = Switch(target, emit, settings.off_after_silence)
-        self.configuration = LightConfiguration(
-            target, emit, limits=settings.limits, restores=settings.restore_configuration)
-        self.sources = LightSources(settings.sources)
-        self.was_commanded = False
-        self.version = 0
-        # The holder, if the calls under way have refused an OFF of it, else ''.
-        self._refused_off = ''
-        self._address = target.address
-        self._commands = target.commands
-        self._liveness = liveness
-        self._settings = settings
+        self._target = target
+        self._requests = requests
+        self._twin = twin
+        self._rules = rules
         self._emit = emit
+        self.switch: Property[Status] = Property(target, plan_switch)
+        self._configuration: Property[Status] = Property(target, plan_configuration)
+        # Takes the results of the OFF at the end of the process.
+        self._report: Callable[[Result, float], None] | None = None
 
-    def change_settings(self, settings: LightSettings, now: float) -> None:
-        """
-        Take other settings.
+    # The step
 
-        Only ``limits``, ``off_after_silence`` and the time-out of ``sources`` may differ. The
-        silence begins again if ``off_after_silence`` differs.
-        """
-        before, self._settings = self._settings, settings
-        if settings.limits != before.limits:
-            self.configuration.change_limits(settings.limits, now)
-        if settings.off_after_silence != before.off_after_silence:
-            self._forget_silenced(now)
-            self.switch.silence = Silence(settings.off_after_silence, now)
-        if settings.sources:
-            self.sources.set_lease(settings.sources.timeout)
-        # The next poll sends what they demand: an atomic set that fails takes them back before.
-        self.version += 1
+    def step(self, now: float) -> None:
+        """Decide what the light should be, send it, and go on with what is under way."""
+        self._rules.put_due(now, may_be_on=self.may_go_off(now))
+        self._rules.check_range()
+        goals = self._decide(now)
+        switch = goals.switch
+        if (switch is not None and not switch.values and not self.switch.is_under_way(OFF)
+                and self._twin.brightness_is_switch is not False):
+            self._end_configuration(now)
+            goals = self._decide(now)
+        # First the configuration, so that an ON finds it.
+        if self._steer(self._configuration, goals.configuration, now):
+            self._rules.sent(now)
+        if self._steer(self.switch, goals.switch, now) and self._report is None:
+            self._tell_automatic('')
+        attempt = self.switch.attempt
+        if attempt is not None and attempt.goal.insists and (failure := attempt.failure()):
+            if self._report is None:
+                self._tell_automatic(failure)
+            else:
+                self._report(Result(False, failure), now)
 
-    def unreachable(self, now: float) -> str:
-        """Return why requests cannot reach the light, for people; '' if they can."""
-        return '' if self._liveness.connected else self._liveness.loss(
-            f'light {self._address}', now)
+    def _decide(self, now: float) -> Goals:
+        limits = self._rules.settings.limits
+        goals = decide(self._requests, self._twin.shown, limits, now)
+        if not goals.missing or goals.configuration is None:
+            return goals
+        text = not_reported(goals.missing)
+        for one in goals.configuration.serves:
+            if one.why in WEAK:
+                self._rules.failed(one, f'{", ".join(one.values)} not sent: {text}', now)
+            else:
+                self._requests.end(one, Result(False, text), now)
+        return goals._replace(configuration=None)
+
+    def _end_configuration(self, now: float) -> None:
+        """End what an OFF must not be followed by, where the brightness may be the switch."""
+        text = 'superseded by off'
+        for one in self._requests.live():
+            if (one.why is Why.REQUEST and 'enabled' not in one.values
+                    and (one.is_call or one.since < now)):
+                self._requests.end(one, Result(False, text, superseded=True), now)
+        self._withdraw(self._configuration, text, now)
+        self.switch.fence_until(self._configuration.fence)
+
+    def _steer(self, part: Property[Status], goal: Goal | None, now: float) -> bool:
+        """Have a goal under way; return whether a command was begun."""
+        before = part.attempt
+        if before is not None and not all(map(self._requests.may_be_sent, before.serves)):
+            self._withdraw(part, 'held by another source', now)
+        self._withdrawn(part.steer(goal, now, self._twin.status, self._twin.gap), now)
+        return part.attempt is not None and part.attempt is not before
+
+    def _tell_automatic(self, failure: str) -> None:
+        """Report an automatic OFF, and once why it is not confirmed."""
+        attempt = self.switch.attempt
+        rule = next((one for one in attempt.goal.serves if one.why is not Why.REQUEST), None
+                    ) if attempt is not None else None
+        if rule is not None and not rule.failure:
+            rule.failure = failure
+            self._emit(events.AutomaticSwitch(self._target.address, False, rule.detail, failure))
+
+    def _withdraw(self, part: Property[Status], text: str, now: float) -> None:
+        self._withdrawn(part.withdraw(text, now), now)
+
+    def _withdrawn(self, served: Iterable[Served[Status]], now: float) -> None:
+        """Take the requests of a command that is sent no more; those that stand stay wanted."""
+        for one in served:
+            if one.request not in self._requests.standing:
+                self._requests.end(one.request, one.result, now)
+        self._note_failure(now)
 
     # Requests
 
-    def enable(
-        self, on: bool, now: float, done: Done, *, detail: str = '', source: str = DEFAULT,
-        is_stream: bool = False,
-    ) -> None:
-        """
-        Switch the light on or off; ``done`` is called once with the result.
+    def cancel(self, text: str, now: float) -> None:
+        """Send nothing any more of what is under way: the light is lost, or the process ends."""
+        for part in self.switch, self._configuration:
+            self._withdraw(part, text, now)
 
-        While a higher source holds the light, a request is not sent. One of a stream is then
-        remembered, and any other is refused and leaves nothing behind.
-
-        :param detail: how it was requested, for :class:`LightSwitched`.
-        :param is_stream: whether it is one of a stream, which its publisher repeats: a newer one
-            replaces it.
-        """
-        caller = Caller(done, now, source, is_stream, detail)
-        if self._take_request(caller, DesiredState(enabled=on), now):
-            if not on:
-                self._prepare_off(now)
-            self.switch.ask(on, now, caller)
-        self.update(now)
-
-    def _prepare_off(self, now: float) -> None:
-        """End what an OFF must not be followed by, where the brightness may be the switch."""
-        if self.configuration.brightness_is_switch is not False:
-            self.configuration.cancel('superseded by off', now, superseded=True)
-            self.switch.property.fence_until(self.configuration.property.fence)
-
-    def configure(self, changes: Changes, now: float, done: Done) -> None:
-        """
-        Change some fields with one command; ``done`` is called once with the result.
-
-        The request is one of the source :data:`~..payload.command_sources.DEFAULT`.
-
-        :param changes: values by name, see :data:`~.model.FIELDS`; if one is wrong none is sent.
-        """
-        caller = Caller(done, now, DEFAULT)
-        if self._take_request(caller, DesiredState(), now):
-            self.configuration.configure(changes, now, caller)
-        self.update(now)
-
-    def set_brightness(
-        self, brightness: float, now: float, *, source: str = DEFAULT,
-    ) -> None:
-        """
-        Take a setpoint of a stream: the newest wins, and one command is under way at a time.
-
-        :param brightness: %, checked.
-        """
-        def failed(result: Result, now: float) -> None:
-            # While another source holds the light, a setpoint is remembered.
-            if not (result.superseded or self.is_held_by_other(source)):
-                self._emit(events.SetpointFailed(self._address, result.message))
-
-        caller = Caller(failed, now, source, is_stream=True)
-        if self._take_request(caller, DesiredState(brightness=brightness), now):
-            self.configuration.set_brightness(brightness)
-        self.update(now)
-
-    def require(self, values: Changes, now: float) -> None:
-        """
-        Send values, and what is required already, once the light has reported its configuration.
-
-        :param values: by name, checked, except against the limits that the light reports; none if
-            the light is heard again.
-        """
-        self.configuration.require(values, now)
-        self.update(now)
-
-    def _take_request(self, caller: Caller, desired: DesiredState, now: float) -> bool:
-        """
-        Take a request: it counts for its source, and ends what lower sources have requested.
-
-        :return: whether it may be sent now; if not, it is answered with the reason.
-        """
-        sources, source, is_off = self.sources, caller.source, desired.enabled is False
-        if closed := self._commands.refusal:
-            caller.done(Result(False, closed, superseded=True), now)
-            return False
-        self._take_holder(sources.poll(now), now)
-        self.was_commanded = True
-        late, held = '' if is_off else self._commands.lateness(now), sources.refusal(source)
-        if caller.is_stream and not late:
-            self._take_stream(source, desired, now)
-        elif is_off and not held:
-            # An OFF ends the ON that is remembered, though it may fail.
-            sources.forget_switch(source)
-        if is_off and held and source == sources.holder:
-            # A call under way refuses it, and may fail.
-            self._refused_off = source
-        sent = is_off and not held and self._send_unheard_off()
-        if sent:
-            self.switch.property.note_sent(OFF, now)
-        if refusal := late or held or self.unreachable(now):
-            refusal += '; an OFF was sent once' if sent else ''
-            caller.done(Result(False, refusal), now)
-            return False
-        if not caller.is_stream:
-            self._take_over(source, now)
-            # Calls that overlap, of which none succeeds, must not hold off the silence for ever.
-            if not sources.are_calling:
-                self.switch.silence.called_at = now
-            sources.begin_call(source)
-        return True
-
-    def _send_unheard_off(self) -> bool:
-        """
-        Send an OFF once to a light that is lost: it may hear though it is not heard.
-
-        :return: whether it was sent.
-        """
-        is_sent = not (self._liveness.connected or self._liveness.link_failure)
-        if is_sent:
-            self._commands.send_once(Command(self._address, OFF.command, OFF.params))
-        return is_sent
-
-    def _take_stream(self, source: str, desired: DesiredState, now: float) -> None:
-        """Take a request of a stream, which counts at once."""
-        self._forget_silenced(now)
-        self.switch.silence.requested_at = now
-        self._take_over(source, now)
-        self._take_holder(self.sources.claim(source, now), now)
-        # A request to a lost light has no effect later, but an OFF ends a remembered ON.
-        if self._liveness.connected or desired.enabled is False:
-            self.sources.remember(source, desired)
-
-    def _take_over(self, source: str, now: float) -> None:
-        """End the requests of another source, unless it is a higher one."""
-        if self.sources.takes_over(source):
-            self._end_requests(f'held by {source}', now)
-
-    def _end_requests(self, message: str, now: float) -> None:
-        self.switch.cancel(message, now, superseded=True)
-        self.configuration.cancel(message, now, superseded=True)
-
-    def is_held_by_other(self, source: str) -> bool:
-        """Return whether another source holds the light, so that a request is not sent."""
-        return bool(self.sources.refusal(source))
-
-    def release(self, source: str, now: float) -> str:
-        """
-        Release the light: the next lower source that has claimed it then holds it.
-
-        :return: the source that holds it now, '' if none does.
-        """
-        self._take_holder(self.sources.poll(now), now)
-        self._take_holder(self.sources.release(source, now), now)
-        self.update(now)
-        return self.sources.holder or ''
-
-    def _forget_silenced(self, now: float) -> None:
-        """Forget what would switch the light on, if it was requested before a silence."""
-        if self.sources.are_ranked and now >= self.switch.silence.ends_at:
-            self.sources.forget_on(
-                brightness_is_switch=bool(self.configuration.brightness_is_switch))
-
-    def _take_holder(self, change: HolderChanged[str] | None, now: float) -> None:
-        """Take a change of the source that holds the light."""
-        if change is None:
+    def cancel_configuration(self, now: float) -> None:
+        """Send no configuration again that is beyond the limits, or that a limit has asked for."""
+        attempt = self._configuration.attempt
+        if attempt is None:
             return
-        self._emit(DeviceHeld(self._address, change))
-        if change.after is None:
-            is_known_off = (self._liveness.connected and self.switch.enabled is False
-                            and not self.may_be_on(now))
-            if self._settings.off_on_release and not is_known_off:
-                reason = f'on_release: {change.before} no longer holds it'
-                self.switch.require_off(reason)
-                if self.switch.is_pending(ON) and not self.sources.are_calling:
-                    self.switch.cancel(reason, now, superseded=True)
-        elif change.cause is not Cause.CLAIM:
-            self._end_requests(f'held by {change.after}', now)
-            self._send_remembered(change.after, now)
+        goal, limits = attempt.goal.values, self._rules.settings.limits
+        if (limits.clipped(goal, self._twin.strobe_range) != goal
+                or not any(one.why is Why.REQUEST for one in attempt.goal.serves)):
+            self._withdraw(self._configuration, 'a limit was changed', now)
+
+    def switch_off_finally(self, now: float, report: Callable[[Result, float], None]) -> None:
+        """Report the results of the OFF at the end of the process."""
+        self._report, self._rules.wants_off = report, True
+        report(Result(False, 'sent, not confirmed' if now < self.switch.fence else ''), now)
+
+    # Known facts
+
+    @property
+    def is_configuring(self) -> bool:
+        """Whether a configuration is under way."""
+        return self._configuration.attempt is not None
+
+    def may_go_off(self, now: float) -> bool:
+        """Return whether the light is on, or may go on by an ON, and no OFF is under way."""
+        return self._may_be_switched_on(now) and not self.switch.is_under_way(OFF)
 
     def may_be_on(self, now: float) -> bool:
         """Return whether the light is on, or may go on by a command of ours that was sent."""
-        return self.switch.may_be_on(now) or self.configuration.may_switch(now)
+        return self._may_be_switched_on(now) or self._may_light_up(now)
 
-    def _send_remembered(self, source: str, now: float) -> None:
-        """Send the values that the new holder of the light has requested before."""
-        self._forget_silenced(now)
-        desired = self.sources.desired
-        reason = f'{source}, which holds the light now'
-        if self._commands.refusal or not self._liveness.connected:
-            if desired.enabled is False:
-                # It is sent when the light is heard again.
-                self.switch.require_off(reason)
-            return
-        caller = Caller(
-            _reported_failure(self._emit, self._address, source), now, source, True, reason)
-        if desired.enabled is False:
-            self._prepare_off(now)
-            self.switch.ask(False, now, caller)
-        if desired.brightness is not None:
-            self.configuration.set_brightness(desired.brightness)
-            self.configuration.update(now, is_off_pending=self.switch.is_pending(OFF))
-        if desired.enabled:
-            self.switch.ask(True, now, caller)
+    def _may_be_switched_on(self, now: float) -> bool:
+        switch, enabled = self.switch, self._twin.enabled
+        return bool(enabled or self.switch.is_under_way(ON) or switch.unconfirmed(now) == ON
+                    and (enabled is None or now < switch.fence))
 
-    # Answers
+    def _may_light_up(self, now: float) -> bool:
+        """Return whether a configuration of ours may have switched the light on."""
+        return bool(self._twin.brightness_is_switch) and (
+            self.is_configuring or now <= self._configuration.sent_at + IMPLIED_TIME)
 
-    def update(self, now: float) -> None:
-        """Send what is desired now, and answer the callers whose requests have ended."""
-        switch, configuration = self.switch, self.configuration
-        parts: tuple[Switch | LightConfiguration, ...] = switch, configuration
-        self.version += 1
-        has_outcomes = True
-        while has_outcomes:
-            for part in parts:
-                while part.property.outcomes:
-                    outcome = part.property.outcomes.popleft()
-                    part.take(outcome, now)
-                    self._finish(outcome, now)
-            if self._liveness.connected:
-                # First the configuration, so that an ON finds it.
-                configuration.update(now, is_off_pending=switch.is_pending(OFF))
-                if configuration.brightness_is_switch is not False and switch.is_off_due(now):
-                    self._prepare_off(now)
-                switch.update(now)
-            has_outcomes = bool(switch.property.outcomes or configuration.property.outcomes)
+    def _is_late(self, now: float) -> bool:
+        """Return whether a command of ours that ended unconfirmed asked for the present state."""
+        enabled = self._twin.enabled
+        return enabled is not None and self.switch.unconfirmed(now) == SWITCHES[enabled]
 
-    def _finish(self, outcome: Outcome[Status], now: float) -> None:
-        """Take the end of a value: a call that has succeeded counts from now on."""
-        result, status = outcome.result, outcome.status
-        if outcome.desired.change == ON and status and (
-                excess := self.configuration.excess(status)):
-            result = result._replace(
-                message=f'{result.message}; {", ".join(excess)}, and is brought back')
-        for caller in outcome.callers:
-            if caller.is_stream:
-                continue
-            change = self.sources.end_call(caller.source, now, success=result.success)
-            self._take_holder(change, now)
-            if result.success:
-                self._forget_silenced(now)
-                self.switch.silence.requested_at = now
-                self.sources.remember(caller.source, _wish(outcome))
-        if not self.sources.are_calling:
-            self.switch.silence.called_at = -math.inf
-            refused, self._refused_off = self._refused_off, ''
-            if refused and refused == self.sources.holder:
-                self._send_remembered(refused, now)
-        answer(outcome.callers, result, now)
-
-    # The end of the process
-
-    def close(self, now: float) -> None:
-        """Answer all requests, and make no change any more but :meth:`switch_off_finally`."""
-        self.sources = LightSources(None)
-        self.switch.close(self._commands.refusal, now)
-        self.configuration.cancel(self._commands.refusal, now, superseded=True)
-        self.update(now)
-
-    def switch_off_finally(self, now: float, report: Done) -> None:
-        """
-        Switch the light off, and again whenever it may be on, after :meth:`close`.
-
-        :param report: called with a failure that is not permanent when the first OFF is sent and
-            when one has failed, and with a success when the light shows it. The failure of a light
-            without an open link is permanent.
-        """
-        self.switch.switch_off_finally(now, report)
-        if unreachable := self.unreachable(now):
-            self._send_unheard_off()
-            report(Result(False, unreachable, permanent=bool(self._liveness.link_failure)), now)
-        self.update(now)
+    def _note_failure(self, now: float) -> None:
+        """Note that a command has ended unconfirmed."""
+        if self._twin.is_off_by_heat and self.switch.unconfirmed(now) == ON:
+            # It may light up once it has cooled down.
+            self._twin.enabled = None
+        elif self._is_late(now):
+            self._twin.tell(events.LATE_EFFECT)
 
     # Reports
 
     def expects(self, status: Status) -> bool:
         """Return whether a status shows what a command under way changes."""
-        return self.switch.property.expects(status) or self.configuration.property.expects(status)
+        return self.switch.expects(status) or self._configuration.expects(status)
 
     def may_cause(self, now: float) -> bool:
         """Return whether a command of ours may have caused what a status shows."""
-        switch, configuration = self.switch.property, self.configuration.property
-        return switch.command is not None or configuration.command is not None or (
+        switch, configuration = self.switch, self._configuration
+        return switch.attempt is not None or configuration.attempt is not None or (
             now <= max(switch.sent_at, configuration.sent_at) + IMPLIED_TIME)
 
-    def reported(self, status: Status, now: float, *, is_followed: bool) -> None:
-        """
-        Take a status that is not older than those before.
+    def reported(self, status: Status, now: float) -> None:
+        """Take a status that is not older than those before."""
+        twin, switch, configuration = self._twin, self.switch, self._configuration
+        self._rules.forget_silenced(now)
+        gap, late = twin.gap or 0.0, configuration.unconfirmed(now)
+        sent_at = max(switch.sent_at, -math.inf if late else configuration.sent_at)
+        cause = Cause(self.is_configuring, late, sent_at + IMPLIED_TIME)
+        before, was_off_by_heat = twin.enabled, twin.is_off_by_heat
+        twin.take(status)
+        origin = (events.LATE_EFFECT if self._is_late(now) else
+                  events.A_REQUEST if self._may_light_up(now) else events.OTHER_SENDER)
+        is_calm = switch.attempt is None and not twin.changing.are_changing
+        if twin.enabled and is_calm and not was_off_by_heat and (
+                before is None or not before and origin == events.OTHER_SENDER):
+            # Another sender has switched it on, or it was on when it was found.
+            self._rules.silence.requested_at = now
+        served = self._serve(switch, switch.reported(status, gap, now), now)
+        if not served and switch.attempt is None and (
+                twin.enabled is not before or not twin.is_told):
+            twin.tell(origin if twin.may_tell else '')
+        self._serve(configuration, configuration.reported(status, gap, now), now)
+        self._compare(status, cause, now)
 
-        :param is_followed: whether changes of others are followed and reported.
-        """
-        self._forget_silenced(now)
-        switched_at = self.switch.property.sent_at
-        self.switch.reported(status, now, may_be_ours=self.configuration.may_switch(now),
-                             is_told=is_followed)
-        self.configuration.reported(
-            status, now, can_follow=is_followed, switched_at=switched_at)
+    def _compare(self, status: Status, cause: Cause, now: float) -> None:
+        """Compare a status with what was agreed, with the rules, and with the limits."""
+        twin, rules, was_agreed = self._twin, self._rules, self._twin.agreed is not None
+        if was_agreed and not cause.is_busy:
+            rules.drop_shown(status)
+        twin.compare(rules.waiting, cause)
+        if not was_agreed and twin.agreed is not None:
+            for one in rules.weak:
+                one.due = min(one.due, now)
+            rules.drop_shown(status)
+        rules.keep_limits(now, is_busy=self.is_configuring)
 
     def restarted(self, status: Status, now: float) -> None:
-        """Take the first status after a restart."""
-        self._forget_silenced(now)
-        self.switch.restarted(status, now)
-        self.configuration.restarted(status, now)
+        """Take the first status after a restart, which confirms nothing."""
+        attempt, wanted = self._configuration.attempt, self._twin.agreed
+        self._rules.forget_silenced(now)
+        if attempt is not None:
+            # A set ends before the fence of the restart, and its values must not be lost with it.
+            wanted = attempt.goal.values
+        self._rules.restarted({} if wanted is None else {
+            name: getattr(wanted, name) for name in FIELDS if name != 'mode' or wanted.mode}, now)
+        for part in self.switch, self._configuration:
+            part.restarted(now)
+        self._twin.restarted(status)
+        self._compare(status, Cause(is_busy=attempt is not None), now)
 
-    def lost(self, now: float) -> None:
-        """Note that the light is not heard any more."""
-        message = self.unreachable(now)
-        self.switch.cancel(message, now)
-        self.configuration.cancel(message, now, superseded=False)
-        self.update(now)
+    # Results
+
+    def _serve(self, part: Property[Status], ended: list[Served[Status]], now: float) -> bool:
+        """Take the requests that a command has ended; return whether there are any."""
+        for served in ended:
+            if part is self.switch:
+                self._switched(served, now)
+            else:
+                self._configured(served, now)
+        for one in self._requests.live() if ended and part.attempt is None else ():
+            # A call for the same values that has no time to wait for another command.
+            if (one.is_call and one.values == ended[-1].request.values
+                    and now + self._target.commands.timeout > one.until):
+                self._requests.end(one, ended[-1].result, now)
+        return bool(ended)
+
+    def _switched(self, served: Served[Status], now: float) -> None:
+        one, result, on = served.request, served.result, served.change == ON
+        twin = self._twin
+        if result.success:
+            twin.enabled = on
+            self._rules.switched(one, on, now)
+            twin.tell(one.detail or events.A_REQUEST)
+            if on and served.status is not None and (reported := twin.reported) and (
+                    excess := self._rules.settings.limits.excess(reported)):
+                result = result._replace(
+                    message=f'{result.message}; {", ".join(excess)}, and is brought back')
+        else:
+            self._note_failure(now)
+        self._end(one, result, now)
+        if self._report is not None and result.success:
+            self._report(result, now)
+
+    def _configured(self, served: Served[Status], now: float) -> None:
+        one, result, change = served.request, served.result, served.change
+        assert isinstance(change, Configure)
+        if result.success:
+            self._twin.agree(change.configuration, change.names, served.status)
+        elif result.contradicted:
+            self._twin.failure = Failure(
+                result.message, change.configuration, self._twin.status)
+        if one.why in WEAK:
+            self._rules.ended(one, result, now)
+        else:
+            self._end(one, result, now)
+
+    def _end(self, one: Request, result: Result, now: float) -> None:
+        """End a request; a call that has succeeded counts from now on."""
+        self._requests.end(one, result, now)
+        if one.is_call and result.success:
+            self._rules.forget_silenced(now)
+            self._rules.silence.requested_at = now
 
     # Time
 
     def poll(self, now: float) -> None:
-        """Do what is due."""
-        self._take_holder(self.sources.poll(now), now)
-        self.switch.property.poll(now)
-        self.configuration.property.poll(now)
-        self.update(now)
+        """Go on with the commands that are due."""
+        for part in self.switch, self._configuration:
+            self._serve(part, part.poll(now), now)
 
-    def next_deadline(self) -> float:
-        """Return when :meth:`poll` has something to do."""
-        due = self.sources.next_deadline() if self.sources.are_ranked else math.inf
-        if self._liveness.connected:
-            due = min(due, self.switch.next_deadline(), self.configuration.next_deadline())
-        return due
-
-
-def _wish(outcome: Outcome[Status]) -> DesiredState:
-    """Return the values that a request has set."""
-    change = outcome.desired.change
-    return DesiredState(change == ON if change in (ON, OFF) else None, requested(outcome))
-
-
-def _reported_failure(
-    emit: Callable[[events.LightEvent], None], address: Address, source: str,
-) -> Done:
-    """Return a function that reports that the light does not have what a source requested."""
-    def done(result: Result, now: float) -> None:
-        if not (result.success or result.superseded):
-            emit(events.DesiredStateFailed(address, source, result.message))
-
-    return done
+    @property
+    def command_due(self) -> float:
+        """Return when a command is due, s."""
+        return min(self.switch.due, self._configuration.due)

@@ -20,9 +20,10 @@ from ..mavlink.command_sender import (
 from ..mavlink.dialect import mavlink
 from ..mavlink.messages import ComponentInformationBasic
 from ..mavlink.retries import MESSAGE, Retries
-from ..payload.confirmed_command import Done, Result, Target
+from ..payload.attempt import Target
 from ..payload.identity import Identity
 from ..payload.liveness import Liveness
+from ..payload.requests import Done, Result
 
 # s without a status after which the light is asked for one, and between the requests.
 STATUS_TIMEOUT = 2.5

@@ -232,6 +232,16 @@ class SafetyLimits:
         if excess := self._excess(name, value):
             raise InvalidValue(excess)
 
+    def excess_of(self, values: Changes) -> str:
+        """Describe how values that :func:`checked` has returned exceed the limits, '' if not."""
+        return ', '.join(filter(None, (self._excess(*one) for one in values.items())))
+
+    def clip(self, values: Changes) -> dict[str, Any]:
+        """Return the values within the limits that are nearest to others."""
+        nearest = {'brightness': self.max_brightness, 'strobe_period': self.min_strobe_period}
+        return {name: nearest[name] if self._excess(name, value) else value
+                for name, value in values.items()}
+
     def _excess(self, name: str, value: float) -> str:
         if name == 'brightness' and value > self.max_brightness:
             return f'brightness {value:g} % is above max_brightness {self.max_brightness:g} %'

@@ -36,6 +36,7 @@ DEGREE_SCALE, METRE_SCALE = 1e7, 1e4
 # COMMAND_INT: represents NaN in x and y.
 INT32_UNSET = 0x7FFFFFFF
 
+K = TypeVar('K')
 V = TypeVar('V')
 
 
@@ -282,6 +283,8 @@ class CommandSender:
     :ivar refusal: why no device may be changed any more, for people; '' if it may be.
     :ivar version: counts what has happened to commands, for those who keep a deadline of theirs.
     :ivar round_trips: the last round-trip time of each target, s, at most :data:`MAX_TARGETS`.
+    :ivar answers: how many acknowledgements, but those of progress, each kind of command got
+        lately, by target and MAV_CMD, at most :data:`MAX_TARGETS`.
     :raises ValueError: if ``timeout`` or ``retries`` is out of its range.
     """
 
@@ -293,6 +296,7 @@ class CommandSender:
     counters: CommandCounters = field(default_factory=CommandCounters)
     unanswering: dict[Address, None] = field(default_factory=dict)
     round_trips: dict[Address, float] = field(default_factory=dict)
+    answers: dict[tuple[Address, int], int] = field(default_factory=dict)
     version: int = 0
     refusal: str = ''
     _may_send: Callable[[Command | Message], bool] | None = None
@@ -381,6 +385,7 @@ class CommandSender:
             if older := self._pending.get(key):
                 self._end(older, CommandStatus.CANCELLED, now)
             self._pending[key] = sending
+            _keep(self.answers, key[:2], self.answers.get(key[:2], 0))
             sending.first_sent = now
             sending.tries = sending.rejected = tried
             self._transmit(sending, now)
@@ -403,6 +408,9 @@ class CommandSender:
             return False
         self.version += 1
         self.unanswering.pop(source, None)
+        key = source, ack.command
+        if key in self.answers and ack.result != mavlink.MAV_RESULT_IN_PROGRESS:
+            self.answers[key] += 1
         for pending in self._pending.values():
             if pending.command.command == ack.command and pending.command.target == source:
                 self._answered(pending, ack, now)
@@ -506,7 +514,7 @@ class CommandSender:
             self.refusal or self.clock_fault()), now)
 
 
-def _keep(values: dict[Address, V], target: Address, value: V) -> None:
+def _keep(values: dict[K, V], target: K, value: V) -> None:
     """Keep a value of a target; drop the one not renewed for longest if there are too many."""
     values.pop(target, None)
     values[target] = value

@@ -22,6 +22,8 @@ from dataclasses import dataclass, field
 import math
 from typing import Generic, NamedTuple, TypeVar
 
+from .requests import Done as Done  # noqa: F401 - gimbals import it from here
+from .requests import Result as Result
 from ..mavlink.command_sender import (
     Command,
     CommandPosition,
@@ -116,31 +118,6 @@ class Change(Generic[S]):
     shown_by: Callable[[S], bool | None] = field(default=lambda status: None, compare=False)
     actual: Callable[[S], str] = field(default=lambda status: '', compare=False)
     evidence: Callable[[S], str] | None = field(default=None, compare=False)
-
-
-class Result(NamedTuple):
-    """
-    The outcome of a request.
-
-    :param success: whether the device accepted it and, if it sends a status, shows it.
-    :param message: the outcome for people.
-    :param refused: whether the device answered with another result than ACCEPTED.
-    :param permanent: whether the same request will fail again.
-    :param contradicted: whether the device accepted it and then showed something else.
-    :param superseded: whether a newer request replaced it.
-    :param note: a change that was not asked for but came with it, for people, '' if none.
-    """
-
-    success: bool
-    message: str
-    refused: bool = False
-    permanent: bool = False
-    contradicted: bool = False
-    superseded: bool = False
-    note: str = ''
-
-
-Done = Callable[[Result, float], None]
 
 
 @dataclass(frozen=True)

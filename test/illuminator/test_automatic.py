@@ -12,8 +12,8 @@ from illuminator_ros.illuminator.events import (
     LightSwitched,
     StatesChanging,
 )
-from illuminator_ros.illuminator.light_control import LightSettings
 from illuminator_ros.illuminator.model import SafetyLimits
+from illuminator_ros.illuminator.settings import LightSettings
 from illuminator_ros.mavlink.dialect import mavlink
 from illuminator_ros.payload.command_sources import SourceSettings
 import pytest
@@ -34,7 +34,7 @@ def silenced(light: FakeLight | None = None, **faults: float) -> Pair:
 @pytest.mark.parametrize(('act', 'on'), [
     (lambda pair: pair.ask_enable(True), True),
     (lambda pair: pair.ask_configure(brightness=20.0), True),
-    (lambda pair: pair.light.control.set_brightness(20.0, pair.now), True),
+    (lambda pair: pair.light.set_brightness(20.0, pair.now), True),
     (lambda pair: pair.ask_refresh(), False),
 ], ids=['enable', 'configure', 'stream', 'refresh'])
 def test_a_light_stays_on_as_long_as_it_is_commanded(
@@ -45,8 +45,8 @@ def test_a_light_stays_on_as_long_as_it_is_commanded(
         act(pair)
         pair.run(SILENCE - 1.0)
 
-    assert pair.light.status
-    assert pair.light.status.enabled is on
+    assert pair.light.twin.status
+    assert pair.light.twin.status.enabled is on
 
 
 @pytest.mark.parametrize('way', ['request', 'another sender', 'already on'])
@@ -152,7 +152,7 @@ def _is_silent(pair: Pair) -> None:
 
 
 def _release(pair: Pair) -> None:
-    pair.light.control.release('default', pair.now)
+    pair.light.release('default', pair.now)
 
 
 def _end(pair: Pair) -> None:
@@ -297,7 +297,7 @@ def test_a_brightness_from_before_an_off_is_not_sent_after_it_where_that_is_the_
         pair.run(5.0)
     light.results[CONFIGURE] = [None, None, mavlink.MAV_RESULT_ACCEPTED]
     for brightness in setpoints:
-        pair.light.control.set_brightness(brightness, pair.now)
+        pair.light.set_brightness(brightness, pair.now)
         pair.turn()
     pair.run(0.05)
 
@@ -322,7 +322,7 @@ def test_a_configuration_that_is_restored_is_not_sent_after_an_off_where_brightn
     pair = learned(light)
     light.results[CONFIGURE] = [None, mavlink.MAV_RESULT_ACCEPTED]
     light.restart(pair.now, enable=1)
-    pair.run_until(lambda: pair.light.restarts)
+    pair.run_until(lambda: pair.light.twin.order.restarts)
 
     assert pair.enable(False).success
     pair.run(10.0)
@@ -333,7 +333,7 @@ def test_a_setpoint_that_an_off_replaces_is_not_reported_where_brightness_is_the
     light = FakeLight(brightness=50.0)
     pair = learned(light)
     light.results[CONFIGURE] = [None, mavlink.MAV_RESULT_ACCEPTED]
-    pair.light.control.set_brightness(30.0, pair.now)
+    pair.light.set_brightness(30.0, pair.now)
     pair.turn()
 
     assert pair.enable(False).success
@@ -344,7 +344,7 @@ def test_a_setpoint_waits_for_an_off_of_a_light_that_has_not_been_off_yet() -> N
     light = FakeLight(brightness=50.0, enable=1, results={ON_OFF: [None, None, 0]})
     pair = Pair(light).settle()
     off = pair.ask_enable(False)
-    pair.light.control.set_brightness(30.0, pair.now)
+    pair.light.set_brightness(30.0, pair.now)
     pair.run(0.5)
     assert (off.results, pair.commands(CONFIGURE)) == ([], [])
     # It reports a brightness while it is off, so that a brightness does not switch it on.

@@ -7,8 +7,8 @@ from dataclasses import replace
 from typing import Any
 
 from illuminator_ros.illuminator.events import SetpointFailed
-from illuminator_ros.illuminator.light_control import LightSettings
 from illuminator_ros.illuminator.model import SafetyLimits
+from illuminator_ros.illuminator.settings import LightSettings
 from illuminator_ros.mavlink.dialect import mavlink
 from illuminator_ros.payload.command_sources import SourceSettings
 import pytest
@@ -35,7 +35,7 @@ def change(pair: Pair, **settings: Any) -> float:
 
 
 def request(pair: Pair, source: str, on: bool) -> None:
-    pair.light.control.enable(on, pair.now, Answer(pair.now), source=source, is_stream=True)
+    pair.light.enable(on, pair.now, Answer(pair.now), source=source, is_stream=True)
     pair.turn()
 
 
@@ -106,7 +106,7 @@ def test_a_request_beyond_a_limit_that_is_set_meanwhile_fails_and_is_not_resent(
 def test_a_setpoint_beyond_a_limit_that_is_set_meanwhile_is_sent_as_the_limit() -> None:
     light, pair = served(brightness=20.0)
     light.results[CONFIGURE] = None
-    pair.light.control.set_brightness(90.0, pair.now)
+    pair.light.set_brightness(90.0, pair.now)
     pair.turn()
     pair.run(0.2)
 
@@ -146,7 +146,7 @@ def test_nothing_that_was_requested_before_a_silence_follows_its_change() -> Non
     pair.run(5.1)
 
     change(pair, off_after_silence=60.0)
-    pair.light.control.release('safety', pair.now)
+    pair.light.release('safety', pair.now)
     pair.run(5.0)
 
     assert light.fields['enable'] == 0

@@ -10,8 +10,8 @@ import random
 
 from illuminator_ros.illuminator.client import enable_all
 from illuminator_ros.illuminator.events import AutomaticSwitch, DesiredStateFailed
-from illuminator_ros.illuminator.light_control import LightSettings
 from illuminator_ros.illuminator.model import SafetyLimits
+from illuminator_ros.illuminator.settings import LightSettings
 from illuminator_ros.mavlink.dialect import mavlink
 from illuminator_ros.payload.arbitration import Cause
 from illuminator_ros.payload.command_sources import SourceSettings
@@ -40,7 +40,7 @@ class Shared:
 
     def enable(self, source: str, on: bool, *, is_stream: bool = True) -> Answer:
         answer = Answer(self.pair.now)
-        self.pair.light.control.enable(
+        self.pair.light.enable(
             on, self.pair.now, answer, source=source, is_stream=is_stream)
         self.pair.turn()
         return answer
@@ -50,11 +50,11 @@ class Shared:
         return self.enable(source, on, is_stream=False)
 
     def dim(self, source: str, brightness: float) -> None:
-        self.pair.light.control.set_brightness(brightness, self.pair.now, source=source)
+        self.pair.light.set_brightness(brightness, self.pair.now, source=source)
         self.pair.turn()
 
     def release(self, source: str) -> None:
-        self.pair.light.control.release(source, self.pair.now)
+        self.pair.light.release(source, self.pair.now)
         self.pair.turn()
 
     def take_over(self) -> float:
@@ -273,23 +273,26 @@ def test_an_off_under_way_is_resent_though_its_source_releases_the_light() -> No
     assert shared.light.fields['enable'] == 0
 
 
-@pytest.mark.parametrize('act', [
-    lambda shared: shared.dim('operator', 20.0),
-    lambda shared: (shared.enable('operator', True), shared.pair.run(1.0),
-                    shared.enable('operator', False))], ids=['never on', 'switched off'])
-def test_the_release_of_a_light_that_is_off_sends_nothing_where_release_is_off(
+def _switch_on_unseen(shared: Shared) -> None:
+    """Let another sender switch on, so that the status that shows it comes after the release."""
+    shared.light.stream = 0.0
+    shared.light.fields['enable'] = 1
+
+
+@pytest.mark.parametrize('act', [lambda shared: None, _switch_on_unseen], ids=['off', 'unseen on'])
+def test_the_off_of_a_release_is_sent_whatever_was_shown_last(
     act: Callable[[Shared], object],
 ) -> None:
     shared = Shared(off_on_release=True)
     shared.pair.settle()
-    act(shared)
+    shared.pair.wait_for(shared.enable('operator', False))
     shared.pair.run(1.0)
+    act(shared)
     released_at = shared.pair.now
     shared.release('operator')
     shared.pair.run(1.0)
 
-    assert shared.sent(ON_OFF, released_at) == []
-    assert not any(isinstance(one, AutomaticSwitch) for one in shared.pair.recorder.others)
+    assert (shared.sent(ON_OFF, released_at), shared.light.fields['enable']) == ([0.0], 0)
 
 
 @pytest.mark.parametrize(('is_switch', 'act'), [
@@ -353,19 +356,37 @@ def test_an_on_of_a_call_goes_on_when_the_hold_of_a_lower_source_ends() -> None:
     assert (shared.light.fields['enable'], shared.holder) == (1, 'operator')
 
 
-def test_a_call_whose_source_releases_the_light_meanwhile_claims_it_no_more() -> None:
-    shared = Shared()
+@pytest.mark.parametrize('off', [False, True])
+def test_a_release_ends_the_calls_of_its_source_and_then_decides(off: bool) -> None:
+    shared = Shared(off_on_release=off)
+    shared.light.apply_after = 0.2
     shared.pair.settle()
     answer = shared.call('operator', True)
     shared.release('operator')
-    shared.pair.run(1.0)
+    shared.pair.run(4.0)
 
-    assert answer.result.success
+    assert (answer.result.success, answer.result.message) == (False, 'released by operator')
+    assert off is any(one.reason.startswith('on_release') for one in shared.pair.recorder.others
+                      if isinstance(one, AutomaticSwitch))
     assert shared.holder == ''
     assert shared.pair.wait_for(shared.call('autonomy', False)).success
     # The release is reported, too, since the call had taken the light.
     assert [event.change.after for event in shared.pair.recorder.others
             if isinstance(event, DeviceHeld)] == [None, 'autonomy']
+
+
+def test_an_off_after_a_released_call_holds_the_light_though_that_call_ends_later() -> None:
+    shared = Shared(timeout=60.0)
+    shared.light.apply_after = 0.2
+    shared.pair.settle()
+    shared.call('safety', True)
+    shared.release('safety')
+    assert shared.pair.wait_for(shared.call('safety', False)).success
+    refused = shared.call('autonomy', True)
+    shared.pair.run(3.0)
+
+    assert refused.result.message == 'held by safety'
+    assert (shared.holder, shared.light.fields['enable']) == ('safety', 0)
 
 
 def test_an_off_that_a_call_under_way_refuses_is_sent_when_the_call_has_failed() -> None:
@@ -433,7 +454,7 @@ def test_values_that_wait_when_a_light_is_released_do_not_switch_it_on_later() -
     pair.run(1.0)
     pair.wait_for(shared.enable('operator', False))
     light.results[CONFIGURE] = None
-    pair.light.control.require({'brightness': 20.0}, pair.now)
+    pair.light.require({'brightness': 20.0}, pair.now)
     # The second try of the values was sent 2.4 s ago, and the third one is due in 0.3 s.
     pair.run(4.4)
     shared.release('operator')

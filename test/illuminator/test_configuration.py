@@ -9,8 +9,8 @@ from dataclasses import astuple, replace
 from typing import Any
 
 from illuminator_ros.illuminator.events import ChangeCause
-from illuminator_ros.illuminator.light_control import LightSettings
 from illuminator_ros.illuminator.model import Configuration, float32, Mode, SafetyLimits
+from illuminator_ros.illuminator.settings import LightSettings
 from illuminator_ros.mavlink.dialect import mavlink
 from illuminator_ros.mavlink.messages import CommandAck, result_name
 from illuminator_ros.payload.confirmed_command import Result
@@ -60,7 +60,7 @@ def test_a_confirmed_set_is_one_event_before_its_answer(pair: Pair) -> None:
     def done(result: Result, now: float) -> None:
         answers.append((result.message, pair.recorder.changes[-1]))
 
-    pair.light.control.configure({'brightness': 50, 'strobe_duty_cycle': 5}, pair.now, done)
+    pair.light.configure({'brightness': 50, 'strobe_duty_cycle': 5}, pair.now, done)
     pair.turn()
     pair.run(5.0)
     (message, event), = answers
@@ -151,7 +151,7 @@ def test_a_setpoint_is_sent_though_the_parameters_do_not_follow_a_changing_light
     faked.run(1.0)
     assert faked.snapshot.states_are_changing
     assert confirmed(faked).brightness == agreed
-    faked.light.control.set_brightness(agreed, faked.now)
+    faked.light.set_brightness(agreed, faked.now)
     faked.run(1.0)
 
     assert fake.fields['brightness'] == agreed
@@ -299,7 +299,7 @@ def test_a_discrepancy_ends_when_another_sender_changes_the_light(
 
 def publish(pair: Pair, *values: float, rate: float = 0.0) -> None:
     for value in values:
-        pair.light.control.set_brightness(value, pair.now)
+        pair.light.set_brightness(value, pair.now)
         pair.turn()
         if rate:
             pair.run(1 / rate)
@@ -378,11 +378,13 @@ def test_a_setpoint_is_sent_again_where_the_light_may_have_another_value(
     assert fake.fields['brightness'] == last
 
 
-def test_a_setpoint_that_is_under_way_is_not_sent_again(fake: FakeLight, faked: Pair) -> None:
+def test_setpoints_that_come_while_one_is_under_way_are_replaced_by_the_newest(
+    fake: FakeLight, faked: Pair,
+) -> None:
     fake.apply_after = 0.2
     publish(faked, 40.0, 50.0, 40.0)
     faked.run(2.0)
-    assert sent(faked) == [(1, 40, 0, 0)]
+    assert sent(faked) == [(1, 40, 0, 0)] * 2
     assert confirmed(faked).brightness == 40.0
 
 
@@ -421,7 +423,7 @@ def test_a_setpoint_waits_for_a_set_and_does_not_end_it(fake: FakeLight, faked: 
 
 def test_a_stream_does_not_keep_overrides_from_being_sent(fake: FakeLight, faked: Pair) -> None:
     fake.results[CONFIGURE] = [None, None, None, ACCEPTED]
-    faked.light.control.require({'strobe_period': 2.0}, faked.now)
+    faked.light.require({'strobe_period': 2.0}, faked.now)
     publish(faked, *[value % 100 / 1.0 for value in range(400)], rate=50)
     assert fake.fields['strobe_period'] == 2.0
 
@@ -431,7 +433,7 @@ def test_a_stream_does_not_keep_overrides_from_being_sent(fake: FakeLight, faked
 def overriding(fake: FakeLight, settings: LightSettings | None = None, **values: Any) -> Pair:
     """Return a pair whose light must be configured as soon as it is found."""
     return Pair(fake, settings=settings,
-                on_light=lambda light: light.control.require(values, START))
+                on_light=lambda light: light.require(values, START))
 
 
 def successes(pair: Pair) -> list[bool]:
@@ -498,7 +500,7 @@ def test_overrides_and_a_restored_configuration_reach_a_light_that_answers_too_l
     fake: FakeLight, latency: float,
 ) -> None:
     pair = Pair(fake, there=Faults(latency=latency),
-                on_light=lambda light: light.control.require({'brightness': 30.0}, START))
+                on_light=lambda light: light.require({'brightness': 30.0}, START))
     for _ in range(2):
         at = pair.now
         fake.restart(at)

@@ -8,7 +8,7 @@ from __future__ import annotations
 from typing import Any
 
 from illuminator_ros.illuminator import events
-from illuminator_ros.illuminator.light_control import LightSettings
+from illuminator_ros.illuminator.settings import LightSettings
 from illuminator_ros.mavlink import messages as mav
 from illuminator_ros.mavlink.dialect import mavlink
 from illuminator_ros.payload.device_events import DeviceConnected, DeviceForgotten, DeviceFound
@@ -128,7 +128,7 @@ def test_silent_lights_that_were_never_commanded_give_their_places_to_others(
 ) -> None:
     for source in FORGED[:MAX_DEVICES]:
         client.receive(source, status_message(), 0.0)
-    client.lights[FORGED[0]].control.enable(True, 0.0, lambda result, now: None)
+    client.lights[FORGED[0]].enable(True, 0.0, lambda result, now: None)
     client.run(55.0)
     assert len(client.lights) == MAX_DEVICES
     client.run(70.0)

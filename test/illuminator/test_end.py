@@ -17,8 +17,8 @@ from illuminator_ros.illuminator.events import (
     SetpointFailed,
 )
 from illuminator_ros.illuminator.light import Light
-from illuminator_ros.illuminator.light_control import LightSettings
 from illuminator_ros.illuminator.model import SafetyLimits
+from illuminator_ros.illuminator.settings import LightSettings
 from illuminator_ros.illuminator.simulated_properties import (
     IlluminatorBehaviour,
     IlluminatorProperties,
@@ -148,8 +148,8 @@ def test_a_closed_bridge_sends_no_change_but_off_where_that_is_asked_for(
     ending.begin(off=off)
     later = [pair.ask_enable(True), pair.ask_enable(False), pair.ask_configure(brightness=30.0),
              pair.ask_refresh()]
-    pair.light.control.set_brightness(40.0, pair.now)
-    pair.light.control.require({'brightness': 50.0}, pair.now)
+    pair.light.set_brightness(40.0, pair.now)
+    pair.light.require({'brightness': 50.0}, pair.now)
     pair.run(LIMIT)
 
     assert {answer.result.message for answer in under_way + later} == {ENDING}
@@ -297,7 +297,7 @@ def test_a_light_that_is_on_or_gets_an_on_may_be_left_on_without_an_off(
         ending.pair.ask_enable(ask)
     ending.begin(off=False)
 
-    assert ending.pair.light.control.may_be_on(ending.pair.now) is may_be_left_on
+    assert ending.pair.light.may_be_on(ending.pair.now) is may_be_left_on
 
 
 @pytest.mark.parametrize(('results', 'sends_status', 'reason'), [

@@ -225,7 +225,7 @@ def test_ten_minutes_of_loss_with_a_reboot_in_them_are_one_restart_and_the_light
     faked.run(300.0)
     fake.silent = False
     faked.run(3.0)
-    assert faked.light.restarts == 1
+    assert faked.light.twin.order.restarts == 1
     assert (fake.fields['brightness'], fake.fields['enable']) == (40.0, 0)
     assert faked.enable(True).success
 
@@ -257,7 +257,7 @@ def test_an_on_after_a_restart_is_not_confirmed_by_what_came_from_before_it(
     shows_on = fake.status(faked.now)
     shows_on.enable = 1
     fake.restart(faked.now)
-    faked.run_until(lambda: faked.light.restarts)
+    faked.run_until(lambda: faked.light.twin.order.restarts)
     second = faked.ask_enable(True)
     for _ in range(20):
         fake.send(mavlink.MAVLink_command_ack_message(ON_OFF, 0))

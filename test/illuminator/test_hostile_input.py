@@ -13,9 +13,8 @@ from typing import Any
 from illuminator_ros.mavlink import messages as mav
 from illuminator_ros.mavlink.dialect import CRC_EXTRA
 from illuminator_ros.mavlink.signing import MAX_STREAMS, SigningMode
-from illuminator_ros.payload.confirmed_command import Result
-from illuminator_ros.payload.device_property import MAX_CALLERS
 from illuminator_ros.payload.discovery import MAX_DEVICES
+from illuminator_ros.payload.requests import MAX_CALLS, Result
 import pytest
 from support.attacked_link import ATTACKED, AttackedBridge, AttackedLink, GENUINE
 from support.fake_light import status_message
@@ -124,7 +123,7 @@ def test_a_set_ends_within_0_9_s_in_a_flood_that_never_ends(
     if fault:
         bridge.disturb(fault)
     begun = link.now
-    link.call(lambda now: light.control.configure(
+    link.call(lambda now: light.configure(
         {'brightness': 55.0}, now,
         lambda result, now: ended.append((result.success, now - begun))))
     bridge.genuine(1.2)
@@ -146,24 +145,26 @@ def test_a_flood_of_requests_is_refused_beyond_a_limit_and_all_are_answered(
     bridge: AttackedBridge,
 ) -> None:
     light = bridge.controller.lights[GENUINE]
-    answers: list[list[Result]] = [[] for _ in range(10 * MAX_CALLERS)]
+    answers: list[list[Result]] = [[] for _ in range(10 * MAX_CALLS)]
 
     def ask(now: float) -> None:
         for results in answers:
-            light.control.enable(True, now, lambda result, now, to=results: to.append(result))
+            light.enable(True, now, lambda result, now, to=results: to.append(result))
 
     bridge.link.ask(ask)
     bridge.check_bounds()
     bridge.check_service()
     assert [len(results) for results in answers] == [1] * len(answers)
-    assert [results[0].success for results in answers].count(True) == MAX_CALLERS
+    assert [results[0].success for results in answers].count(True) == MAX_CALLS
 
 
 # Values
 
 def send_status(bridge: AttackedBridge, later_ms: int = 10, **fields: Any) -> None:
     """Send a status in the name of the genuine light."""
-    uptime_ms = bridge.controller.lights[GENUINE].status.uptime_ms + later_ms
+    status = bridge.controller.lights[GENUINE].twin.status
+    assert status is not None
+    uptime_ms = status.uptime_ms + later_ms
     flood(bridge, [frame_of(status_message(uptime_ms, **{'enable': 1, **fields}), 0, GENUINE)])
 
 

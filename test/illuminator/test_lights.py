@@ -8,9 +8,9 @@ from __future__ import annotations
 import functools
 from typing import Any
 
-from illuminator_ros.illuminator.light_control import LightSettings
 from illuminator_ros.illuminator.light_queries import SETTLING_TIME
 from illuminator_ros.illuminator.messages import STATUS_ID
+from illuminator_ros.illuminator.settings import LightSettings
 from illuminator_ros.illuminator.simulated_properties import IlluminatorProperties
 from illuminator_ros.mavlink import messages as mav
 from illuminator_ros.mavlink.dialect import decode, encode, mavlink
@@ -74,7 +74,7 @@ def test_a_line_that_is_lost_beside_another_one_takes_its_lights_and_their_reque
     first, second = pair.controller.lights.values()
     results: dict[mav.Address, Any] = {}
     for light in (first, second):
-        light.control.enable(True, pair.now, functools.partial(
+        light.enable(True, pair.now, functools.partial(
             lambda address, result, now: results.update({address: result}), light.address))
     pair.controller.components_lost([first.address], pair.now, 'unplugged')
     assert (first.connected, second.connected) == (False, True)
@@ -115,7 +115,7 @@ def test_a_restart_is_one_event_after_the_light_is_heard_again(
         light.restart(pair.now)
     pair.run(60.0)
     assert [event.partition(':')[0] for event in pair.recorder.events[1:]] == events
-    assert pair.light.restarts == events.count('restarted')
+    assert pair.light.twin.order.restarts == events.count('restarted')
 
 
 # The stream of statuses
@@ -244,7 +244,7 @@ def test_an_identity_that_does_not_come_is_requested_so_often_and_the_reason_nam
 
 def test_a_light_that_ignores_the_request_for_its_identity_confirms_changes_as_fast() -> None:
     pair = Pair(Selective(None, stream=0.0), command_timeout=5.0)
-    pair.run_until(lambda: pair.controller.lights and pair.light.status)
+    pair.run_until(lambda: pair.controller.lights and pair.light.twin.status)
     assert not pair.snapshot.identity_is_settled
     answer = pair.ask_enable(True)
     assert pair.wait_for(answer).success

@@ -7,9 +7,9 @@ from typing import Any
 
 from hypothesis import given, settings, strategies
 from illuminator_ros.illuminator.events import LimitExceeded, SetpointClipped
-from illuminator_ros.illuminator.light_configuration import LIMIT_INTERVAL
-from illuminator_ros.illuminator.light_control import LightSettings
+from illuminator_ros.illuminator.limit_watch import LIMIT_INTERVAL
 from illuminator_ros.illuminator.model import float32, SafetyLimits
+from illuminator_ros.illuminator.settings import LightSettings
 from illuminator_ros.mavlink.dialect import mavlink
 import pytest
 from support.back_to_back import Pair
@@ -50,9 +50,9 @@ def test_limits_hold_for_each_frame_on_the_wire(
             pair.ask_configure(strobe_period=strobe_period)
             pair.ask_configure(brightness=brightness, strobe_duty_cycle=10.0)
         elif way == 'stream':
-            pair.light.control.set_brightness(brightness, pair.now)
+            pair.light.set_brightness(brightness, pair.now)
         elif way == 'override':
-            pair.light.control.require(
+            pair.light.require(
                 {'brightness': brightness, 'strobe_period': strobe_period}, pair.now)
         elif way == 'restart':
             pair.device.restart(pair.now)
@@ -82,7 +82,7 @@ def test_a_stream_beyond_a_limit_is_clipped_and_reported() -> None:
     _, pair = limited(brightness=50.0)
 
     for _ in range(20):
-        pair.light.control.set_brightness(90.0, pair.now)
+        pair.light.set_brightness(90.0, pair.now)
         pair.run(0.1)
 
     assert {command.param2 for command in pair.commands(CONFIGURE)} == {60.0}
@@ -124,7 +124,7 @@ def test_a_light_that_restarts_beyond_a_limit_is_brought_back_at_once() -> None:
     assert light.fields['brightness'] == 60.0
     light.restart(pair.now)
     pair.run(0.1)
-    assert (pair.light.restarts, light.fields['brightness']) == (1, 60.0)
+    assert (pair.light.twin.order.restarts, light.fields['brightness']) == (1, 60.0)
 
 
 def test_a_light_whose_on_resets_its_brightness_is_brought_back_and_the_answer_says_so() -> None:
@@ -156,7 +156,7 @@ def test_a_light_that_restarts_within_the_limits_is_not_sent_what_it_had_beyond_
     light.restart(pair.now, **within)
     pair.run(10.0)
 
-    assert pair.light.restarts == 1
+    assert pair.light.twin.order.restarts == 1
     assert pair.commands(CONFIGURE, since=restarted_at) == []
     assert pair.snapshot.configuration
     assert pair.snapshot.configuration.brightness == 60.0

@@ -34,7 +34,7 @@ def test_each_kind_of_light_is_found_switched_configured_restored_and_never_lost
     assert pair.light.address == PROFILES[profile].properties.address
     for on in (True, False, True):
         assert pair.enable(on).success
-        assert pair.light.status is not None and pair.light.status.enabled is on
+        assert pair.light.twin.status is not None and pair.light.twin.status.enabled is on
     assert pair.configure(brightness=30).success
     assert pair.configure(strobe_period=1).success is strobes
     # A set that follows a refused one within 1.5 s cannot be confirmed in its time.
@@ -44,7 +44,7 @@ def test_each_kind_of_light_is_found_switched_configured_restored_and_never_lost
     assert pair.configure(mode='internal_control').success
     pair.run(60.0)
     assert pair.recorder.events == ['connected']
-    assert pair.light.control.configuration.strobe_range.known is strobes
+    assert pair.light.twin.strobe_range.known is strobes
     assert (pair.snapshot.temperature is not None) is strobes
     identity = pair.snapshot.identity
     assert (identity is not None) is strobes

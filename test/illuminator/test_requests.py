@@ -127,7 +127,7 @@ def test_requests_to_a_lost_light_fail_at_once_with_the_reason(
     faked.run(10.0 - (faked.now - faked.light.liveness.heard_at))
     sent = len(faked.commands())
     answers = [faked.ask_enable(True), faked.ask_configure(brightness=50), faked.ask_refresh()]
-    faked.light.control.set_brightness(50.0, faked.now)
+    faked.light.set_brightness(50.0, faked.now)
     assert {(answer.seconds, answer.result.message) for answer in answers} == {
         (0.0, f'light 1/243 is lost: {reason}')}
     assert faked.recorder.failed_setpoints == [f'light 1/243 is lost: {reason}']
@@ -185,15 +185,42 @@ def test_an_off_that_replaces_an_on_is_sent_at_once_and_confirmed_after_the_fenc
     assert (timing(off.result.message)[0], len(faked.commands(ON_OFF))) == (tries, 1 + tries)
 
 
-def test_a_set_takes_over_the_values_of_the_set_that_it_supersedes(
+def test_sets_of_different_fields_share_a_command_and_are_answered_by_their_own_values(
     fake: FakeLight, faked: Pair,
 ) -> None:
     fake.apply_after = 0.1
     first, second = faked.ask_configure(brightness=50), faked.ask_configure(strobe_period=1)
-    assert first.result.message == (
-        'superseded by brightness 50 %, strobe_period 1 s, strobe_duty_cycle 50 %')
+    assert not first.results
+    for answer, text in ((first, 'brightness 50 %, confirmed by'),
+                         (second, 'strobe_period 1 s, strobe_duty_cycle 50 %, confirmed by')):
+        result = faked.wait_for(answer)
+        assert result.success
+        assert result.message.startswith(text)
+    assert [(m.param2, m.param3) for m in faked.commands(CONFIGURE)][:2] == [(50, 0), (50, 1)]
+
+
+def test_a_set_succeeds_by_its_own_value_though_the_light_keeps_another_field(
+    fake: FakeLight, faked: Pair,
+) -> None:
+    fake.applies = False
+    faked.light.require({'strobe_duty_cycle': 20.0}, faked.now)
+    faked.run(1.5)
+    answer = faked.ask_configure(brightness=40)
+    fake.fields['brightness'] = 40.0
+    assert faked.wait_for(answer).success
+    assert faked.commands(CONFIGURE)[-1].param4 == 20.0
+    assert faked.snapshot.discrepancy
+
+
+def test_a_set_ends_an_earlier_one_that_wants_another_value_of_one_of_its_fields(
+    fake: FakeLight, faked: Pair,
+) -> None:
+    fake.apply_after = 0.1
+    first = faked.ask_configure(brightness=50, strobe_duty_cycle=20)
+    second = faked.ask_configure(brightness=60)
+    assert first.result.message == 'superseded by brightness 60 %'
     assert faked.wait_for(second).success
-    assert (fake.fields['brightness'], fake.fields['strobe_period']) == (50.0, 1.0)
+    assert fake.fields['brightness'] == 60.0
 
 
 def test_a_program_that_sets_each_second_is_not_locked_out_by_a_set_that_failed(
@@ -215,7 +242,7 @@ def test_a_stream_of_brightness_is_followed_again_after_a_lost_acknowledgement(
     for number in range(500):
         if number == 400:
             begun = faked.now
-        faked.light.control.set_brightness(10.0 + number % 80, faked.now)
+        faked.light.set_brightness(10.0 + number % 80, faked.now)
         faked.turn()
         faked.run(0.02)
 
@@ -295,9 +322,9 @@ def test_an_answer_may_start_the_next_request(pair: Pair, kind: int) -> None:
 
     def ask(now: float) -> None:
         if kind == ON_OFF:
-            pair.light.control.enable(len(log) % 2 == 0, now, done)
+            pair.light.enable(len(log) % 2 == 0, now, done)
         else:
-            pair.light.control.configure({'brightness': 10 * len(log)}, now, done)
+            pair.light.configure({'brightness': 10 * len(log)}, now, done)
 
     def done(result: Result, now: float) -> None:
         log.append(result.success)
@@ -314,7 +341,7 @@ def test_an_answer_that_raises_does_not_hold_up_other_requests(pair: Pair) -> No
     def done(result: Result, now: float) -> None:
         raise RuntimeError('as the test says')
 
-    pair.light.control.enable(True, pair.now, done)
+    pair.light.enable(True, pair.now, done)
     answer = pair.ask_enable(True)
     with pytest.raises(RuntimeError):
         pair.run(5.0)
@@ -384,8 +411,8 @@ def test_a_refresh_requests_status_and_identity_and_takes_both(
                               'COMPONENT_INFORMATION_BASIC: received (4 ms)')
     assert {message.param1 for message in faked.commands(REQUEST, since=at)} == {
         STATUS_ID, mav.INFORMATION_ID}
-    assert faked.light.status is not None
-    assert faked.light.status.brightness == 12.0
+    assert faked.light.twin.status is not None
+    assert faked.light.twin.status.brightness == 12.0
     assert faked.snapshot.identity == Identity(serial_number='T-2')
 
 

@@ -53,7 +53,7 @@ def test_a_status_that_comes_late_neither_confirms_nor_restarts(
     faked.run(0.1)
     fake.send(old)
     assert not faked.wait_for(answer).success
-    assert faked.light.restarts == 0
+    assert faked.light.twin.order.restarts == 0
 
 
 @pytest.mark.parametrize('fields', [
@@ -91,7 +91,7 @@ def test_a_value_that_the_status_lacks_is_not_called_confirmed(
 
 def test_each_switch_is_one_event_with_its_origin(fake: FakeLight, faked: Pair) -> None:
     events = events_of(faked)
-    faked.light.control.enable(True, faked.now, lambda result, now: None, detail='service')
+    faked.light.enable(True, faked.now, lambda result, now: None, detail='service')
     faked.run(40.0)
     fake.fields['enable'] = 0
     faked.run(3.0)
@@ -181,6 +181,6 @@ def test_a_request_is_answered_before_its_status_is_published(faked: Pair) -> No
             order.append('status')
 
     faked.controller.events.subscribe(note)
-    faked.light.control.enable(True, faked.now, lambda result, now: order.append('answer'))
+    faked.light.enable(True, faked.now, lambda result, now: order.append('answer'))
     faked.run(1.0)
     assert order[:2] == ['answer', 'status']

@@ -7,8 +7,8 @@ from __future__ import annotations
 
 import random
 
-from illuminator_ros.illuminator.light_control import LightSettings
 from illuminator_ros.illuminator.model import Mode
+from illuminator_ros.illuminator.settings import LightSettings
 from illuminator_ros.illuminator.simulated_properties import IlluminatorProperties
 from illuminator_ros.illuminator.thermal import ThermalProperties
 from illuminator_ros.mavlink.messages import Address
@@ -57,7 +57,7 @@ def test_random_schedules_end_with_one_answer_each_and_the_true_state(seed: int)
         # Under external sync only the mode is followed.
         assert followed.mode is actual.mode
         assert followed == actual or actual.mode is Mode.EXTERNAL_SYNC
-        assert light.status is not None
-        assert light.status.enabled == simulated.device.enabled
+        assert light.twin.status is not None
+        assert light.twin.status.enabled == simulated.device.enabled
         assert light.next_deadline() > pair.now
     assert pair.controller.sender.next_deadline() == float('inf')

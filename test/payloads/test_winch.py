@@ -10,7 +10,7 @@ from illuminator_ros.cli.simulator.components import components, Scenario, scena
 from illuminator_ros.cli.simulator.console import execute
 from illuminator_ros.cli.simulator.options import parser, payload_types
 from illuminator_ros.illuminator.client import IlluminatorClient
-from illuminator_ros.illuminator.light_control import LightSettings
+from illuminator_ros.illuminator.settings import LightSettings
 from illuminator_ros.mavlink.command_sender import CommandSender
 from illuminator_ros.mavlink.component import Component, Endpoint
 from illuminator_ros.mavlink.dialect import mavlink
@@ -90,7 +90,7 @@ def test_one_component_with_one_heartbeat_finds_both(vehicle: Vehicle) -> None:
 
 def test_each_payload_gets_the_result_of_its_own_request(vehicle: Vehicle) -> None:
     lit: list[Result] = []
-    vehicle.lights.lights[LIGHT].control.enable(
+    vehicle.lights.lights[LIGHT].enable(
         True, vehicle.now, lambda result, now: lit.append(result))
     for length in (5.0, -9.0):
         vehicle.release(length)

@@ -51,12 +51,13 @@ def test_a_lower_limit_dims_the_light_at_once_and_is_shown(own_ros: Ros) -> None
         assert refused.reason == 'brightness 60 % is above max_brightness 50 %'
         own_ros.publish(Float32, '/illuminator/cmd/brightness', 60.0)
         bridge.wait_for('brightness 60 % is above max_brightness 50 %: the limit is sent')
+        light.wait_for(CONFIGURE, count=2)
         # All or none, and the limit is put back.
         result = parameters.set_atomically(max_brightness=40.0, brightness=45.0)
         assert result.reason == 'brightness 45 % is above max_brightness 40 %'
         own_ros.synchronize()
         assert parameters.get('max_brightness', 'brightness') == [50.0, 50.0]
-        assert [command.param2 for command in light.commands(CONFIGURE)] == [50.0]
+        assert [command.param2 for command in light.commands(CONFIGURE)] == [50.0, 50.0]
 
         assert parameters.set(max_brightness=100.0)[0].successful
         parameters.wait_range('brightness', 100.0)

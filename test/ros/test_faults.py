@@ -11,7 +11,6 @@ from unittest import mock
 from diagnostic_msgs.msg import DiagnosticArray
 from illuminator_ros.illuminator.client import IlluminatorClient
 from illuminator_ros.illuminator.light import Light
-from illuminator_ros.illuminator.light_control import LightControl
 from illuminator_ros.illuminator.ros.event_publisher import EventPublisher
 from illuminator_ros.ros.bridge import Bridge
 from illuminator_ros.ros.diagnostics_publisher import DiagnosticsPublisher
@@ -96,9 +95,9 @@ def start_set(ros: Ros, atomically: bool) -> Call:
 
 
 @pytest.mark.parametrize(('owner', 'method', 'service'), [
-    (LightControl, 'enable', 'enable'), (Light, 'refresh', 'refresh'),
-    (LightControl, 'configure', 'set_parameters'),
-    (LightControl, 'configure', 'set_parameters_atomically')])
+    (Light, 'enable', 'enable'), (Light, 'refresh', 'refresh'),
+    (Light, 'configure', 'set_parameters'),
+    (Light, 'configure', 'set_parameters_atomically')])
 def test_service_that_fails_inside_answers_with_the_exception(
     ros: Ros, light: ServedLight, owner: type, method: str, service: str,
 ) -> None:
@@ -149,7 +148,7 @@ def test_command_topic_goes_on_after_it_has_failed(
     ros: Ros, light: ServedLight, topic: str, type_: Any, value: object, method: str,
 ) -> None:
     light.report(enable=0)
-    with fault(LightControl, method) as failing:
+    with fault(Light, method) as failing:
         ros.publish(type_, f'/illuminator/cmd/{topic}', value)
         eventually(lambda: failing.called)
 

@@ -12,7 +12,6 @@ from unittest.mock import Mock
 
 from diagnostic_msgs.msg import DiagnosticStatus
 from illuminator_ros.illuminator.events import LightSnapshot
-from illuminator_ros.illuminator.light_control import LightSettings
 from illuminator_ros.illuminator.ros.diagnostics import (
     FLAG_PAUSE,
     FlagLog,
@@ -20,6 +19,7 @@ from illuminator_ros.illuminator.ros.diagnostics import (
     LightsHeard,
     reports,
 )
+from illuminator_ros.illuminator.settings import LightSettings
 from illuminator_ros.mavlink.dialect import mavlink
 from illuminator_ros.mavlink.link_state import LinkState
 from illuminator_ros.mavlink.messages import Address, CommandAck, Heartbeat, heartbeat
@@ -241,7 +241,7 @@ def test_missing_light_is_a_warning_with_its_likeliest_reason_and_an_error_after
 def test_silent_light_that_signs_while_signing_is_off_is_a_warning_with_the_remedy() -> None:
     reported = Reported()
     reported.receive(signed_frame(1))
-    reported.link.ask(lambda now: reported.client.lights[LIGHT].control.enable(
+    reported.link.ask(lambda now: reported.client.lights[LIGHT].enable(
         True, now, lambda result, now: None))
     for _ in range(3):
         reported.link.run(1.0)

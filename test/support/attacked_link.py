@@ -10,7 +10,7 @@ import math
 import random
 from typing import Any, cast
 
-from illuminator_ros.illuminator.light_control import LightSettings
+from illuminator_ros.illuminator.settings import LightSettings
 from illuminator_ros.illuminator.simulated import SimulatedIlluminator
 from illuminator_ros.illuminator.simulated_properties import FAULTS, IlluminatorProperties
 from illuminator_ros.mavlink.dialect import mavlink
@@ -160,10 +160,10 @@ class AttackedBridge(AttackedLink):
         if asked < 3:
             self.results.append(results)
         self.link.ask((
-            lambda now: light.control.enable(brightness > 50, now, done),
-            lambda now: light.control.configure({'brightness': brightness}, now, done),
+            lambda now: light.enable(brightness > 50, now, done),
+            lambda now: light.configure({'brightness': brightness}, now, done),
             lambda now: light.refresh(now, done),
-            lambda now: light.control.set_brightness(brightness, now))[asked])
+            lambda now: light.set_brightness(brightness, now))[asked])
 
     def check_service(self) -> None:
         self.genuine(ANSWERED_WITHIN)
@@ -184,8 +184,8 @@ class AttackedBridge(AttackedLink):
                 def done(outcome: Result, now: float) -> None:
                     to.append(outcome)
 
-                light.control.enable(on, now, done)
-                light.control.configure({'brightness': brightness}, now, done)
+                light.enable(on, now, done)
+                light.configure({'brightness': brightness}, now, done)
 
             self.link.ask(ask)
             self.genuine(2.0)

@@ -10,7 +10,7 @@ from typing import Any
 
 from illuminator_ros.illuminator.events import LightEvent, LightSnapshot
 from illuminator_ros.illuminator.light import Light
-from illuminator_ros.illuminator.light_control import LightSettings
+from illuminator_ros.illuminator.settings import LightSettings
 from illuminator_ros.illuminator.simulated import SimulatedIlluminator
 from illuminator_ros.illuminator.simulated_properties import IlluminatorProperties
 from illuminator_ros.mavlink import messages as mav
@@ -122,14 +122,14 @@ class Pair(Line):
     ) -> Answer:
         """Begin to switch a light on or off."""
         answer = Answer(self.now)
-        (light or self.light).control.enable(on, self.now, answer, is_stream=is_stream)
+        (light or self.light).enable(on, self.now, answer, is_stream=is_stream)
         self.turn()
         return answer
 
     def ask_configure(self, light: Light | None = None, **changes: Any) -> Answer:
         """Begin to configure a light."""
         answer = Answer(self.now)
-        (light or self.light).control.configure(changes, self.now, answer)
+        (light or self.light).configure(changes, self.now, answer)
         self.turn()
         return answer
 

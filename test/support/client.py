@@ -6,7 +6,7 @@
 from typing import Any
 
 from illuminator_ros.illuminator.client import IlluminatorClient
-from illuminator_ros.illuminator.light_control import LightSettings
+from illuminator_ros.illuminator.settings import LightSettings
 from illuminator_ros.mavlink.command_sender import CommandSender
 from illuminator_ros.mavlink.component import Component
 from illuminator_ros.mavlink.messages import Address

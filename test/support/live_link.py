@@ -13,7 +13,7 @@ from typing import Any, Generic, TypeVar
 
 from illuminator_ros.illuminator.events import LightEvent
 from illuminator_ros.illuminator.light import Light
-from illuminator_ros.illuminator.light_control import LightSettings
+from illuminator_ros.illuminator.settings import LightSettings
 from illuminator_ros.illuminator.simulated import SimulatedIlluminator
 from illuminator_ros.illuminator.simulated_properties import IlluminatorProperties
 from illuminator_ros.mavlink.component import Endpoint, HeartbeatTimer
@@ -180,7 +180,7 @@ class Bridge(EndpointLink[Client]):
         """Switch a light on or off, and return the result."""
         results: Log[Result] = Log()
         one = light or self.wait_connected()
-        self.link.call(lambda now: one.control.enable(
+        self.link.call(lambda now: one.enable(
             on, now, lambda result, now: results.append(result)))
         return results.wait_for(lambda result: True)
 

@@ -57,8 +57,8 @@ class RandomUsers:
 
     def enable(self) -> None:
         if light := self.light():
-            light.control.enable(self.draw.random() < 0.7, self.pair.now, self.answer(),
-                                 source=self.source(), is_stream=self.draw.random() < 0.5)
+            light.enable(self.draw.random() < 0.7, self.pair.now, self.answer(),
+                         source=self.source(), is_stream=self.draw.random() < 0.5)
 
     def enable_all(self) -> None:
         if lights := [*self.pair.controller.lights.values()]:
@@ -69,12 +69,12 @@ class RandomUsers:
             self.sets.append(self.answer())
             values = {'brightness': float(self.draw.randrange(81)),
                       'strobe_period': self.draw.choice((0.0, 1.0))}
-            light.control.configure(values, self.pair.now, self.sets[-1])
+            light.configure(values, self.pair.now, self.sets[-1])
 
     def dim(self) -> None:
         if light := self.light():
             for _ in range(self.draw.randint(1, 5)):
-                light.control.set_brightness(
+                light.set_brightness(
                     float(self.draw.randrange(101)), self.pair.now, source=self.source())
 
     def refresh(self) -> None:
@@ -83,11 +83,11 @@ class RandomUsers:
 
     def desire(self) -> None:
         if light := self.light():
-            light.control.require({'strobe_duty_cycle': 30.0}, self.pair.now)
+            light.require({'strobe_duty_cycle': 30.0}, self.pair.now)
 
     def release(self) -> None:
         if light := self.light():
-            light.control.release(self.source(), self.pair.now)
+            light.release(self.source(), self.pair.now)
 
     def restart(self) -> None:
         self.draw.choice(self.pair.devices).restart(self.pair.now)

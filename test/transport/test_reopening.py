@@ -10,7 +10,7 @@ import contextlib
 from pathlib import Path
 import socket
 
-from illuminator_ros.illuminator.light_control import LightSettings
+from illuminator_ros.illuminator.settings import LightSettings
 from illuminator_ros.mavlink import component, line
 from illuminator_ros.mavlink import connector as connector_module
 from illuminator_ros.mavlink.retries import CONNECTION

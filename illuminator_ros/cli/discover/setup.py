@@ -21,8 +21,8 @@ from typing import Any, TypeVar
 from .report import executable, payloads_for
 from ..entry_point import Refusal
 from ...illuminator.client import IlluminatorClient
-from ...illuminator.light_control import LightSettings
 from ...illuminator.model import SafetyLimits
+from ...illuminator.settings import LightSettings
 from ...mavlink.command_sender import CommandSender
 from ...mavlink.component import Component
 from ...mavlink.component_kinds import AUTOPILOT
@@ -152,7 +152,7 @@ def try_light(url: str, address: Address) -> str:
 
     def ask(method: str, *arguments: object) -> Result:
         results: SimpleQueue[Result] = SimpleQueue()
-        link.call(lambda now: getattr(client.lights[address].control, method)(
+        link.call(lambda now: getattr(client.lights[address], method)(
             *arguments, now, lambda result, now: results.put(result)))
         result = Result(False, 'no answer in time')
         with contextlib.suppress(Empty):

@@ -120,7 +120,7 @@ class LightNode:
             for event in light.snapshot(now).events():
                 self.take(event)
             if self._overrides:
-                light.control.require(self._overrides, now)
+                light.require(self._overrides, now)
 
     def release(self) -> None:
         """Serve no light: it was forgotten."""
@@ -184,7 +184,7 @@ class LightNode:
     def _enable_service(self, source: str, prefix: str) -> ros_node.RequestService:
         def enable(request: SetBool.Request, now: float, answer: ros_node.Answer) -> None:
             if light := self._light_or_refusal(now, answer):
-                light.control.enable(
+                light.enable(
                     request.data, now,
                     lambda result, now: answer(result.success, result.message),
                     detail=f'{prefix}service', source=source)
@@ -193,7 +193,7 @@ class LightNode:
 
     def _release(self, source: str, now: float, answer: ros_node.Answer) -> None:
         if light := self._light_or_refusal(now, answer):
-            answer(True, f'held by {light.control.release(source, now) or "no source"}')
+            answer(True, f'held by {light.release(source, now) or "no source"}')
 
     def _command_topics(
         self, source: str, prefix: str,
@@ -225,11 +225,11 @@ class LightNode:
             light = self._light()
             # A source may repeat its request while a higher one holds the light.
             if not (result.success or result.superseded
-                    or light and light.control.is_held_by_other(source)):
+                    or light and light.is_held_by_other(source)):
                 warn(False, result.message)
 
         if light := self._light_or_refusal(now, warn):
-            light.control.enable(
+            light.enable(
                 on, now, done, detail=f'{prefix}topic', source=source, is_stream=True)
 
     def _refresh(self, request: Trigger.Request, now: float, answer: ros_node.Answer) -> None:
@@ -238,11 +238,11 @@ class LightNode:
 
     def _set_brightness(self, source: str, prefix: str, brightness: float, now: float) -> None:
         if light := self._light_or_refusal(now, self._warning_on(f'{prefix}cmd/brightness')):
-            light.control.set_brightness(brightness, now, source=source)
+            light.set_brightness(brightness, now, source=source)
 
     def _check_value(self, name: str, value: object) -> None:
         light = self._light()
-        strobe_range = light.control.configuration.strobe_range if light else None
+        strobe_range = light.twin.strobe_range if light else None
         self._client.settings.limits.check(name, checked(name, value, strobe_range))
 
     def _configure(
@@ -254,7 +254,7 @@ class LightNode:
             answer('' if result.success else result.message)
 
         if light := self._light_or_refusal(now, lambda success, message: answer(message)):
-            light.control.configure(changes, now, done)
+            light.configure(changes, now, done)
 
     # Diagnostics
 

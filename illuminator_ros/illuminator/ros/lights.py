@@ -159,8 +159,8 @@ class Lights(ServedPayload):
         """See :meth:`ServedPayload.shut_down`: switch all off, or name the lights that stay on."""
         if not self._host.values['off_on_shutdown']:
             for light in self._client.lights_by_address:
-                if light.control.may_be_on(now):
-                    known = light.status and light.status.enabled
+                if light.may_be_on(now):
+                    known = light.twin.status and light.twin.status.enabled
                     report(light.address, logging.WARNING,
                            f'light {light.address} {"is" if known else "may be"} left on')
             return

@@ -14,8 +14,8 @@ from typing import NamedTuple
 
 from rclpy.node import Node
 
-from ..light_control import LightSettings
 from ..model import MAX_STROBE_PERIOD, MODES, SafetyLimits
+from ..settings import LightSettings
 from ...mavlink.messages import Address
 from ...ros.command_sources import SOURCE_PARAMETERS, source_settings
 from ...ros.parameters import (

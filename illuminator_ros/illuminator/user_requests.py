@@ -1,0 +1,179 @@
+# Copyright 2026 The illuminator_ros developers
+# SPDX-License-Identifier: Apache-2.0
+
+"""What the users of a light ask for: refused, remembered, or made."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+
+from . import events
+from .commands import SWITCHES
+from .model import checked, FIELDS, InvalidValue
+from .rules import Rules
+from .twin import Twin
+from ..mavlink.command_sender import Command
+from ..payload.arbitration import Cause, HolderChanged
+from ..payload.attempt import Target
+from ..payload.command_sources import DEFAULT
+from ..payload.liveness import Liveness
+from ..payload.requests import Done, REPEAT_TIME, Request, Requests, Result
+
+OFF = SWITCHES[False]
+
+
+class UserRequests:
+    """
+    Makes the requests of users to one light, for their sources. No I/O; times are s.
+
+    :param emit: takes the events.
+    :ivar were_made: whether a user has ever made one.
+    """
+
+    def __init__(
+        self, target: Target, liveness: Liveness, requests: Requests, twin: Twin, rules: Rules,
+        emit: Callable[[events.LightEvent], None],
+    ) -> None:
+        self.were_made = False
+        self._target = target
+        self._liveness = liveness
+        self._requests = requests
+        self._twin = twin
+        self._rules = rules
+        self._emit = emit
+
+    def make(self, new: Request, now: float, *, off_is_under_way: bool) -> bool:
+        """
+        Make a request, or answer why it is refused.
+
+        :return: whether an OFF was sent to a light that is not heard.
+        """
+        requests, silence = self._requests, self._rules.silence
+        if not requests.are_ranked:
+            new.source = DEFAULT
+        self.expire(now)
+        self._rules.forget_silenced(now)
+        self.were_made = True
+        is_off, is_held = new.values.get('enabled') is False, bool(requests.refusal(new.source))
+        if not is_off and (late := self._target.commands.lateness(now)):
+            requests.reply(new, Result(False, late))
+            return False
+        if new.is_wish:
+            silence.requested_at = now
+            requests.claim(new.source, now)
+        if not self._liveness.connected:
+            return self._refuse_lost(new, now, is_off=is_off, is_held=is_held)
+        if not is_held and self._is_repetition(new, now):
+            requests.reply(new, Result(False, 'repeated', superseded=True))
+        elif is_held or self._is_right(new, off_is_under_way=off_is_under_way):
+            if new.is_call and not is_held and not requests.are_calling:
+                silence.calling_since = now
+            requests.put(new, now)
+        return False
+
+    def _refuse_lost(self, new: Request, now: float, *, is_off: bool, is_held: bool) -> bool:
+        """Refuse a request to a light that is lost: only an OFF has an effect later."""
+        requests, liveness = self._requests, self._liveness
+        # It may hear though it is not heard.
+        is_sent = is_off and not is_held and self.send_unheard_off()
+        refusal = requests.refusal(new.source) or liveness.loss(
+            f'light {self._target.address}', now)
+        requests.reply(new, Result(
+            False, refusal + ('; an OFF was sent once' if is_sent else '')))
+        if new.is_wish and is_off:
+            new.is_open = new.may_be_repeated = False
+            requests.put(new, now)
+        elif is_off and not is_held:
+            requests.forget({'enabled': None}, new.source)
+        return is_sent
+
+    def send_unheard_off(self) -> bool:
+        """Send an OFF once, without an attempt; return whether the link is open for it."""
+        if self._liveness.link_failure:
+            return False
+        self._target.commands.send_once(Command(self._target.address, OFF.command, OFF.params))
+        return True
+
+    def _is_repetition(self, new: Request, now: float) -> bool:
+        """
+        Return whether a message of a topic repeats the one before, and nothing is to be sent.
+
+        One that the light does not show, and an OFF, is sent again once in a while.
+        """
+        old = self._requests.repeated(new) if new.is_wish else None
+        if old is None or old.is_open:
+            return old is not None
+        [(name, value)] = new.values.items()
+        if any(one.values.get(name, value) != value for one in self._requests.live()):
+            return False
+        is_settled = self._twin.shows(name, value) and new.values != {'enabled': False}
+        return is_settled or now < old.since + REPEAT_TIME
+
+    def _is_right(self, new: Request, *, off_is_under_way: bool) -> bool:
+        """Check the values of a request, and answer one that the light must not get."""
+        try:
+            if 'enabled' not in new.values:
+                self._check(new, off_is_under_way=off_is_under_way)
+        except InvalidValue as error:
+            self._requests.reply(new, Result(False, str(error), permanent=True))
+            return False
+        return True
+
+    def _check(self, new: Request, *, off_is_under_way: bool) -> None:
+        twin = self._twin
+        new.values = {name: checked(name, value, twin.strobe_range)
+                      for name, value in new.values.items()}
+        for one in new.values.items():
+            self._rules.settings.limits.check(*one)
+        if (off_is_under_way and new.is_call and twin.brightness_is_switch is None
+                and 'brightness' not in new.values):
+            raise InvalidValue('an OFF is under way, which the brightness in this command '
+                               'may undo; repeat it')
+        known = {name for one in (*self._rules.weak, new) for name in one.values}
+        if twin.agreed is None and not known.issuperset(FIELDS):
+            raise InvalidValue(not_reported(name for name in FIELDS if name not in known))
+
+    # Sources
+
+    def release(self, source: str, now: float) -> None:
+        """Release the light."""
+        self.expire(now)
+        self._hand_over(self._requests.release(source, now), now)
+
+    def expire(self, now: float) -> None:
+        """End the claims of silent sources."""
+        self._hand_over(self._requests.expire(now), now)
+
+    def _hand_over(self, change: HolderChanged[str] | None, now: float) -> None:
+        """Want what the next holder has asked for, or an OFF where there is none."""
+        if change is None or change.cause is Cause.CLAIM:
+            return
+        after, is_heard = change.after, self._liveness.connected
+        if after is None:
+            if self._rules.settings.off_on_release:
+                self._rules.release(f'on_release: {change.before} no longer holds it', now)
+            return
+        self._rules.forget_silenced(now)
+        reason = f'{after}, which holds the light now'
+        for one in self._requests.wishes(after):
+            if is_heard:
+                one.is_open, one.since, one.detail = True, now, reason
+                one.done = self._failure_report(after)
+            elif one.values.get('enabled') is False:
+                # It is sent when the light is heard again.
+                self._rules.release(reason, now)
+
+    def _failure_report(self, source: str) -> Done:
+        """Return a function that reports that the light does not have what a source wants."""
+        def done(result: Result, now: float) -> None:
+            if not (result.success or result.superseded):
+                self._emit(events.DesiredStateFailed(
+                    self._target.address, source, result.message))
+
+        return done
+
+
+def not_reported(missing: Iterable[str]) -> str:
+    """Return why a configuration that is not complete cannot be sent."""
+    return ('the light has not reported its configuration yet, so '
+            f'{", ".join(missing)} must be set in the same call')

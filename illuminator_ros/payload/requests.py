@@ -1,0 +1,408 @@
+# Copyright 2026 The illuminator_ros developers
+# SPDX-License-Identifier: Apache-2.0
+
+"""What is wanted of one device: the standing requests, and the claims of their sources."""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Callable, Collection, Mapping
+from dataclasses import dataclass, replace
+from enum import IntEnum
+import math
+from typing import Any, NamedTuple
+
+from .arbitration import Arbiter, Cause, HolderChanged, Policy
+from .command_sources import DEFAULT, SourceSettings
+from ..mavlink.component import call_each
+
+# By field; whether a light is on is a field like the others.
+Values = Mapping[str, Any]
+# s in which an equal message of a topic that no status shows, or an equal OFF, counts once.
+REPEAT_TIME = 1.0
+# Calls that may wait for one field.
+MAX_CALLS = 32
+
+
+class Result(NamedTuple):
+    """
+    The result of a request.
+
+    :param success: whether the device accepted it and, if it sends a status, shows it.
+    :param message: the result for people.
+    :param refused: whether the device answered with another result than ACCEPTED.
+    :param permanent: whether the same request will fail again.
+    :param contradicted: whether the device accepted it and then showed something else.
+    :param superseded: whether a newer request replaced it.
+    :param note: a change that was not asked for but came with it, for people, '' if none.
+    """
+
+    success: bool
+    message: str
+    refused: bool = False
+    permanent: bool = False
+    contradicted: bool = False
+    superseded: bool = False
+    note: str = ''
+
+
+Done = Callable[[Result, float], None]
+
+
+class Why(IntEnum):
+    """The reasons why values are wanted; the smallest has the highest rank."""
+
+    END = 0
+    SILENCE = 1
+    REQUEST = 2
+    RELEASE = 3
+    OVERRIDE = 4
+    RESTORED = 5
+    LIMIT = 6
+
+
+# The requests that a new one ends if they want another value of one of its fields. A release ends
+# only messages of topics.
+ENDS: Mapping[Why, Collection[Why]] = {
+    Why.END: {*Why}, Why.SILENCE: {Why.REQUEST, Why.RELEASE},
+    Why.REQUEST: {Why.SILENCE, Why.REQUEST, Why.RELEASE}, Why.RELEASE: {Why.REQUEST}}
+# Sent until a status shows them, whatever the device answers.
+INSISTENT = frozenset((Why.END, Why.SILENCE, Why.RELEASE))
+# What a user has set is not undone by what was given or agreed before.
+WEAK = frozenset((Why.OVERRIDE, Why.RESTORED, Why.LIMIT))
+
+
+def no_reply(result: Result, now: float) -> None:
+    """Take the result of a request that has no receiver."""
+
+
+@dataclass(eq=False)
+class Request:
+    """
+    Values that are wanted until a status shows them, or until they are refused or superseded.
+
+    :param since: when it was made, s; a command that began before confirms nothing of it.
+    :param done: takes the result, once.
+    :param is_call: whether a caller waits for the result. What a topic asks for stays as the
+        wish of its source, for a hand-over.
+    :param detail: how it was requested, or the reason of a rule, for people.
+    :param until: s; it fails at that time.
+    :param due: s; it is not sent before.
+    :ivar is_open: whether it is still to be reached. What a status has shown is not sent again if
+        another sender changes it; a hand-over opens it again.
+    :ivar is_under_way: whether an attempt serves it, which ends it.
+    :ivar may_be_repeated: whether an equal message of its source is a repetition.
+    :ivar tried: how often a rule has failed, and ``failure`` why it failed last.
+    """
+
+    values: dict[str, Any]
+    why: Why
+    since: float
+    source: str = DEFAULT
+    done: Done = no_reply
+    is_call: bool = False
+    detail: str = ''
+    until: float = math.inf
+    due: float = -math.inf
+    is_open: bool = True
+    is_under_way: bool = False
+    may_be_repeated: bool = True
+    tried: int = 0
+    failure: str = ''
+
+    @property
+    def is_wish(self) -> bool:
+        """Whether it is kept as the wish of its source."""
+        return self.why is Why.REQUEST and not self.is_call
+
+    def contradicts(self, old: Request) -> bool:
+        """Return whether both want other values of one field; a setpoint waits for a call."""
+        if self.is_wish and old.is_call and 'enabled' not in self.values:
+            return False
+        return any(old.values.get(name, value) != value for name, value in self.values.items())
+
+
+class Goal(NamedTuple):
+    """
+    The values of one command, and the requests that it serves.
+
+    :param until: s; the command ends then, unless it insists.
+    :param note: a change that comes with it and that no request asks for, for people.
+    :param waits: whether it leaves another command that is under way alone.
+    """
+
+    values: Any
+    serves: tuple[Request, ...]
+    until: float = math.inf
+    note: str = ''
+    waits: bool = False
+
+    @property
+    def insists(self) -> bool:
+        """Whether it is sent until a status shows it."""
+        return any(one.why in INSISTENT for one in self.serves)
+
+    @property
+    def is_last(self) -> bool:
+        """Whether the process ends."""
+        return any(one.why is Why.END for one in self.serves)
+
+    @property
+    def is_awaited(self) -> bool:
+        """Whether a caller waits for it."""
+        return any(one.is_call for one in self.serves)
+
+
+class Requests:
+    """
+    The standing requests to one device, and the claims of their sources. No I/O; times are s.
+
+    A message of a topic claims the device at once, a call when it has succeeded. The highest
+    source that has claimed the device holds it. While a call is under way, lower sources are
+    refused as if its source held the device.
+
+    :param device: its name, for people.
+    :param settings: of the sources, None if commands have no sources.
+    :param describe: describes values, for people.
+    :param report: takes each change of the holder.
+    :ivar standing: the requests, in the order in which they were made.
+    :ivar claims: the claims of the sources.
+    """
+
+    def __init__(
+        self, device: str, settings: SourceSettings | None, describe: Callable[[Values], str],
+        report: Callable[[HolderChanged[str], float], None],
+    ) -> None:
+        ranked = settings or SourceSettings((DEFAULT,))
+        self.are_ranked = settings is not None
+        self.standing: list[Request] = []
+        self.claims: Arbiter[str] = Arbiter(
+            Policy.PRIORITY, ranked.names.index, lease=ranked.timeout, remembers=True)
+        self._rank = ranked.names.index
+        self._device = device
+        self._describe = describe
+        self._report = report
+        self._replies: deque[tuple[Done, Result]] = deque()
+
+    # Sources
+
+    @property
+    def commander(self) -> str | None:
+        """Return the highest source that holds the device or has a call under way."""
+        sources = [one.source for one in self.standing if one.is_call]
+        if self.claims.holder is not None:
+            sources.append(self.claims.holder)
+        return min(sources, key=self._rank, default=None)
+
+    @property
+    def shown_holder(self) -> str | None:
+        """Return the holder for snapshots: '' for none, None if commands have no sources."""
+        return self.claims.holder or '' if self.are_ranked else None
+
+    @property
+    def are_calling(self) -> bool:
+        """Whether a caller waits for a result."""
+        return any(one.is_call for one in self.standing)
+
+    def refusal(self, source: str) -> str:
+        """Return why a source may not command the device, '' if it may."""
+        if not self.are_ranked:
+            return ''
+        commander = self.commander
+        is_lower = commander is not None and self._rank(commander) < self._rank(source)
+        return f'held by {commander}' if is_lower else ''
+
+    def may_be_sent(self, one: Request) -> bool:
+        """Return whether a request is one of a rule, or of the source that commands the device."""
+        # What the last holder has asked for is still sent when it has released the device.
+        commander = self.commander
+        return one.why is not Why.REQUEST or commander is None or one.source == commander
+
+    def live(self) -> list[Request]:
+        """Return the open requests that may be sent."""
+        return [one for one in self.standing if one.is_open and self.may_be_sent(one)]
+
+    # Requests come
+
+    def put(self, new: Request, now: float) -> None:
+        """Make a request: the only way in. It ends what it contradicts, and lower sources."""
+        held = self.refusal(new.source) if new.why is Why.REQUEST else ''
+        if held:
+            self.reply(new, Result(False, held))
+            if new.is_call:
+                return
+            new.done = no_reply
+        elif new.is_call and self._are_too_many(new):
+            self.reply(new, Result(
+                False, f'{MAX_CALLS} requests are waiting for {self._device} already'))
+            return
+        else:
+            self._supersede(new, now)
+        if new.is_wish:
+            self._remember(new, now)
+        else:
+            self.standing.append(new)
+
+    def _are_too_many(self, new: Request) -> bool:
+        return sum(one.is_call and not one.values.keys().isdisjoint(new.values)
+                   for one in self.standing) >= MAX_CALLS
+
+    def _supersede(self, new: Request, now: float) -> None:
+        is_request = new.why is Why.REQUEST
+        text = new.detail if not is_request else f'superseded by {self._describe(new.values)}'
+        for old in [*self.standing]:
+            if is_request and old.why is Why.REQUEST and old.source != new.source:
+                self._take_from(old, f'held by {new.source}', now)
+            elif (old.is_open and old.why in ENDS.get(new.why, ()) and new.contradicts(old)
+                  and not (old.is_call and new.why is Why.RELEASE)
+                  and not (old.is_wish and new.is_wish)):
+                self.end(old, Result(False, text, superseded=True), now)
+        if new.values.get('enabled') is False:
+            # An OFF ends an ON that is remembered, though it may fail.
+            self.forget({'enabled': True}, new.source if is_request else None)
+
+    def _take_from(self, old: Request, text: str, now: float) -> None:
+        """End a request of a source that another one replaces; a claimed wish is kept."""
+        result = Result(False, text, superseded=True)
+        if old.is_call or not self.claims.is_claimed_by(old.source):
+            self.end(old, result, now)
+        elif old.is_open:
+            self.reply(old, result)
+
+    def forget(self, values: Values, source: str | None = None) -> None:
+        """Forget the wishes for some values, of one source or of all."""
+        for old in [*self.standing]:
+            if old.is_wish and source in (None, old.source):
+                self.drop(old, [name for name, value in values.items()
+                                if name in old.values and value in (None, old.values[name])])
+
+    def drop(self, old: Request, names: Collection[str]) -> None:
+        """Remove some fields of a request, and the request if no field is left."""
+        if names:
+            old.values = {name: value for name, value in old.values.items() if name not in names}
+            if not old.values:
+                old.is_open = False
+                self.standing.remove(old)
+                self.reply(old, Result(False, 'superseded', superseded=True))
+
+    def _remember(self, new: Request, now: float) -> None:
+        """Keep the wish of a source in place of its older ones for the same fields."""
+        self.claim(new.source, now)
+        for old in [*self.standing]:
+            if old.is_wish and old.source == new.source and old.since <= new.since:
+                if old.is_open and not old.is_under_way:
+                    self.reply(old, Result(
+                        False, f'superseded by {self._describe(new.values)}', superseded=True))
+                elif old.is_under_way and not old.values.keys().isdisjoint(new.values):
+                    # Its attempt ends it. Other fields stay wanted.
+                    self.standing.remove(old)
+                    old = replace(old, done=no_reply, is_under_way=False)
+                    self.standing.append(old)
+                self.drop(old, [*new.values.keys() & old.values.keys()])
+        self.standing.append(new)
+
+    def claim(self, source: str, now: float) -> None:
+        """Note that a source asks for something; it then holds the device unless refused."""
+        if (change := self.claims.claim(source, now)) and self.are_ranked:
+            self._report(change, now)
+
+    def repeated(self, new: Request) -> Request | None:
+        """Return the request of its source that a message of a topic repeats, None if none."""
+        return next((old for old in self.standing if old.is_wish and old.may_be_repeated
+                     and old.source == new.source and old.values == new.values), None)
+
+    # Requests end
+
+    def end(self, one: Request, result: Result, now: float) -> None:
+        """End a request: the only way out. A call that has succeeded claims the device."""
+        is_known, one.is_open, one.is_under_way = one in self.standing, False, False
+        if is_known and not (one.is_wish and self.claims.is_claimed_by(one.source)):
+            self.standing.remove(one)
+        if result.success and one.why is Why.REQUEST:
+            for old in [*self.standing]:
+                if old.why in WEAK:
+                    self.drop(old, [*one.values.keys() & old.values.keys()])
+            if one.is_call:
+                self._remember(Request(one.values, one.why, one.since, one.source,
+                                       is_open=False, may_be_repeated=False), now)
+        self.reply(one, result)
+
+    def end_all(self, result: Result, now: float) -> None:
+        """End the requests of users: the device is lost. The wishes of sources are kept."""
+        for one in [*self.standing]:
+            one.may_be_repeated = False
+            if one.why is Why.REQUEST and one.is_open:
+                self.end(one, result, now)
+
+    def close(self, result: Result, now: float) -> None:
+        """End all requests and claims, and have no sources any more."""
+        self.are_ranked = False
+        self.claims = Arbiter(Policy.PRIORITY)
+        for one in [*self.standing]:
+            self.end(one, result, now)
+        self.standing.clear()
+
+    def wishes(self, source: str) -> list[Request]:
+        """Return what a source has asked for last."""
+        return [one for one in self.standing if one.is_wish and one.source == source]
+
+    def reply(self, one: Request, result: Result) -> None:
+        """Answer a request, once, after this step."""
+        done, one.done = one.done, no_reply
+        if done is not no_reply:
+            self._replies.append((done, result))
+
+    def answer(self, now: float) -> None:
+        """Call the replies that have come due, in their order, even if one of them raises."""
+        while self._replies:
+            replies, self._replies = self._replies, deque()
+            call_each([_call(*one) for one in replies], now)
+
+    def release(self, source: str, now: float) -> HolderChanged[str] | None:
+        """
+        End the claim of a source, and its calls.
+
+        :return: the change of the holder; a source that had only a call under way counts as one
+            that held the device.
+        """
+        if not self.are_ranked:
+            return None
+        calls = [one for one in self.standing if one.is_call and one.source == source]
+        for one in calls:
+            self.end(one, Result(False, f'released by {source}', superseded=True), now)
+        change = self.claims.release(source, now)
+        if calls and change is None and self.claims.holder is None:
+            change = HolderChanged(source, None, Cause.RELEASE)
+        return self._expired(change, now)
+
+    def expire(self, now: float) -> HolderChanged[str] | None:
+        """End the claims of silent sources; return the change of the holder."""
+        if now < self.claims.next_deadline():
+            return None
+        return self._expired(self.claims.poll(now), now)
+
+    def _expired(
+        self, change: HolderChanged[str] | None, now: float,
+    ) -> HolderChanged[str] | None:
+        for one in [*self.standing]:
+            if not one.is_wish or self.claims.is_claimed_by(one.source):
+                continue
+            if change is not None and change.after is not None:
+                self.end(one, Result(False, f'held by {change.after}', superseded=True), now)
+            elif change is None or one.source != change.before or not one.is_open:
+                self.standing.remove(one)
+        if change is not None and self.are_ranked:
+            self._report(change, now)
+        return change
+
+    def next_due(self, now: float) -> float:
+        """Return when a request becomes due or is late next, or when a claim ends, s."""
+        due = self.claims.next_deadline()
+        for one in self.standing:
+            if one.is_open:
+                due = min(due, one.until, one.due if one.due > now else math.inf)
+        return due
+
+
+def _call(done: Done, result: Result) -> Callable[[float], None]:
+    return lambda now: done(result, now)
