@@ -94,21 +94,19 @@ def on_ports(reports: Sequence[Mapping[str, Any]]) -> Iterator[Finding]:
 
     :param reports: of ``discover``, one for each port.
     """
+    from .discover.report import lines
     from .discover.run import CONSOLE
     from ..mavlink.listener import NOT_SENT_HERE
 
     addresses: dict[str, list[str]] = {}
     for one in reports:
-        heard = [f'{device["address"]} ({", ".join(device["kinds"]) or "no HEARTBEAT"})'
-                 for device in one['components']]
         for device in one['components']:
             addresses.setdefault(device['address'], []).append(one['url'])
         trouble = one['trouble']
         # A UDP port may be silent, and one program may use a port, such as our node.
         passed = one['run'] or trouble in (CONSOLE, NOT_SENT_HERE) or trouble.startswith(
             'in use') and ' and "' not in trouble and 'ModemManager' not in trouble
-        yield bool(passed), f'{one["url"] or one["port"]}: ' + '; '.join(filter(None, (
-            ', '.join(heard), trouble, *one['run'])))
+        yield bool(passed), '\n      '.join(lines(one))
     for address, urls in addresses.items():
         if len(urls) > 1:
             yield False, (f'{address} is heard on {" and ".join(urls)}: give one device another '

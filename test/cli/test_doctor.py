@@ -13,19 +13,22 @@ from illuminator_ros.cli.doctor import machine, OLDEST_TIME, on_nodes, on_ports
 from illuminator_ros.mavlink.listener import NOT_SENT_HERE, SILENT
 import pytest
 
-LIGHT = {'address': '1/243', 'kinds': ['light']}
+LIGHT = {'address': '1/243', 'kinds': ['light'], 'mavlink_versions': [2], 'signed': False,
+         'frames_per_s': 6.0}
 
 
 def port(
     url: str, trouble: str = '', *heard: dict[str, Any], run: str = '',
 ) -> dict[str, Any]:
     return {'port': url, 'url': url if heard else '', 'trouble': trouble, 'components': heard,
-            'run': [run] if run else []}
+            'run': [run] if run else [], 'try': []}
 
 
 @pytest.mark.parametrize(('one', 'passed', 'text'), [
     (port('serial:///dev/x:57600', '', LIGHT, run='bridge serial:///dev/x:57600'), True,
-     'serial:///dev/x:57600: 1/243 (light); bridge serial:///dev/x:57600'),
+     'serial:///dev/x:57600\n'
+     '        1/243    light                            MAVLink 2              6.0 frames/s\n'
+     '        run: bridge serial:///dev/x:57600'),
     (port('/dev/x', SILENT), False, f'/dev/x: {SILENT}'),
     (port('/dev/x', CONSOLE), True, f'/dev/x: {CONSOLE}'),
     (port('udpin://0.0.0.0:14550', NOT_SENT_HERE), True,

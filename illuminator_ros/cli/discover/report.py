@@ -5,7 +5,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 import shlex
 from typing import Any
 
@@ -83,7 +83,7 @@ def payloads_for(found: set[str]) -> list[list[str]]:
     return [*([shared] if shared else []), *([CAMERA] if MICASENSE in found else [])]
 
 
-def lines(report: dict[str, Any]) -> Iterator[str]:
+def lines(report: Mapping[str, Any]) -> Iterator[str]:
     """Return the lines on one port."""
     trouble = report['trouble']
     if not report['components']:

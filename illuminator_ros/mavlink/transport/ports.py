@@ -61,12 +61,13 @@ def users_of(url: Url) -> str:
     # The program that has made a pseudo-terminal is its other side.
     is_pty = any(target.startswith('/dev/pts/') for target in targets)
     found = []
-    for process in Path('/proc').glob('[0-9]*'):
+    for process in filter(str.isdigit, os.listdir('/proc')):
         # A process may end meanwhile, or be of another user.
         with contextlib.suppress(OSError):
-            files = {os.readlink(link) for link in (process / 'fd').iterdir()}
-            if files & targets and process.name != str(os.getpid()) and not (
+            folder = f'/proc/{process}/fd/'
+            files = {os.readlink(folder + link) for link in os.listdir(folder)}
+            if files & targets and process != str(os.getpid()) and not (
                     is_pty and files & PTY_MAKERS):
-                command = _read(process / 'cmdline').replace('\0', ' ')[:MAX_COMMAND].strip()
-                found.append(f'"{command}" (process {process.name})')
+                command = _read(Path('/proc', process, 'cmdline')).replace('\0', ' ')
+                found.append(f'"{command[:MAX_COMMAND].strip()}" (process {process})')
     return ' and '.join(found)
