@@ -90,7 +90,7 @@ def _switch(ranked: list[Request]) -> Goal | None:
         return None
     first = min(reversed(ranked), key=lambda one: (one.why, -one.since))
     on = first.values['enabled']
-    return Goal(on, tuple(one for one in ranked if one.values['enabled'] == on))
+    return Goal.of(on, tuple(one for one in ranked if one.values['enabled'] == on))
 
 
 def _configuration(
@@ -124,4 +124,4 @@ def _configuration(
     is_asked = any(one.is_wish for one in serves)
     until = (max(one.until for one in calls) if calls
              else now + CONFIGURE_LIMIT if is_asked else math.inf)
-    return Goals(None, Goal(configuration, serves, until, note, waits=not calls))
+    return Goals(None, Goal.of(configuration, serves, until=until, note=note, waits=not calls))

@@ -103,6 +103,8 @@ class Light:
         self._queries = LightQueries(
             target, self.liveness, settings.status_interval, settings.heartbeat_timeout)
         self._due = -math.inf
+        # Whether a status without news changes nothing.
+        self._is_calm = False
 
     def change_settings(self, settings: LightSettings, now: float) -> None:
         """
@@ -143,6 +145,7 @@ class Light:
         """Receive an ILLUMINATOR_STATUS; one that is older than the one before is ignored."""
         self.heard(now)
         twin, control, before = self.twin, self._control, self.twin.order.newest_at
+        has_news = not (self._is_calm and status.repeats(twin.status))
         order = twin.order.take(status, now, control.expects)
         if order is Order.LATE:
             return
@@ -151,12 +154,14 @@ class Light:
             self._emit(events.LightRestarted(self.address, twin.enabled, status.enabled))
             self._queries.begin(now)
             control.restarted(status, now)
-        else:
+        elif has_news:
             if twin.changing.take(status, now, is_commanded=control.may_cause(now)):
                 self._emit(events.StatesChanging(self.address, True))
             control.reported(status, now)
         self._queries.take_status(now)
-        self._step(now)
+        if has_news:
+            self._step(now)
+            self._is_calm = control.is_settled(now)
         # Last, so that a caller has its answer before topics show the change.
         self._emit(events.StatusReceived(self.address, status, now, twin.temperature))
 
@@ -347,6 +352,7 @@ class Light:
 
     def _step(self, now: float) -> None:
         """Send what is wanted now, and answer those whose requests have ended."""
+        self._is_calm = False
         self.users.expire(now)
         if self.connected:
             self._control.step(now)

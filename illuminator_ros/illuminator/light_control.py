@@ -68,7 +68,10 @@ class LightControl:
 
     def step(self, now: float) -> None:
         """Decide what the light should be, send it, and go on with what is under way."""
-        self._rules.put_due(now, may_be_on=self.may_go_off(now))
+        if self._rules.may_put:
+            self._rules.put_due(now, may_be_on=self.may_go_off(now))
+        if self.is_calm:
+            return
         self._rules.check_range()
         goals = self._decide(now)
         switch = goals.switch
@@ -108,16 +111,19 @@ class LightControl:
             if (one.why is Why.REQUEST and 'enabled' not in one.values
                     and (one.is_call or one.since < now)):
                 self._requests.end(one, Result(False, text, superseded=True), now)
-        self._withdraw(self._configuration, text, now)
+        self._withdrawn(self._configuration.withdraw(text, now), now)
         self.switch.fence_until(self._configuration.fence)
 
     def _steer(self, part: Property[Status], goal: Goal | None, now: float) -> bool:
         """Have a goal under way; return whether a command was begun."""
         before = part.attempt
-        if before is not None and not all(map(self._requests.may_be_sent, before.serves)):
-            self._withdraw(part, 'held by another source', now)
-        self._withdrawn(part.steer(goal, now, self._twin.status, self._twin.gap), now)
-        return part.attempt is not None and part.attempt is not before
+        if before is not None and self._requests.of_commander(before.serves) != before.serves:
+            self._withdrawn(part.withdraw('held by another source', now), now)
+        served = part.steer(goal, now, self._twin.status, self._twin.gap)
+        if part.attempt is before:
+            return False
+        self._withdrawn(served, now)
+        return part.attempt is not None
 
     def _tell_automatic(self, failure: str) -> None:
         """Report an automatic OFF, and once why it is not confirmed."""
@@ -127,9 +133,6 @@ class LightControl:
         if rule is not None and not rule.failure:
             rule.failure = failure
             self._emit(events.AutomaticSwitch(self._target.address, False, rule.detail, failure))
-
-    def _withdraw(self, part: Property[Status], text: str, now: float) -> None:
-        self._withdrawn(part.withdraw(text, now), now)
 
     def _withdrawn(self, served: Iterable[Served[Status]], now: float) -> None:
         """Take the requests of a command that is sent no more; those that stand stay wanted."""
@@ -143,7 +146,7 @@ class LightControl:
     def cancel(self, text: str, now: float) -> None:
         """Send nothing any more of what is under way: the light is lost, or the process ends."""
         for part in self.switch, self._configuration:
-            self._withdraw(part, text, now)
+            self._withdrawn(part.withdraw(text, now), now)
 
     def cancel_configuration(self, now: float) -> None:
         """Send no configuration again that is beyond the limits, or that a limit has asked for."""
@@ -153,7 +156,7 @@ class LightControl:
         goal, limits = attempt.goal.values, self._rules.settings.limits
         if (limits.clipped(goal, self._twin.strobe_range) != goal
                 or not any(one.why is Why.REQUEST for one in attempt.goal.serves)):
-            self._withdraw(self._configuration, 'a limit was changed', now)
+            self._withdrawn(self._configuration.withdraw('a limit was changed', now), now)
 
     def switch_off_finally(self, now: float, report: Callable[[Result, float], None]) -> None:
         """Report the results of the OFF at the end of the process."""
@@ -161,6 +164,20 @@ class LightControl:
         report(Result(False, 'sent, not confirmed' if now < self.switch.fence else ''), now)
 
     # Known facts
+
+    @property
+    def is_calm(self) -> bool:
+        """Whether nothing is under way, and nothing is wanted."""
+        return (self.switch.attempt is None and self._configuration.attempt is None
+                and not any(one.is_open for one in self._requests.standing))
+
+    def is_settled(self, now: float) -> bool:
+        """Return whether a status that shows nothing new has no effect."""
+        twin = self._twin
+        return (self.is_calm and twin.is_told and not twin.changing.are_changing
+                and self.switch.unconfirmed(now) is None
+                and self._configuration.unconfirmed(now) is None
+                and not (twin.failure.text or self._rules.limits.exceeded.excess))
 
     @property
     def is_configuring(self) -> bool:
@@ -213,7 +230,6 @@ class LightControl:
     def reported(self, status: Status, now: float) -> None:
         """Take a status that is not older than those before."""
         twin, switch, configuration = self._twin, self.switch, self._configuration
-        self._rules.forget_silenced(now)
         gap, late = twin.gap or 0.0, configuration.unconfirmed(now)
         sent_at = max(switch.sent_at, -math.inf if late else configuration.sent_at)
         cause = Cause(self.is_configuring, late, sent_at + IMPLIED_TIME)
@@ -225,7 +241,7 @@ class LightControl:
         if twin.enabled and is_calm and not was_off_by_heat and (
                 before is None or not before and origin == events.OTHER_SENDER):
             # Another sender has switched it on, or it was on when it was found.
-            self._rules.silence.requested_at = now
+            self._rules.note_request(now)
         served = self._serve(switch, switch.reported(status, gap, now), now)
         if not served and switch.attempt is None and (
                 twin.enabled is not before or not twin.is_told):
@@ -248,7 +264,6 @@ class LightControl:
     def restarted(self, status: Status, now: float) -> None:
         """Take the first status after a restart, which confirms nothing."""
         attempt, wanted = self._configuration.attempt, self._twin.agreed
-        self._rules.forget_silenced(now)
         if attempt is not None:
             # A set ends before the fence of the restart, and its values must not be lost with it.
             wanted = attempt.goal.values
@@ -309,8 +324,7 @@ class LightControl:
         """End a request; a call that has succeeded counts from now on."""
         self._requests.end(one, result, now)
         if one.is_call and result.success:
-            self._rules.forget_silenced(now)
-            self._rules.silence.requested_at = now
+            self._rules.note_request(now)
 
     # Time
 

@@ -328,6 +328,10 @@ class Status:
             StrobeRange(message.min_strobe_period, message.max_strobe_period), tuple(invalid),
             message.gimbal_device_id)
 
+    def repeats(self, other: Status | None) -> bool:
+        """Return whether it is equal to another one in all but its uptime."""
+        return other is not None and self == replace(other, uptime_ms=self.uptime_ms)
+
     @property
     def is_dimmed(self) -> bool:
         """Whether heat makes the light less bright than it was set, or has switched it off."""

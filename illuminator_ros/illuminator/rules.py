@@ -55,6 +55,16 @@ class Rules:
 
     # OFF
 
+    def note_request(self, now: float) -> None:
+        """Note a request that counts: the silence begins again."""
+        self.forget_silenced(now)
+        self.silence.requested_at = now
+
+    @property
+    def may_put(self) -> bool:
+        """Whether an OFF may be due."""
+        return bool(self.silence.limit) or self.wants_off is not None
+
     def silence_due(self, *, may_be_on: bool) -> float:
         """
         Return when ``off_after_silence`` switches the light off, infinity for never.

@@ -48,18 +48,17 @@ class UserRequests:
 
         :return: whether an OFF was sent to a light that is not heard.
         """
-        requests, silence = self._requests, self._rules.silence
+        requests = self._requests
         if not requests.are_ranked:
             new.source = DEFAULT
         self.expire(now)
-        self._rules.forget_silenced(now)
         self.were_made = True
         is_off, is_held = new.values.get('enabled') is False, bool(requests.refusal(new.source))
         if not is_off and (late := self._target.commands.lateness(now)):
             requests.reply(new, Result(False, late))
             return False
         if new.is_wish:
-            silence.requested_at = now
+            self._rules.note_request(now)
             requests.claim(new.source, now)
         if not self._liveness.connected:
             return self._refuse_lost(new, now, is_off=is_off, is_held=is_held)
@@ -67,7 +66,7 @@ class UserRequests:
             requests.reply(new, Result(False, 'repeated', superseded=True))
         elif is_held or self._is_right(new, off_is_under_way=off_is_under_way):
             if new.is_call and not is_held and not requests.are_calling:
-                silence.calling_since = now
+                self._rules.silence.calling_since = now
             requests.put(new, now)
         return False
 

@@ -129,6 +129,9 @@ class Goal(NamedTuple):
     :param until: s; the command ends then, unless it insists.
     :param note: a change that comes with it and that no request asks for, for people.
     :param waits: whether it leaves another command that is under way alone.
+    :param is_awaited: whether a caller waits for it.
+    :param insists: whether it is sent until a status shows it.
+    :param is_last: whether the process ends.
     """
 
     values: Any
@@ -136,21 +139,16 @@ class Goal(NamedTuple):
     until: float = math.inf
     note: str = ''
     waits: bool = False
+    is_awaited: bool = False
+    insists: bool = False
+    is_last: bool = False
 
-    @property
-    def insists(self) -> bool:
-        """Whether it is sent until a status shows it."""
-        return any(one.why in INSISTENT for one in self.serves)
-
-    @property
-    def is_last(self) -> bool:
-        """Whether the process ends."""
-        return any(one.why is Why.END for one in self.serves)
-
-    @property
-    def is_awaited(self) -> bool:
-        """Whether a caller waits for it."""
-        return any(one.is_call for one in self.serves)
+    @classmethod
+    def of(cls, values: Any, serves: tuple[Request, ...], **how: Any) -> Goal:
+        """Return the goal that serves some requests; ``how`` has the first of the other fields."""
+        reasons = {one.why for one in serves}
+        return cls(values, serves, **how, is_awaited=any(one.is_call for one in serves),
+                   insists=not reasons.isdisjoint(INSISTENT), is_last=Why.END in reasons)
 
 
 class Requests:
@@ -212,15 +210,17 @@ class Requests:
         is_lower = commander is not None and self._rank(commander) < self._rank(source)
         return f'held by {commander}' if is_lower else ''
 
-    def may_be_sent(self, one: Request) -> bool:
-        """Return whether a request is one of a rule, or of the source that commands the device."""
-        # What the last holder has asked for is still sent when it has released the device.
-        commander = self.commander
-        return one.why is not Why.REQUEST or commander is None or one.source == commander
-
     def live(self) -> list[Request]:
-        """Return the open requests that may be sent."""
-        return [one for one in self.standing if one.is_open and self.may_be_sent(one)]
+        """Return the open requests of rules, and of the source that commands the device."""
+        return self.of_commander([one for one in self.standing if one.is_open])
+
+    def of_commander(self, some: list[Request]) -> list[Request]:
+        """Return those of some requests that may be sent."""
+        # What the last holder has asked for is still sent when it has released the device.
+        if not (some and self.are_ranked) or (commander := self.commander) is None:
+            return some
+        return [one for one in some
+                if one.why is not Why.REQUEST or one.source == commander]
 
     # Requests come
 
@@ -377,7 +377,7 @@ class Requests:
 
     def expire(self, now: float) -> HolderChanged[str] | None:
         """End the claims of silent sources; return the change of the holder."""
-        if now < self.claims.next_deadline():
+        if not self.are_ranked or now < self.claims.next_deadline():
             return None
         return self._expired(self.claims.poll(now), now)
 
@@ -397,7 +397,7 @@ class Requests:
 
     def next_due(self, now: float) -> float:
         """Return when a request becomes due or is late next, or when a claim ends, s."""
-        due = self.claims.next_deadline()
+        due = self.claims.next_deadline() if self.are_ranked else math.inf
         for one in self.standing:
             if one.is_open:
                 due = min(due, one.until, one.due if one.due > now else math.inf)

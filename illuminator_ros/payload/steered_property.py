@@ -56,6 +56,8 @@ class Property(Generic[S]):
         :param gap: between the last two statuses, None if none has come.
         """
         attempt, ended = self.attempt, list[Served[S]]()
+        if attempt is None and goal is None:
+            return ended
         is_wanted = attempt is not None and bool(attempt.serves)
         if attempt is not None and is_wanted and goal is not None and goal.waits:
             return ended
@@ -168,8 +170,7 @@ class Property(Generic[S]):
         # The effect of a command that was withdrawn may come later.
         if result.superseded or self._frames:
             self.fence_until(attempt.last_sent + FENCE)
-        if now < self.fence and (self._frames or not is_shown) and (
-                len(self._under_way) < MAX_VALUES):
+        if now < self.fence and len(self._under_way) < MAX_VALUES:
             self._under_way[attempt.change.value] = self.fence
 
     # Known facts
