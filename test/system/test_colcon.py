@@ -101,8 +101,8 @@ def test_installed_programs_find_each_other(
 
 def test_the_systemd_unit_is_installed_for_a_user_and_runs_two_lights(
         own_ros: Ros, workspace: Path, tmp_path: Path) -> None:
-    # The page has the command that adapts the unit.
-    [adapt] = re.findall(r'^(sed .*) \|\n', (ROOT / 'doc' / 'ros.md').read_text(), re.M)
+    # The page has the command that adapts the unit, and one for a virtual environment.
+    adapt, _ = re.findall(r'^(sed .*) \|\n', (ROOT / 'doc' / 'ros.md').read_text(), re.M)
     text = subprocess.run(
         ['bash', '-c', adapt], capture_output=True, text=True, check=True, env={
             'USER': 'diver', 'HOME': str(tmp_path), 'SHARE': str(
@@ -149,13 +149,17 @@ def test_the_unit_for_a_virtual_environment_is_verified_and_differs_in_its_comma
         return [line for line in (ROOT / 'config' / name).read_text().splitlines()
                 if not line.startswith('#')]
 
-    units = [lines(f'illuminator{kind}@.service') for kind in ('', '-venv')]
+    units = [lines(f'illuminator{kind}@.service') for kind in ('', '_venv')]
     [command] = [one for one in units[1] if one not in units[0]]
     assert command.startswith('ExecStart=/home/pilot/venv/bin/illuminator-bridge --ros-args ')
     if verify := shutil.which('systemd-analyze'):
         # It has to find the command.
         unit = tmp_path / 'illuminator@.service'
-        unit.write_text('\n'.join(units[1]).replace(
-            '/home/pilot/venv/bin/illuminator-bridge', sys.executable))
+        _, adapt = re.findall(r'^(sed .*) \|\n', (ROOT / 'doc' / 'ros.md').read_text(), re.M)
+        adapted = subprocess.run(
+            ['bash', '-c', adapt], capture_output=True, text=True, check=True,
+            env={'USER': 'root', 'HOME': str(tmp_path), 'SHARE': str(ROOT)}).stdout
+        assert '/home/pilot' not in adapted
+        unit.write_text(adapted.replace(f'{tmp_path}/venv/bin/illuminator-bridge', sys.executable))
         verified = subprocess.run([verify, 'verify', str(unit)], capture_output=True, text=True)
         assert (verified.returncode, verified.stderr) == (0, '')
