@@ -20,7 +20,7 @@ from ..mavlink.command_sender import (
     request_message,
 )
 from ..mavlink.dialect import mavlink, short_names
-from ..mavlink.messages import Address
+from ..mavlink.messages import Address, result_name
 from ..mavlink.retries import GIMBAL_MESSAGE, Retries
 from ..payload.confirmed_command import Result
 from ..payload.device_events import DeviceConnected, DeviceDisconnected
@@ -34,6 +34,9 @@ SILENCE_LIMIT = 3.0
 # PX4 does every 2 s), before a manager with a heartbeat each 5 s is lost; and after which control
 # is unknown.
 STATUS_REQUEST_DELAY, STATUS_LIMIT = 2.5, 6.0
+# s without an attitude after which an interval is requested where none is configured, before the
+# lack of attitudes is reported; and that interval.
+ATTITUDE_REQUEST_DELAY, ATTITUDE_INTERVAL = 1.5, 0.2
 # ms by which a status may be older than the one before it; with a longer step back, its sender has
 # restarted.
 LATE_LIMIT = 1000
@@ -98,6 +101,63 @@ class RemoteManager:
         return True
 
 
+class AttitudeRequest:
+    """
+    Requests GIMBAL_DEVICE_ATTITUDE_STATUS of a device that does not send it as configured.
+
+    :param address: of the sender of the attitudes.
+    :param interval: between attitudes, 0 for that of the device.
+    :ivar refusal: the MAV_RESULT by which it has refused an interval, '' for none.
+    """
+
+    def __init__(self, address: Address, commands: CommandSender, interval: float) -> None:
+        self.refusal = ''
+        self._address = address
+        self._commands = commands
+        self._interval = interval
+        self.connected(math.inf)
+
+    @property
+    def due(self) -> float:
+        """Return when :meth:`poll` is due, s."""
+        return self._query.due
+
+    def connected(self, now: float) -> None:
+        """Request the configured interval: the device may have restarted."""
+        self._lacks_interval = bool(self._interval)
+        self._query = Retries(GIMBAL_MESSAGE)
+        self.expect(now)
+
+    def expect(self, now: float) -> None:
+        """Note that attitudes must come from now on."""
+        if not self._lacks_interval:
+            self._query.due = now + max(ATTITUDE_REQUEST_DELAY, 2.5 * self._interval)
+
+    def received(self, now: float) -> None:
+        """Note an attitude."""
+        if not self._lacks_interval:
+            self._query = Retries(GIMBAL_MESSAGE)
+            self.expect(now)
+
+    def poll(self, now: float) -> None:
+        """Request an interval if that is due."""
+        if self._query.begin_try(now):
+            microseconds = (self._interval or ATTITUDE_INTERVAL) * 1e6
+            self._commands.start(
+                Command(self._address, mavlink.MAV_CMD_SET_MESSAGE_INTERVAL,
+                        (float(GimbalDeviceAttitudeStatus.id), microseconds)), now,
+                self._answered)
+
+    def _answered(self, result: CommandResult, now: float) -> None:
+        if result.result is not None:
+            self.refusal = '' if result.accepted else result_name(result.result)
+            self._lacks_interval = False
+            due = self._query.due
+            self.expect(now)
+            # Without attitudes the waits between requests go on growing.
+            self._query.due = max(self._query.due, due)
+
+
 class RemoteDevice:
     """
     The reports of the device of a gimbal. Times are s.
@@ -105,11 +165,12 @@ class RemoteDevice:
     :param interval: between its attitudes; 0 for its own.
     :ivar without_id: of attitudes that may be those of another gimbal.
     :ivar problem: why the last status has no attitude, '' if it has one.
+    :ivar request: of its attitudes.
     """
 
     def __init__(self, address: Address, commands: CommandSender, interval: float) -> None:
-        self.liveness = Liveness(SILENCE_LIMIT)
-        self.without_id = Liveness(SILENCE_LIMIT)
+        self.liveness, self.without_id = (
+            Liveness(max(SILENCE_LIMIT, 2.5 * interval)) for _ in range(2))
         self.attitude_at = -math.inf
         self.attitude: MountAttitude | None = None
         self.problem = ''
@@ -119,14 +180,13 @@ class RemoteDevice:
         self._status_time = 0
         self._address = address
         self._commands = commands
-        self._interval = interval
-        self.connected()
+        self.request = AttitudeRequest(address, commands, interval)
+        self._identity_query = Retries(GIMBAL_MESSAGE)
 
-    def connected(self) -> None:
+    def connected(self, now: float) -> None:
         """Request everything from now on: the device may have restarted."""
         self._identity_query = Retries(GIMBAL_MESSAGE)
-        self._interval_query = Retries(
-            GIMBAL_MESSAGE, -math.inf if self._interval else math.inf)
+        self.request.connected(now)
 
     def take_information(self, message: gimbal.GimbalDeviceInformation) -> None:
         """Take its identity and its ranges."""
@@ -139,6 +199,7 @@ class RemoteDevice:
         if _is_late(status.time_boot_ms, self._status_time):
             return False
         self._status_time, self.attitude_at = status.time_boot_ms, now
+        self.request.received(now)
         self.flags, self.errors = status.flags, status.failure_flags
         try:
             self.attitude, self.problem = MountAttitude.from_status(status), ''
@@ -146,24 +207,16 @@ class RemoteDevice:
             self.attitude, self.problem = None, str(error)
         return True
 
-    def poll(self, now: float) -> None:
-        """Request what it does not send by itself."""
+    def request_identity(self, now: float) -> None:
+        """Request GIMBAL_DEVICE_INFORMATION if that is due."""
         if self._identity_query.begin_try(now):
             self._commands.start(
                 request_message(self._address, gimbal.GimbalDeviceInformation.id), now)
-        if self._interval_query.begin_try(now):
-            interval = (float(GimbalDeviceAttitudeStatus.id), self._interval * 1e6)
-            self._commands.start(
-                Command(self._address, mavlink.MAV_CMD_SET_MESSAGE_INTERVAL, interval), now,
-                self._interval_answered)
 
-    def next_deadline(self) -> float:
-        """Return when :meth:`poll` is due, or when the device is lost, s."""
-        return min(self.liveness.silent_at, self._identity_query.due, self._interval_query.due)
-
-    def _interval_answered(self, result: CommandResult, now: float) -> None:
-        if result.result is not None:
-            self._interval_query.stop()
+    @property
+    def identity_due(self) -> float:
+        """Return when :meth:`request_identity` is due, s."""
+        return self._identity_query.due
 
 
 class GimbalReports:
@@ -204,6 +257,8 @@ class GimbalReports:
 
     def announce(self, address: Address, now: float) -> RemoteManager | None:
         """Note an announcement; return the manager, None if there are too many."""
+        if self._announced_at == -math.inf:
+            self.device.request.expect(now)
         self._announced_at = now
         if address not in self.managers and len(self.managers) < MAX_MANAGERS:
             self.managers[address] = RemoteManager(address)
@@ -259,7 +314,7 @@ class GimbalReports:
             self._emit(DeviceDisconnected(self._key, reason))
             return False
         self.link_problem = ''
-        self.device.connected()
+        self.device.connected(now)
         self._emit(DeviceConnected(self._key, f'manager {self.manager.address}'))
         return True
 
@@ -314,7 +369,20 @@ class GimbalReports:
         if device.without_id.is_heard(now):
             return (f'{self._key.address} has several gimbals and sends attitudes without '
                     'gimbal_device_id, so they cannot be told apart')
-        return self.link_problem or _silence(f'device {self._key}', device.liveness, now)
+        if self.link_problem or not self._key.number:
+            return self.link_problem or _silence(f'device {self._key}', device.liveness, now)
+        age = now - device.attitude_at
+        ago = f' for {format_seconds(age)}' if math.isfinite(age) else ''
+        refused = (f', and refuses MAV_CMD_SET_MESSAGE_INTERVAL for it ({device.request.refusal})'
+                   if device.request.refusal else '')
+        return (f'{self._key.address} is heard and sends no {GimbalDeviceAttitudeStatus.msgname}'
+                f'{ago}{refused}: enable the message there (ArduPilot: stream rate EXTRA3)')
+
+    @property
+    def _can_request_attitudes(self) -> bool:
+        """Whether the sender of the attitudes is heard: the device, or its manager."""
+        sender = self.manager if self._key.number else self.device
+        return sender.liveness.connected
 
     def absence(self, now: float) -> str:
         """Return that the manager is lost, for people; '' if it is heard."""
@@ -378,7 +446,9 @@ class GimbalReports:
             if self.manager.status_query.begin_try(now):
                 self._commands.start(
                     request_message(self.manager.address, gimbal.GimbalManagerStatus.id), now)
-            self.device.poll(now)
+            self.device.request_identity(now)
+        if self._can_request_attitudes:
+            self.device.request.poll(now)
 
     def next_deadline(self) -> float:
         """Return when :meth:`poll` is due, or connection or control may have changed, s."""
@@ -387,5 +457,5 @@ class GimbalReports:
             manager.liveness.silent_at, manager.status_at + STATUS_LIMIT)
         if self.is_connected:
             due = min(due, manager.liveness.silent_at, manager.status_query.due,
-                      self.device.next_deadline())
-        return due
+                      self.device.liveness.silent_at, self.device.identity_due)
+        return min(due, self.device.request.due) if self._can_request_attitudes else due

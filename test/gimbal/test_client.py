@@ -291,10 +291,58 @@ def test_gm_20_attitude_is_taken_from_the_device_itself_with_any_manager() -> No
     assert {target for _, target in requests(rig, DEVICE_INFORMATION)} == {DEVICE}
 
 
+def intervals(rig: Rig) -> list[tuple[int, float, float]]:
+    """Return the intervals that were requested: of which component, message and time."""
+    return [(one.target_component, one.param1, one.param2) for one in rig.messages(CommandLong)
+            if one.command == mavlink.MAV_CMD_SET_MESSAGE_INTERVAL]
+
+
 def test_attitude_interval_is_set_once_at_the_device() -> None:
     rig = Rig(FakeManager(), attitude_interval=0.05).run(20.0)
 
-    intervals = [one for one in rig.messages(CommandLong)
-                 if one.command == mavlink.MAV_CMD_SET_MESSAGE_INTERVAL]
-    assert [(one.target_component, one.param1, one.param2) for one in intervals] == [
-        (154, 285, 50_000)]
+    assert intervals(rig) == [(154, 285, 50_000)]
+
+
+@pytest.mark.parametrize('device_id', [1, 154])
+def test_a_device_that_sends_attitudes_by_itself_keeps_its_interval(device_id: int) -> None:
+    assert intervals(Rig(FakeManager(device_id=device_id)).run(20.0)) == []
+
+
+@pytest.mark.parametrize(('device_id', 'sender'), [(1, 1), (154, 154)])
+@pytest.mark.parametrize(('interval', 'requested'), [(0.0, 200_000), (0.1, 100_000)])
+def test_attitudes_that_come_on_demand_only_are_requested_and_again_if_they_end(
+        device_id: int, sender: int, interval: float, requested: float) -> None:
+    manager = FakeManager(device_id=device_id, device_reports=False, on_demand=True)
+    rig = Rig(manager, attitude_interval=interval).run(4.0)
+
+    for _ in range(2):
+        assert rig.gimbal.snapshot(rig.now).unreachable == ''
+        assert manager.device_reports
+        assert {*intervals(rig)} == {(sender, 285, requested)}
+        rig.sent.clear()
+        manager.device_reports = False
+        rig.run(2.5)
+
+
+@pytest.mark.parametrize(('results', 'refused'), [({}, ''), (
+    {mavlink.MAV_CMD_SET_MESSAGE_INTERVAL: mavlink.MAV_RESULT_DENIED},
+    ', and refuses MAV_CMD_SET_MESSAGE_INTERVAL for it (MAV_RESULT_DENIED)')])
+def test_a_manager_that_sends_no_attitude_is_named_with_the_remedy(
+        results: dict[int, int], refused: str) -> None:
+    rig = Rig(FakeManager(device_id=1, device_reports=False, results=results)).run(60.0)
+
+    assert rig.gimbal.reports.unreachable(rig.now) == (
+        f'1/1 is heard and sends no GIMBAL_DEVICE_ATTITUDE_STATUS{refused}: enable the message '
+        'there (ArduPilot: stream rate EXTRA3)')
+    assert 3 <= len(intervals(rig)) <= 7
+
+
+def test_a_gimbal_whose_attitudes_come_rarely_as_configured_is_not_lost_between_them() -> None:
+    manager = FakeManager(device_id=1, device_reports=False)
+    rig = Rig(manager, attitude_interval=5.0)
+    for _ in range(6):
+        rig.run(5.0)
+        rig.receive(AUTOPILOT, manager.attitude())
+
+    assert len(rig.all_of(DeviceConnected)) == 1
+    assert rig.all_of(DeviceDisconnected) == []

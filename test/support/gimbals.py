@@ -49,6 +49,7 @@ class FakeManager:
     :ivar answers: whether it acknowledges commands.
     :ivar hears: whether anything that is sent reaches it.
     :ivar device_reports: whether the device sends GIMBAL_DEVICE_ATTITUDE_STATUS.
+    :ivar on_demand: whether it does so once an interval is set.
     :ivar received: the received setpoints.
     """
 
@@ -67,6 +68,7 @@ class FakeManager:
     alive: bool = True
     device_alive: bool = True
     device_reports: bool = True
+    on_demand: bool = False
     primary: mav.Address = mav.Address(0, 0)
     secondary: mav.Address = mav.Address(0, 0)
     flags: int = (mavlink.GIMBAL_DEVICE_FLAGS_ROLL_LOCK | mavlink.GIMBAL_DEVICE_FLAGS_PITCH_LOCK
@@ -156,6 +158,8 @@ class FakeManager:
                 (283, self.device): device_information()}
             found = made.get((int(p1), target))
             return [(target, found)] if found is not None else []
+        if command == mavlink.MAV_CMD_SET_MESSAGE_INTERVAL and target == self.device:
+            self.device_reports |= self.on_demand
         if self.applies and command == mavlink.MAV_CMD_DO_GIMBAL_MANAGER_CONFIGURE:
             old = (*self.primary, *self.secondary)
             new = [was if value == -1 else 0 if value == -3 else int(value)

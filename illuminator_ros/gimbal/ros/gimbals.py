@@ -36,8 +36,8 @@ GIMBAL_PARAMETERS = (
     *FRAME_PARAMETERS,
     PUBLISH_TF,
     GEOID_SEPARATION,
-    ParameterSpec('attitude_interval', 0.0, "period of the attitude; 0 = the device's own", 's',
-                  0.0, 3600.0),
+    ParameterSpec('attitude_interval', 0.0, "period of the attitude; 0 = the device's own, or "
+                  '0.2 s of a device that sends none', 's', 0.0, 3600.0),
     *SOURCE_PARAMETERS,
 )
 
