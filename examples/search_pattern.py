@@ -14,7 +14,7 @@ from rclpy.client import Client
 from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, QoSProfile
 from rclpy.signals import SignalHandlerOptions
-from std_msgs.msg import Bool, Float32, Header
+from std_msgs.msg import Bool, Float32, Header, String
 from std_srvs.srv import SetBool, Trigger
 
 # Change these: the nodes, the brightness, %, the directions (degrees down, degrees left), and s
@@ -33,6 +33,7 @@ class Search(Node):
     def __init__(self) -> None:
         super().__init__('search_pattern')
         self.in_control, self.angles, self.is_stopped = False, Vector3Stamped(), False
+        self.is_connected, self.controller = False, 'unknown'
         self.enable = self.create_client(SetBool, f'{LIGHT}/enable')
         self.take = self.create_client(Trigger, f'{GIMBAL}/take_control')
         self.release = self.create_client(Trigger, f'{GIMBAL}/release_control')
@@ -42,12 +43,20 @@ class Search(Node):
         self.create_timer(0.5, lambda: self.brightness.publish(Float32(data=BRIGHTNESS)))
         self.create_subscription(Vector3Stamped, f'{GIMBAL}/angles', self.take_angles, 10)
         self.create_subscription(Bool, f'{GIMBAL}/in_control', self.take_control, STATE)
+        self.create_subscription(Bool, f'{GIMBAL}/connected', self.take_connected, STATE)
+        self.create_subscription(String, f'{GIMBAL}/controller', self.take_controller, STATE)
 
     def take_angles(self, message: Vector3Stamped) -> None:
         self.angles = message
 
     def take_control(self, message: Bool) -> None:
         self.in_control = message.data
+
+    def take_connected(self, message: Bool) -> None:
+        self.is_connected = message.data
+
+    def take_controller(self, message: String) -> None:
+        self.controller = message.data
 
     def stop(self, *signal_and_frame: object) -> None:
         self.is_stopped = True
@@ -74,8 +83,12 @@ class Search(Node):
             rclpy.spin_once(self, timeout_sec=0.1)
             if self.is_stopped:
                 sys.exit()
-            if not self.in_control:
-                sys.exit('another component has taken the gimbal')
+            if not (self.in_control and self.is_connected):
+                # The other topics come a moment later.
+                for _ in range(5):
+                    rclpy.spin_once(self, timeout_sec=0.1)
+                sys.exit(f'control of the gimbal is lost: {self.controller}' if self.is_connected
+                         else 'the gimbal is lost')
 
     def look(self, down: float, left: float) -> None:
         wanted = Vector3(y=math.radians(down), z=math.radians(left))
@@ -91,8 +104,11 @@ class Search(Node):
 
     def run(self) -> None:
         self.demand(self.take, Trigger.Request())
-        while not self.in_control:
-            rclpy.spin_once(self)
+        end = time.monotonic() + 4.0
+        while not (self.in_control and self.is_connected):
+            if self.is_stopped or time.monotonic() > end:
+                sys.exit(None if self.is_stopped else 'the gimbal shows no control')
+            rclpy.spin_once(self, timeout_sec=0.1)
         self.look(*PATTERN[0])
         self.demand(self.enable, SetBool.Request(data=True))
         for direction in PATTERN:

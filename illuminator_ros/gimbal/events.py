@@ -149,6 +149,7 @@ class GimbalSnapshot:
     :param status_at: when the last GIMBAL_MANAGER_STATUS came, s; -inf if none has.
     :param enforces_control: False if the manager is known to obey components without control.
     :param setpoints_sent: since the gimbal was found, with repetitions.
+    :param has_place: whether it points at a place as this component has requested.
     :param unstopped_since: when a rate of this component has ended, if no attitude shows that the
         gimbal stands, s; None if it stands or another component has control.
     :param turns: whether the attitudes since then show that it turns, None if they do not tell.
@@ -173,6 +174,7 @@ class GimbalSnapshot:
     status_at: float
     enforces_control: bool
     setpoints_sent: int
+    has_place: bool
     unstopped_since: float | None
     turns: bool | None
     holder: str | None = None

@@ -455,5 +455,6 @@ class Gimbal:
             device.identity, device.attitude, device.attitude_at, device.problem, device.flags,
             device.errors, reports.control, reports.control_since, self.reports.in_control,
             manager.status_at, manager.enforces_control, self.setpoints.sent,
-            self.setpoints.unstopped_since if is_free else None, self.setpoints.rate_stop.turns,
+            self.setpoints.has_place, self.setpoints.unstopped_since if is_free else None,
+            self.setpoints.rate_stop.turns,
             sources.shown_holder, sources.since)

@@ -104,6 +104,11 @@ class SetpointMixer:
         self._lost: set[str] = set()
         self.rate_stop = RateStop(self._rate_stopped)
 
+    @property
+    def has_place(self) -> bool:
+        """Whether it follows a place."""
+        return self._roi is not None
+
     # The state of the manager
 
     def activate(self, now: float) -> None:

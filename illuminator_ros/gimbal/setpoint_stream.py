@@ -117,9 +117,14 @@ class SetpointStream:
         return self._kind is Kind.RATE or self.rate_stop.may_turn
 
     @property
+    def has_place(self) -> bool:
+        """Whether the gimbal may point at a place."""
+        return self._kind is Kind.PLACE
+
+    @property
     def may_turn(self) -> bool:
         """Whether the gimbal may turn at a rate, or towards a place."""
-        return self._kind is Kind.PLACE or self.may_have_rate
+        return self.has_place or self.may_have_rate
 
     @property
     def lack_of_stop(self) -> str:

@@ -49,6 +49,11 @@ class _Latest(Generic[T]):
                 return value
         return None
 
+    def is_of_ros(self, now: float) -> bool:
+        """Return whether the value is one of ROS."""
+        (_, at), (_, link_at) = self._values
+        return link_at + MAX_AGE <= now < at + MAX_AGE
+
 
 class VehicleState:
     """

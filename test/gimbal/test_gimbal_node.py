@@ -362,12 +362,31 @@ def test_diagnostics_name_flags_limits_identity_and_control(
     assert report(ros, 'no GIMBAL_MANAGER_STATUS for').level == DiagnosticStatus.WARN
 
 
+@pytest.mark.parametrize('parameters', [{}, {'geoid_separation': 0.0}])
+def test_a_place_without_a_geoid_separation_is_a_warning_while_the_gimbal_points_at_it(
+        own_ros: Ros, parameters: dict[str, float]) -> None:
+    text = 'geoid_separation is not set, so the altitude of the place is taken as above'
+    with bridge(own_ros, FakeManager(primary=OURS), **parameters) as program:
+        own_ros.subscribe(Bool, '/gimbal/in_control').wait_value(True)
+        assert report(own_ros, 'in control').level == DiagnosticStatus.OK
+        for _ in range(2):
+            publish(own_ros, 'cmd/roi', NavSatFix(latitude=47.39, longitude=8.54, altitude=535.5))
+        if parameters:
+            own_ros.synchronize('/gimbal')
+        else:
+            assert report(own_ros, text).level == DiagnosticStatus.WARN
+        assert trigger(own_ros, 'clear_roi').success
+        assert report(own_ros, 'in control').level == DiagnosticStatus.OK
+        assert program.count(text) == (not parameters)
+
+
 def test_a_status_that_comes_on_request_only_is_requested_before_it_is_missed() -> None:
     rig = Rig(FakeManager(primary=OURS, streams=False)).run(4.0)
     found = []
     for _ in range(200):
         rig.run(0.1)
-        found += device_findings(rig.gimbal.snapshot(rig.now), rig.now, interval=0.0)
+        found += device_findings(rig.gimbal.snapshot(rig.now), rig.now, interval=0.0,
+                                 geoid_is_known=True)
 
     assert found == []
 

@@ -112,7 +112,8 @@ def points_to(gimbal: SimulatedManager, down: float, left: float) -> bool:
 
 
 @pytest.mark.parametrize(('number', 'outcome'), [
-    (0, (1, 'another component has taken the gimbal\n')), (signal.SIGINT, (0, '')),
+    (0, (1, 'control of the gimbal is lost: primary none, secondary none\n')),
+    (signal.SIGINT, (0, '')),
     (signal.SIGTERM, (0, ''))], ids=['the gimbal is taken', 'SIGINT', 'SIGTERM'])
 def test_the_search_ends_with_the_light_off_and_says_why(
         own_ros: Ros, tmp_path: Path, number: int, outcome: tuple[int, str]) -> None:
@@ -129,6 +130,23 @@ def test_the_search_ends_with_the_light_off_and_says_why(
             assert own_ros.call(Trigger, '/gimbal/release_control', Trigger.Request()).success
 
         assert (program.wait(), program.log) == outcome
+        assert not light.enabled
+
+
+def test_the_search_with_a_gimbal_that_is_lost_says_so_and_switches_the_light_off(
+        own_ros: Ros, tmp_path: Path) -> None:
+    port, light = free_port(), SimulatedIlluminator(IlluminatorProperties())
+    gimbal = SimulatedManager(ManagerProperties())
+    with (node(own_ros, 'bridge', port, payloads='[illuminator, gimbal]'),
+          served(port, light), contextlib.ExitStack() as gimbal_link,
+          ended(example(own_ros, 'search_pattern', tmp_path, DWELL='60.0')) as program):
+        gimbal_link.enter_context(served(port, gimbal))
+        eventually(lambda: light.enabled)
+        gimbal_link.close()
+
+        assert program.wait() == 1
+        assert program.log.startswith('the gimbal is lost\n')
+        assert 'taken' not in program.log
         assert not light.enabled
 
 

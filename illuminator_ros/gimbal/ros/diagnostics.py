@@ -26,6 +26,8 @@ ATTITUDE_SILENCE = 2.0
 STATUS_SILENCE = STATUS_REQUEST_DELAY + 1.5
 # s after the end of a rate after which a gimbal that turns is reported.
 STOP_TIME = 1.0
+NO_GEOID = ('geoid_separation is not set, so the altitude of the place is taken as above mean sea '
+            'level, and is above the ellipsoid')
 # The values of the status of a gimbal, with their meanings for the pages. Angles have the signs of
 # ROS.
 DEVICE_VALUES = {
@@ -84,7 +86,7 @@ def why_no_gimbal(
 def reports(
     link: diagnostics.LinkDiagnostics, *, gimbal: GimbalSnapshot | None,
     heard: Mapping[GimbalKey, str], without_id: Sequence[Address], known: str,
-    limit_reached: bool, interval: float, started: float,
+    limit_reached: bool, interval: float, started: float, geoid_is_known: bool,
 ) -> list[diagnostics.Report]:
     """
     Return the reports of a node.
@@ -93,6 +95,7 @@ def reports(
     :param without_id, known: see :func:`why_no_gimbal`.
     :param interval: the requested s between attitudes, 0 for the device's own interval.
     :param started: when the node was started, s on the link's clock.
+    :param geoid_is_known: whether ``geoid_separation`` is set.
     """
     manager = gimbal.managers[0] if gimbal else None
     made = [diagnostics.link_report(
@@ -104,13 +107,14 @@ def reports(
         hardware_id = (f'{gimbal.identity.uid:x}' if gimbal.identity and gimbal.identity.uid else
                        f'mavlink:{gimbal.key.address.system}/{gimbal.key.device_id}')
         made.append(diagnostics.Report(
-            'device', hardware_id, device_findings(gimbal, link.taken_at, interval), fine,
+            'device', hardware_id, device_findings(
+                gimbal, link.taken_at, interval, geoid_is_known=geoid_is_known), fine,
             lambda: _values(gimbal, link.taken_at)))
     return made
 
 
 def device_findings(
-    gimbal: GimbalSnapshot, now: float, interval: float,
+    gimbal: GimbalSnapshot, now: float, interval: float, *, geoid_is_known: bool,
 ) -> list[diagnostics.Finding]:
     """Return the findings on a gimbal."""
     attitude_limit = max(ATTITUDE_SILENCE, 3 * interval)
@@ -137,6 +141,8 @@ def device_findings(
             findings.append((diagnostics.WARN, f'no {name}{since}'))
     if gimbal.attitude_problem:
         findings.append((diagnostics.WARN, f'attitude unknown: {gimbal.attitude_problem}'))
+    if gimbal.has_place and not geoid_is_known:
+        findings.append((diagnostics.WARN, NO_GEOID))
     if not gimbal.enforces_control:
         findings.append((diagnostics.OK, 'ArduPilot records who has control and obeys others '
                                          'too: exclusive control is not guaranteed'))

@@ -16,7 +16,7 @@ from std_msgs.msg import Bool, Header, String
 from std_srvs.srv import SetBool, Trigger
 
 from . import conversions
-from .diagnostics import controller, reports, why_no_gimbal
+from .diagnostics import controller, NO_GEOID, reports, why_no_gimbal
 from .. import events
 from ..client import GimbalClient
 from ..commands import Control, NEUTRAL, RETRACT, YAW_LOCKS
@@ -28,12 +28,12 @@ from ...payload.messages import GeoPoint
 from ...payload.mount_attitude import YawFrame
 from ...ros import node as ros_node
 from ...ros.command_sources import prefixes, release_services, SOURCE
-from ...ros.conversions import quaternion_message
+from ...ros.conversions import GEOID_SEPARATION, quaternion_message
 from ...ros.device_nodes import publish_event
 from ...ros.diagnostics_publisher import DiagnosticsSource, MakeReports
 from ...ros.node import Interface
 from ...ros.parameter_services import ParameterServices
-from ...ros.parameters import ChangeableParameters
+from ...ros.parameters import ChangeableParameters, given_parameters
 from ...ros.payload import Host
 from ...ros.qos import STREAM_QOS
 from ...ros.throttled_log import NodeLog
@@ -83,7 +83,8 @@ CMD_RATE = Interface(
     'attitude shows that the gimbal stands')
 CMD_ROI = Interface(
     'cmd/roi', NavSatFix, 'a place to point at (MAV_CMD_DO_SET_ROI_LOCATION); its altitude is '
-    'above the ellipsoid', ros_node.SWITCH_QOS)
+    'above the ellipsoid. Set `geoid_separation`: until then the diagnostics warn while the '
+    'gimbal points at a place', ros_node.SWITCH_QOS)
 
 
 class GimbalNode:
@@ -112,7 +113,7 @@ class GimbalNode:
         self._started = host.link.clock()
         self._yaw_lock: bool | None = None
         self._errors = 0
-        self._separation: float = host.values['geoid_separation']
+        self._geoid_is_known = GEOID_SEPARATION.name in given_parameters(host.node)
         sources = client.settings.sources
         self._interface = ros_node.NodeInterface(
             node, host.link, log, publications=(*PUBLICATIONS, *([SOURCE] if sources else [])),
@@ -259,6 +260,8 @@ class GimbalNode:
     # Setpoints
 
     def _command_topics(self, source: str, prefix: str) -> tuple[ros_node.AnyCommandTopic, ...]:
+        separation: float = self._host.values['geoid_separation']
+
         def topic(
             plain: Interface, send: Callable[[Gimbal, T, float], str], read: Callable[[Any], T],
         ) -> ros_node.CommandTopic[T]:
@@ -276,7 +279,10 @@ class GimbalNode:
             return ''
 
         def pointed(result: Result, now: float) -> None:
-            if not (result.success or result.superseded):
+            if result.success and not self._geoid_is_known:
+                # Once: the condition never ends.
+                self._log.write_conditions([NO_GEOID], 'geoid')
+            elif not (result.success or result.superseded):
                 self._refused(CMD_ROI.of(prefix).name, result.message)
 
         return (
@@ -286,7 +292,7 @@ class GimbalNode:
                   self._frames.read_angles),
             topic(CMD_RATE, Gimbal.set_rates, conversions.read_rates),
             topic(CMD_ROI, point,
-                  lambda message: conversions.read_place(message, self._separation)))
+                  lambda message: conversions.read_place(message, separation)))
 
     def _refused(self, topic: str, reason: str) -> None:
         if reason:
@@ -301,4 +307,5 @@ class GimbalNode:
             heard=self._heard(now), without_id=self._client.managers_without_id(now),
             known=self._why_none(),
             limit_reached=self._client.discovery.limit_reached,
-            interval=self._client.settings.attitude_interval, started=self._started)
+            interval=self._client.settings.attitude_interval, started=self._started,
+            geoid_is_known=self._geoid_is_known)

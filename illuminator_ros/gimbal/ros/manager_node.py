@@ -34,11 +34,23 @@ from ...payload.arbitration import Cause, Policy
 from ...payload.messages import GeoPoint
 from ...payload.mount_attitude import AXES, from_mavlink
 from ...payload.rotation import enu_ned, ned_frd, Quaternion, Vector
-from ...ros.conversions import quaternion_message, read_orientation, read_quaternion, read_vector
+from ...ros.conversions import (
+    GEOID_SEPARATION,
+    quaternion_message,
+    read_orientation,
+    read_quaternion,
+    read_vector,
+)
 from ...ros.diagnostics import ERROR, Finding, Report, Value, WARN
 from ...ros.diagnostics_publisher import DiagnosticsSource, MakeReports
 from ...ros.node import AnyCommandTopic, CommandTopic, Interface, NodeInterface
-from ...ros.parameters import by_name, ParameterError, ParameterSpec, Values
+from ...ros.parameters import (
+    by_name,
+    given_parameters,
+    ParameterError,
+    ParameterSpec,
+    Values,
+)
 from ...ros.payload import Host, RosPayload, ServedPayload, ShutdownReport
 from ...ros.qos import STREAM_QOS
 
@@ -252,6 +264,10 @@ class ManagerNode(ServedPayload):
         holder = self._manager.control.holder(Role.PRIMARY)
         peers = self._host.link.lines.peer_count_of(holder, now) if holder else 0
         found, values = findings(self._manager, peers), _values(self._manager, now)
+        if (self._manager.setpoints.has_place and self._manager.vehicle.position.is_of_ros(now)
+                and GEOID_SEPARATION.name not in given_parameters(self._host.node)):
+            found.append((WARN, 'geoid_separation is not set, so the altitude of ~/fix is above '
+                                'the ellipsoid'))
         return lambda link: [Report('manager', f'manager {values["gimbal_device_id"]}', found,
                                     'active', lambda: values)]
 
