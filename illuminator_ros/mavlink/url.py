@@ -119,13 +119,18 @@ class MemoryUrl(NamedTuple):
 Url = UdpUrl | TcpUrl | SerialUrl | AutoUrl | PtyUrl | MemoryUrl
 
 
-def parse_url(text: str) -> Url:
+def parse_url(text: str, *, can_search: bool = True) -> Url:
     """
     Parse a connection URL.
 
+    :param can_search: whether the program looks for a device, as ``serial://auto`` does.
     :raises UrlError: if it is wrong; the message quotes the wrong part.
     """
-    return _Parser(text).parse()
+    parser = _Parser(text)
+    url = parser.parse()
+    if isinstance(url, AutoUrl) and not can_search:
+        parser.fail('only the nodes and conformance look for a device')
+    return url
 
 
 def resource(url: Url) -> Hashable:

@@ -106,6 +106,8 @@ def test_help_names_every_parameter_option_and_form_of_url() -> None:
     ('monitor', '--ros-args --params-file KEYS/pipe',
      'parameter file KEYS/pipe: it is not a regular file'),
     ('discover', 'http://x', "unknown scheme 'http'"),
+    *((program, 'serial://auto', 'only the nodes and conformance look for a device')
+      for program in ('discover', 'simulator')),
     ('discover', '--seconds 0', '--seconds: 0 is outside 1 to 3600'),
     ('simulator', '--banana', 'unrecognized arguments: --banana'),
     ('simulator', 'udpin://127.0.0.1:0', 'port 0 is outside 1..65535'),

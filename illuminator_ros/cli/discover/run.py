@@ -102,7 +102,8 @@ def parse(args: Sequence[str] | None) -> tuple[argparse.Namespace, list[tuple[st
     try:
         # A serial port may be given without its rate; a name by path contains colons.
         return options, [(text, parse_url(
-            f'{text},{RATES[0]}' if re.match(r'/(?!.*[,:]\d+$)', text) else text))
+            f'{text},{RATES[0]}' if re.match(r'/(?!.*[,:]\d+$)', text) else text,
+            can_search=False))
             for text in options.url]
     except ValueError as error:
         parser.error(str(error))

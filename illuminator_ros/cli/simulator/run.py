@@ -137,7 +137,8 @@ def run(
         file = load(options.file, types) if options.file else Scenario()
         label = options.url or file.url or types[0].url
         devices = components(options, file, types)
-        simulation = _Simulation(options, parse_url(label), label, devices, types)
+        url = parse_url(label, can_search=False)
+        simulation = _Simulation(options, url, label, devices, types)
         write_records(options, types, devices)
     except ValueError as error:
         print(f'simulator: {error}', file=sys.stderr)
