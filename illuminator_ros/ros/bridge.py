@@ -19,12 +19,11 @@ from typing import NamedTuple
 from rclpy.clock import Clock, ClockType
 from rclpy.duration import Duration
 from rclpy.exceptions import InvalidHandle
-from rclpy.executors import ExternalShutdownException
+from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
 from rclpy.node import Node
 
 from .diagnostics import SIGNING_NEEDED
 from .diagnostics_publisher import DiagnosticsPublisher
-from .executor import make_executor, SPIN_LIMIT
 from .graph import shared_names, unheard_publishers
 from .ignored_parameters import ignored_parameters
 from .link_call import ENDING
@@ -123,7 +122,9 @@ class Bridge:
         steady = Clock(clock_type=ClockType.STEADY_TIME)
         # Runs once after each reset.
         self._check = node.create_timer(CHECK_INTERVAL, self._work, clock=steady)
-        self._executor = make_executor(node.context, self.log)
+        # rclpy's EventsExecutor queues an event for each message, without a bound: after a flood,
+        # requests would wait for minutes (rclpy 7.1.6 and 9.1.2).
+        self._executor = SingleThreadedExecutor(context=node.context)
         self._nodes = NodeManager(
             node, arguments, self.log, self._executor, self._wake)
         self._diagnostics = DiagnosticsPublisher(
@@ -176,7 +177,6 @@ class Bridge:
         for payload in self._served:
             payload.payload.close()
         self._await_acknowledgements()
-        self._executor.shutdown()
         # The first one last, since the others use its publisher of parameter events.
         for node in reversed(self.nodes):
             node.destroy_node()
@@ -190,7 +190,7 @@ class Bridge:
                 publisher.wait_for_all_acked(
                     Duration(seconds=max(deadline - time.monotonic(), 0.0)))
 
-    def _spin_once(self, timeout: float = SPIN_LIMIT) -> None:
+    def _spin_once(self, timeout: float | None = None) -> None:
         try:
             self._executor.spin_once(timeout)
         except ExternalShutdownException:

@@ -14,7 +14,7 @@ from diagnostic_msgs.msg import DiagnosticArray
 from rclpy.node import Node
 
 from .diagnostics import line_reports, link_diagnostics, LinkDiagnostics, loops, Report
-from .executor import ExecutorCalls
+from .executor_calls import ExecutorCalls
 from .qos import STREAM_QOS
 from ..mavlink.component import Component
 from ..mavlink.link import Link

@@ -16,7 +16,7 @@ from rcl_interfaces import msg
 from rclpy.node import Node
 from rclpy.parameter import Parameter
 
-from .executor import ExecutorCalls
+from .executor_calls import ExecutorCalls
 from .rclpy_private import parameter_overrides
 from .ros_home import state_folder
 from .throttled_log import NodeLog

@@ -1,47 +1,50 @@
 # Copyright 2026 The illuminator_ros developers
 # SPDX-License-Identifier: Apache-2.0
 
-"""The executor of the nodes: rclpy's EventsExecutor, or the older one."""
+"""The requirements of the bridge on the executor of rclpy."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 import functools
-import sys
 import threading
 from typing import TypeVar
 
 from illuminator_ros.ros.deferred_service import DeferredService, Respond
-from illuminator_ros.ros.executor import make_executor, SPIN_LIMIT
 from illuminator_ros.ros.node import SERVICE_QOS
 from illuminator_ros.ros.throttled_log import NodeLog
 import pytest
+from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 from rclpy.parameter import Parameter
 from rclpy.qos import QoSProfile
 from rosgraph_msgs.msg import Clock
 from std_msgs.msg import Int32
 from std_srvs.srv import Trigger
-from support.embedded import embedded_bridge
-from support.light import ServedLight
 from support.recording import Call
-from support.ros import Parameters, Ros
+from support.ros import Ros
 from support.waiting import eventually, Log, PATIENCE
 
 T = TypeVar('T')
-NODES, CLIENTS, ROUNDS = 30, 50, 10
+NODES, CLIENTS, ROUNDS, MESSAGES = 30, 50, 10, 20_000
 
 
 class Spun:
-    """A node in the bridge's executor, which a thread spins as the bridge does."""
+    """
+    A node in the bridge's executor, which a thread spins as the bridge does.
+
+    :ivar errors: of callbacks.
+    :ivar spins: calls of ``spin_once`` that have returned.
+    """
 
     def __init__(self, ros: Ros, **parameters: bool) -> None:
         self.node = Node('spun', context=ros.context, parameter_overrides=[
             Parameter(name, value=value) for name, value in parameters.items()])
         self.log = NodeLog(self.node.get_logger())
-        self.executor = make_executor(ros.context, self.log)
+        self.executor = SingleThreadedExecutor(context=ros.context)
         self.executor.add_node(self.node)
         self.errors: Log[str] = Log()
+        self.spins = 0
         self._ended = threading.Event()
         self._thread = threading.Thread(target=self._spin)
         self._thread.start()
@@ -49,9 +52,10 @@ class Spun:
     def _spin(self) -> None:
         while not self._ended.is_set():
             try:
-                self.executor.spin_once(SPIN_LIMIT)
+                self.executor.spin_once()
             except Exception as error:
                 self.errors.append(repr(error))
+            self.spins += 1
 
     def do(self, function: Callable[[], T]) -> T:
         """Call a function in the executor's thread, and return its result."""
@@ -100,22 +104,6 @@ def accept(respond: Respond) -> None:
 
 def call(ros: Ros, service: str) -> Call:
     return ros.start(Trigger, service, Trigger.Request())
-
-
-def test_bridge_serves_with_the_older_executor_where_rclpy_has_no_events_executor(
-    own_ros: Ros, port: int, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str],
-) -> None:
-    # An import of it fails then.
-    monkeypatch.setitem(sys.modules, 'rclpy.experimental', None)
-
-    with embedded_bridge(own_ros.domain, port), ServedLight(port):
-        parameters = Parameters(own_ros)
-        parameters.wait(mode='internal_control')
-
-        assert own_ros.enable().success
-        assert parameters.set(brightness=20.0)[0].successful
-
-    assert 'has no EventsExecutor' in ''.join(capfd.readouterr())
 
 
 def test_requests_are_answered_while_nodes_are_made_and_removed(ros: Ros, spun: Spun) -> None:
@@ -225,3 +213,25 @@ def test_calls_of_many_clients_at_the_same_moment_are_all_answered(ros: Ros, spu
     for _ in range(ROUNDS):
         calls = [Call(client.call_async(Trigger.Request())) for client in clients]
         assert all(one.result().success for one in calls)
+
+
+def test_request_waits_for_the_kept_messages_of_a_flood_only(ros: Ros, spun: Spun) -> None:
+    spun.make('asked', accept)
+    publisher = ros.node.create_publisher(Int32, '/numbers', 10)
+    eventually(publisher.get_subscription_count)
+    call(ros, '/asked/serve').result()
+    held, released = threading.Event(), threading.Event()
+
+    def hold() -> None:
+        held.set()
+        released.wait(PATIENCE)
+
+    spun.executor.create_task(hold)
+    assert held.wait(PATIENCE)
+    for number in range(MESSAGES):
+        publisher.publish(Int32(data=number))
+    asked, before = call(ros, '/asked/serve'), spun.spins
+    released.set()
+
+    assert asked.result().success
+    assert spun.spins - before < MESSAGES / 10

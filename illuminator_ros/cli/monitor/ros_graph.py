@@ -7,7 +7,7 @@ The devices in the ROS graph, their values, and the requests to them.
 Everything happens in :meth:`Graph.poll` and :meth:`Graph.poll_answers`, which never wait: the
 newest message of each topic is taken when it is shown. An executor would make a wait set and run a
 callback for each message: with 108 topics at 1 Hz, of twelve devices, that took 22 % of a CPU in
-place of 1.6 %.
+place of 1.6 %. rclpy's EventsExecutor would take 0.8 times this, but has an unbounded queue.
 """
 
 from __future__ import annotations
