@@ -102,10 +102,13 @@ def package(module: str) -> tuple[str, str]:
     # Slow to import, and impossible where descriptors are lacking.
     try:
         from importlib.metadata import PackageNotFoundError, version
+    except (ImportError, OSError):
+        return name, ''
+    try:
         found = version(name)
     except PackageNotFoundError:
         return name, f'{name} is not installed: {remedy}'
-    except (ImportError, OSError):
+    except OSError:
         return name, ''
     versions = [[int(number) for number in re.findall(r'\d+', text)] for text in (found, oldest)]
     return f'{name} {found}', '' if versions[0] >= versions[1] else (
