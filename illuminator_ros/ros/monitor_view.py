@@ -31,6 +31,8 @@ STALE_STATES = (LOST, SILENT, GONE)
 # The outcomes of a request with their styles; a message on a topic is SENT, and has no answer.
 PENDING, DONE, SENT, FAILED = (
     ('...', 'dim'), ('done', 'green'), ('sent', 'green'), ('FAILED', 'bold red'))
+# The outcome of an OFF that was confirmed, of a device that is on all the same.
+ON_AGAIN = 'ON AGAIN', 'bold red'
 # s for which a row shows an outcome, and a line of the node's log.
 NEWS_LIFETIME = 10.0
 # The order of attention; the levels from the best to the worst.
@@ -95,6 +97,7 @@ class Device:
     :param name: of its node, with namespace.
     :param now: when the values were taken, s.
     :param source: of commands, which the operator has chosen; '' for the plain interface.
+    :ivar nodes: how many nodes have this name, which share its values and answers.
     :ivar heard_at: when the device was last heard, s.
     :ivar values: by topic; None is a number that cannot be.
     :ivar changed_at: when each topic changed, s, absent before its first change.
@@ -108,6 +111,7 @@ class Device:
     view: View
     now: float
     source: str = ''
+    nodes: int = 1
     heard_at: float = -math.inf
     is_gone: bool = False
     values: dict[str, Any] = field(default_factory=dict)
@@ -123,7 +127,8 @@ class Device:
     def level(self) -> int | None:
         """Return its worst level, an index of :data:`LEVELS`, None if it has not sent one."""
         levels = map(self.level_of, self.diagnoses.values())
-        return max(levels, key=BY_SEVERITY.index, default=3 if self.is_stale else None)
+        own = (1,) if self.nodes > 1 else ()
+        return max((*levels, *own), key=BY_SEVERITY.index, default=3 if self.is_stale else None)
 
     def level_of(self, one: Diagnosis) -> int:
         """Return a level, STALE for an OK that may be out of date."""
@@ -147,6 +152,11 @@ class Device:
         if self.now - self.heard_at > SILENCE:
             return SILENT
         return LOST if self.values.get('connected') is False else self.view.state(self)
+
+    @property
+    def conflict(self) -> str:
+        """Return that several nodes have its name, for people, '' if one has."""
+        return f'{self.nodes} nodes with this name' if self.nodes > 1 else ''
 
     @property
     def prefix(self) -> str:

@@ -354,7 +354,8 @@ def test_arrows_move_a_gimbal_only_after_steering_has_begun() -> None:
         assert 'left by 5 deg' in screen.text
         await screen.press('escape', 'up', 'end', 'm', 't', 'j')
         assert screen.graph.asked == [
-            ('/gimbal', 'pitch to 23.6 down'), ('/gimbal', 'yaw to 9.3 right')]
+            ('/gimbal', 'pitch to 23.6 down'), (
+                '/gimbal', 'yaw to 9.3 right in base_link_stabilized')]
         await screen.press('up', 'm', 'up')
 
     assert len(show(test, light(), gimbal()).asked) == 2

@@ -15,7 +15,7 @@ from illuminator_ros.cli.monitor.ros_graph import (
     OFF_RETRY,
     WANTED_LIFETIME,
 )
-from illuminator_ros.ros.monitor_view import Device, DONE, FAILED, Request
+from illuminator_ros.ros.monitor_view import Device, DONE, FAILED, ON_AGAIN, Request
 import pytest
 from rclpy.node import Node
 from rclpy.task import Future
@@ -301,6 +301,22 @@ def test_off_of_all_off_is_sent_again_until_an_answer_confirms_it(bench: Bench) 
     assert bench.device.off == (DONE, 'off, confirmed')
     bench.poll(2 * OFF_LIMIT)
     assert len(bench.switches()) == 2
+
+
+def test_a_light_that_another_switches_on_after_all_off_is_no_longer_confirmed(
+    bench: Bench,
+) -> None:
+    bench.device.learn('enabled', True)
+    require_off(bench)
+    bench.answer('enable', 1, text='off, confirmed')
+    # The light was on when it was confirmed, as far as the topic says.
+    bench.device.learn('enabled', True)
+    assert bench.device.off == (DONE, 'off, confirmed')
+
+    for value, outcome in ((False, DONE), (True, ON_AGAIN), (True, ON_AGAIN), (False, DONE)):
+        bench.device.learn('enabled', value)
+        bench.device.learn('brightness', 10.0 + value)
+        assert bench.device.off[0] == outcome
 
 
 def test_off_that_is_never_confirmed_is_given_up_and_says_so(bench: Bench) -> None:

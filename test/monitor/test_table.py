@@ -29,7 +29,7 @@ def test_table_has_a_heading_and_a_row_for_each_device() -> None:
         ['/bow', 'off', 'WARN', 'dimmed because it is hot; 40 %  41.5 C  steady  internal'],
         ['/stern', 'LOST', 'WARN', 'dimmed because it is hot; 40 %  41.5 C  steady  internal'],
         ['/gimbal', 'ours', 'OK',
-         'primary 1/193  pitch 28.6 down  yaw 14.3 right  base_link_stabilized'],
+         'primary 1/193  pitch 28.6 down  yaw 14.3 right in base_link_stabilized'],
         ['/camera', 'ok', 'WARN',
          'nothing received on ~/imu; 7  12 ms  fix  47.300000 8.500000 480.0 m']]
 
@@ -118,6 +118,14 @@ def test_gone_device_shows_nothing_as_ok() -> None:
     one = gone(diagnosed(light(), lamp=0, link=0))
 
     assert ' OK' not in ' '.join(plain([one]))
+
+
+def test_several_nodes_of_one_name_are_a_finding_since_their_values_are_mixed() -> None:
+    one = diagnosed(light(), lamp=0)
+    one.nodes = 2
+
+    assert text_of(one).startswith('2 nodes with this name; 40 %')
+    assert (one.attention, level(one)) == (BROKEN, [('WARN', 'yellow')])
 
 
 def test_all_off_counts_the_confirmed_and_names_the_others() -> None:

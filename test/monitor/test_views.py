@@ -199,7 +199,8 @@ def test_temperature_of_a_failed_sensor_is_not_shown_nor_kept() -> None:
 
 @pytest.mark.parametrize(('angles', 'key', 'text'), [
     ((0.0, 0.5, -0.25), 'up', 'pitch to 23.6 down'), ((0.0, 0.0, 0.0), 'up', 'pitch to 5.0 up'),
-    ((0.0, 0.0, 0.0), 'right', 'yaw to 5.0 right'), ((0.0, 0.0, 0.0), 'left', 'yaw to 5.0 left')])
+    ((0.0, 0.0, 0.0), 'right', 'yaw to 5.0 right in map'),
+    ((0.0, 0.0, 0.0), 'left', 'yaw to 5.0 left in map')])
 def test_requested_angle_has_a_direction_as_shown_angles_have(
     angles: tuple[float, ...], key: str, text: str,
 ) -> None:
@@ -211,11 +212,21 @@ def test_keys_of_the_camera_are_its_services() -> None:
         'capture', 'capture_panel', 'ping']
 
 
+def ranging(one: shared.Device) -> shared.Device:
+    """Return a gimbal whose range of yaw is known."""
+    one.diagnoses['device'] = shared.Diagnosis(0, 'in control', {
+        f'yaw_{end}_rad': f'{math.radians(yaw)}' for end, yaw in (('min', -170), ('max', 170))})
+    return one
+
+
 @pytest.mark.parametrize(('one', 'texts'), [
     (light(error_flags=1), ['40 % (agreed: 90 %)', 'maker torch', 'no. T-1', 'up 5 min',
                             '30.0 to 41.5 in 2 min']),
     (light(strobe_period=0.5, strobe_duty_cycle=20.0), ['0.5 s 20 %']),
     (gimbal(), ['28.6 down', '14.3 right', 'ours: primary 1/193']),
+    # The range counts from ahead, as its frame may not.
+    (ranging(gimbal(angles=('map', 0.0, 0.5, math.pi / 2))),
+     ['90.0 left in map (range from ahead: 170.0 right to 170.0 left)']),
     (camera(), ['7, at 47.300000 8.500000 480.0 m', 'fix ok 0 s', 'imu stale 9 s',
                 'imu stale', 'mount unused']),
     (camera(fix=(-1, 0.0, 0.0, 0.0)), ['7, at -'])])

@@ -190,6 +190,16 @@ def test_device_that_leaves_is_gone_can_be_cleared_and_can_return(
     monitor.wait(lambda device: device.values.get('brightness') == 10.0, '/one')
 
 
+def test_a_name_of_two_nodes_is_counted_twice(own_ros: Ros, monitor: Watching) -> None:
+    bridges = [Node('one', context=own_ros.node.context) for _ in range(2)]
+    FakeBridge(own_ros, '/one')
+    monitor.wait(lambda device: device.conflict == '2 nodes with this name', '/one')
+
+    bridges.pop().destroy_node()
+    monitor.wait(lambda device: not device.conflict, '/one')
+    bridges.pop().destroy_node()
+
+
 def test_trend_gets_one_value_in_each_interval(own_ros: Ros, monitor: Watching) -> None:
     FakeBridge(own_ros, '/one')
     device = monitor.wait(lambda device: device.state == 'ON', '/one')

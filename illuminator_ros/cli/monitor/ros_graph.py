@@ -12,6 +12,7 @@ place of 1.6 %. rclpy's EventsExecutor would take 0.8 times this, but has an unb
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Callable, Generator, Iterable, Iterator, Sequence
 import contextlib
 import math
@@ -136,13 +137,21 @@ class GraphDevice(Device):
         for topic, subscription in self._subscriptions.items():
             for message in _taken(subscription):
                 self.heard_at = now
-                spec, known = self.view.topics[topic], self.values.get(topic)
-                self.values[topic] = value = sane(spec.read(message))
-                if not spec.is_state or known is not None and known != value:
-                    self.changed_at[topic] = now
+                self.learn(topic, sane(self.view.topics[topic].read(message)))
         if self.view.off is not None and self._may_request:
             # The discovery of its service takes a while.
             self._endpoint(self.view.off(self))
+
+    def learn(self, topic: str, value: Any) -> None:
+        """Take the newest value of a topic."""
+        known, self.values[topic] = self.values.get(topic), value
+        if self.view.topics[topic].is_state and known in (None, value):
+            return
+        self.changed_at[topic] = self.now
+        if self.view.off is not None and self.off is not None and self.off[0] in (
+                shared.DONE, shared.ON_AGAIN) and (
+                    topic in (wanted := self.view.off(self).values)):
+            self.off = (shared.DONE if value == wanted[topic] else shared.ON_AGAIN), ''
 
     def diagnose(self, status: DiagnosticStatus, values: dict[str, str]) -> None:
         """Take a status of the diagnostics."""
@@ -339,8 +348,11 @@ class Graph:
     def _query(self, now: float) -> None:
         found = devices_among(self._node.get_topic_names_and_types(), self.views,
                               self._node.count_publishers)
+        nodes = Counter(f'{namespace.rstrip("/")}/{name}' for name, namespace in
+                        self._node.get_node_names_and_namespaces())
         for device in self.devices:
             device.is_gone = found.pop(device.name, None) is not device.view
+            device.nodes = nodes[device.name]
         for name in sorted(found)[:MAX_DEVICES - len(self.devices)]:
             self.devices.append(GraphDevice(
                 self._node, name, found[name], now, self._source, may_request=self.may_request))

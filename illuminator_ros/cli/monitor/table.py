@@ -45,7 +45,7 @@ def report(device: Device) -> list[Cell]:
         # The row has the name.
         parts.append([re.sub(rf'^{device.view.kind} \d+/\d+:? ', '', news)])
     # The diagnosis of its link is last.
-    parts += [[text] for text in (device.view.notice(device), *(
+    parts += [[text] for text in (device.conflict, device.view.notice(device), *(
         one.message for _, one in sorted(
             device.diagnoses.items(), key=lambda item: item[0] == 'link') if one.level),
         '  '.join(filter(None, device.view.values(device)))) if text]
@@ -63,6 +63,8 @@ def details(device: Device) -> Iterable[shared.DetailLine]:
         held = device.number(kind, 'held_s')
         yield kind, [LEVELS[device.level_of(one)], f': {one.message}', '' if held is None else (
             f'; held by {device.diagnosed(kind, "holder")} for {shared.age(held)}')]
+    if device.conflict:
+        yield 'nodes', [(device.conflict, 'yellow'), ': give each another name or namespace']
     if notice := device.view.notice(device):
         yield 'note', [notice]
     yield from device.view.details(device)

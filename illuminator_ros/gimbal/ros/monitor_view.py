@@ -32,7 +32,13 @@ def angle(device: Device, axis: str) -> float | None:
 def described(device: Device, axis: str) -> str:
     """Return the angle of an axis with its direction."""
     known = angle(device, axis)
-    return UNKNOWN if known is None else direction(axis, known)
+    return UNKNOWN if known is None else _in_frame(device, axis, known)
+
+
+def _in_frame(device: Device, axis: str, radians: float) -> str:
+    """Return an angle with its direction; for yaw, which has several origins, with its frame."""
+    frame = f' in {device.values["angles"][0]}' if axis == 'yaw' else ''
+    return f'{direction(axis, radians)}{frame}'
 
 
 def direction(axis: str, radians: float) -> str:
@@ -58,7 +64,7 @@ def nudge(device: Device, typed: str, axis: str, step: float) -> Request | str:
     # NaN leaves an axis as it is. The newest setpoint replaces others, so it has their targets.
     targets = {one: aim if one == axis else device.wants(one, math.nan) for one in AXES}
     return Request(
-        f'{axis} to {direction(axis, aim)}', f'{device.prefix}cmd/angles', Vector3Stamped,
+        f'{axis} to {_in_frame(device, axis, aim)}', f'{device.prefix}cmd/angles', Vector3Stamped,
         Vector3Stamped(header=Header(frame_id=device.values['angles'][0]),
                        vector=Vector3(**dict(zip('xyz', targets.values(), strict=True)))),
         {one: target for one, target in targets.items() if math.isfinite(target)})
@@ -93,7 +99,9 @@ def _details(device: Device) -> Iterable[shared.DetailLine]:
     for axis in AXES:
         ends = [device.number('device', f'{axis}_{end}_rad') for end in ('min', 'max')]
         range_ = ' to '.join(direction(axis, end) for end in ends if end is not None)
-        yield axis, [described(device, axis), f' (range: {range_})' * bool(range_)]
+        # In the earth's frame too: the device has stops, whatever yaw counts from.
+        of = ' from ahead' if axis == 'yaw' else ''
+        yield axis, [described(device, axis), f' (range{of}: {range_})' * bool(range_)]
     # The diagnostics also know it from before this monitor, but up to a second later.
     known = device.number('device', 'controller_s')
     since = device.since('controller') or (known is not None and shared.age(known))
@@ -111,8 +119,7 @@ VIEW = shared.View(
     ('in_control', 'controller', 'angles', 'connected'),
     lambda device: (
         device.values.get('controller', UNKNOWN), f'pitch {described(device, "pitch")}',
-        f'yaw {described(device, "yaw")}', 'yaw locked' * bool(device.values.get('yaw_lock')),
-        device.values.get('angles', (UNKNOWN,))[0]),
+        f'yaw {described(device, "yaw")}', 'yaw locked' * bool(device.values.get('yaw_lock'))),
     _details,
     (Key(('t',), 'take control', take_control),
      shared.trigger_key('l', 'release control', 'release_control'),
