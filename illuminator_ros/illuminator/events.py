@@ -188,6 +188,7 @@ class LightSnapshot(NamedTuple):
     :param held_since: when the holder changed last.
     :param unreachable: why requests cannot reach the light, '' if they can.
     :param off_at: when ``off_after_silence`` switches it off, infinity for never.
+    :param shared_serials: the serial numbers of several lights with this address, else empty.
     """
 
     address: Address
@@ -208,6 +209,7 @@ class LightSnapshot(NamedTuple):
     holder: str | None = None
     held_since: float = 0.0
     off_at: float = math.inf
+    shared_serials: tuple[str, ...] = ()
 
     def events(self) -> list[LightEvent]:
         """Return the events that lead to this state, for a listener that subscribes late."""

@@ -151,7 +151,9 @@ class Light:
             return
         twin.gap = now - before if math.isfinite(before) else 0.0
         if order is Order.RESTARTED:
-            self._emit(events.LightRestarted(self.address, twin.enabled, status.enabled))
+            # Lights that share an address seem to restart at each status.
+            if not self._queries.serials.shared(now):
+                self._emit(events.LightRestarted(self.address, twin.enabled, status.enabled))
             self._queries.begin(now)
             control.restarted(status, now)
         elif has_news:
@@ -168,7 +170,8 @@ class Light:
     def receive_identity(self, identity: Identity, now: float) -> None:
         """Receive a COMPONENT_INFORMATION_BASIC."""
         self._queries.take_identity(identity, now)
-        self._emit(events.LightIdentified(self.address, identity))
+        if not self._queries.serials.shared(now):
+            self._emit(events.LightIdentified(self.address, identity))
 
     def lose(self, reason: str, now: float) -> None:
         """Note that the light is not heard any more."""
@@ -229,7 +232,7 @@ class Light:
             rules.failure or twin.failure.text, rules.limits.exceeded, queries.identity,
             queries.identity_is_settled(now), twin.changing.are_changing,
             self.unreachable(now), self._requests.shown_holder, self._requests.claims.since,
-            self._silence_due(now))
+            self._silence_due(now), queries.serials.shared(now))
 
     # Requests
 

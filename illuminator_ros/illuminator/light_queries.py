@@ -10,6 +10,7 @@ import functools
 import math
 
 from .messages import IlluminatorStatus, STATUS_ID
+from .serial_numbers import SerialNumbers
 from ..mavlink.command_sender import (
     Command,
     CommandResult,
@@ -112,12 +113,14 @@ class LightQueries:
     :param interval: s between the statuses that the light is asked for; 0 for its own.
     :param heartbeat_timeout: s of silence after which the light is lost.
     :ivar identity: None before the light has sent it.
+    :ivar serials: those that its address has sent lately.
     """
 
     def __init__(
         self, target: Target, liveness: Liveness, interval: float, heartbeat_timeout: float,
     ) -> None:
         self.identity: Identity | None = None
+        self.serials = SerialNumbers()
         self._target = target
         self._liveness = liveness
         self._interval = interval
@@ -164,6 +167,7 @@ class LightQueries:
     def end(self) -> None:
         """Request no status: the light is lost."""
         self._due = math.inf
+        self.serials.clear()
 
     def close(self, reason: str, now: float) -> None:
         """Answer all who wait for a message."""
@@ -179,6 +183,7 @@ class LightQueries:
     def take_identity(self, identity: Identity, now: float) -> None:
         """Take the identity."""
         self.identity = identity
+        self.serials.take(identity.serial_number, now)
         self._identity.finish('', now)
 
     def identity_is_settled(self, now: float) -> bool:
@@ -212,6 +217,8 @@ class LightQueries:
         if now >= self._status_due:
             self._asked_at, self._due = now, now + STATUS_TIMEOUT
             self._status.ask(now)
+        if self.serials.is_due(now):
+            self._identity.ask(now)
         self._status.poll(now)
         self._identity.poll(now)
 
@@ -223,4 +230,5 @@ class LightQueries:
 
     def next_deadline(self) -> float:
         """Return when :meth:`poll` has something to do."""
-        return min(self._status_due, self._status.retries.due, self._identity.retries.due)
+        return min(self._status_due, self._status.retries.due, self._identity.retries.due,
+                   self.serials.next_deadline())

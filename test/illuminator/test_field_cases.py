@@ -10,8 +10,10 @@ from typing import Any
 
 from illuminator_ros.illuminator.events import ChangeCause, LightSwitched, StatesChanging
 from illuminator_ros.illuminator.messages import STATUS_ID
+from illuminator_ros.illuminator.serial_numbers import INTERVAL, LIFETIME
 from illuminator_ros.illuminator.status_order import CALM_TIME
 from illuminator_ros.mavlink.dialect import mavlink, replaced
+from illuminator_ros.payload.identity import Identity
 import pytest
 from support.back_to_back import Pair
 from support.fake_light import FakeLight
@@ -199,6 +201,34 @@ def test_two_lights_at_one_address_are_reported_and_followed_only_after_10_s_of_
     pair.run(3.0)
     assert changing(pair) == [True, False]
     assert pair.recorder.changes[followed:] == [(ChangeCause.LIGHT, {'brightness': 20.0})]
+
+
+def test_two_serial_numbers_at_one_address_are_named_for_as_long_as_both_answer() -> None:
+    first, second = FakeLight(stream=1.0), FakeLight(stream=1.0)
+    first.identity, second.identity = (Identity(serial_number=one) for one in ('A-1', 'B-2'))
+    second.boot = -400.0
+    pair = Pair(SharedAddress(first, second, offset=0.5)).settle(3.0)
+    restarts = pair.recorder.events.count('restarted')
+    for _ in range(12):
+        pair.run(20.0)
+        assert pair.snapshot.shared_serials == ('A-1', 'B-2')
+    assert pair.recorder.events.count('restarted') == restarts
+    assert pair.recorder.identities == [first.identity]
+    assert pair.enable(True).success
+
+    second.silent = True
+    pair.run(LIFETIME + INTERVAL)
+    assert pair.snapshot.shared_serials == ()
+
+
+def test_a_light_that_takes_the_place_of_a_lost_one_shares_no_address() -> None:
+    fake = FakeLight()
+    pair = Pair(fake).settle()
+    fake.silent = True
+    pair.run(5.0)
+    fake.identity, fake.silent = Identity(serial_number='B-2'), False
+    pair.run(3.0)
+    assert pair.snapshot.shared_serials == ()
 
 
 def test_a_light_that_flickers_after_each_switch_is_no_changing_state() -> None:

@@ -7,6 +7,7 @@ from collections.abc import Callable
 import contextlib
 
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
+from illuminator_ros.payload.identity import Identity
 from std_msgs.msg import Float32
 from support.fake_light import FakeLight
 from support.light import Address
@@ -74,3 +75,21 @@ def test_two_lights_at_one_address_are_a_warning_and_change_no_parameter(
                     and SHARED in array.status[1].message)
         assert events.messages == []
         assert bridge.count('was changed') <= 4
+
+
+def test_two_lights_with_one_address_are_an_error_and_a_log_line_with_their_serial_numbers(
+    own_ros: Ros, port: int,
+) -> None:
+    lights = SharedAddress(FakeLight(Address(1, 243)), FakeLight(Address(1, 243)))
+    for light, serial in zip(lights.lights, ('A-1', 'B-2'), strict=True):
+        light.identity = Identity(serial_number=serial)
+    shared = 'two lights use 1/243: serials A-1, B-2'
+    with (running_bridge(own_ros.domain, port) as bridge,
+          EndpointLink(f'udpout://127.0.0.1:{port}', lights, kind=SlowLink)):
+        arrays = own_ros.subscribe(DiagnosticArray, '/diagnostics', STREAM)
+        bridge.wait_for('connected')
+        CLOCK.forward(1.0)
+        bridge.wait_for(shared)
+        CLOCK.forward(1.0)
+        arrays.wait(lambda array: array.status[-1].level == DiagnosticStatus.ERROR
+                    and shared in array.status[-1].message)

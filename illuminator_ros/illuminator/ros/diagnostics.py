@@ -157,6 +157,13 @@ def changing_states(address: Address) -> str:
             'controller')
 
 
+def shared_address(light: LightSnapshot) -> str:
+    """Return that several lights have one address, for people, '' if one has."""
+    serials = light.shared_serials
+    count = 'two' if len(serials) == 2 else len(serials)
+    return serials and f'{count} lights use {light.address}: serials {", ".join(serials)}' or ''
+
+
 def lamp_findings(light: LightSnapshot, now: float) -> list[diagnostics.Finding]:
     """Return the findings on a light."""
     if not light.connected:
@@ -170,6 +177,8 @@ def lamp_findings(light: LightSnapshot, now: float) -> list[diagnostics.Finding]
             findings.append((diagnostics.WARN, f'no status for {format_seconds(silence)}'))
         if status.invalid:
             findings.append((diagnostics.WARN, f'implausible: {", ".join(status.invalid)}'))
+    if shared := shared_address(light):
+        findings.append((diagnostics.ERROR, shared))
     if light.states_are_changing:
         findings.append((diagnostics.WARN, changing_states(light.address)))
     if light.limit_exceeded.impossible:

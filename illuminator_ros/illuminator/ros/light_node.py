@@ -14,7 +14,7 @@ from std_msgs.msg import Bool, Float32
 from std_srvs.srv import SetBool, Trigger
 
 from .beam import BeamFrame, BeamPublisher
-from .diagnostics import hardware_id, LightsHeard, reports, why_no_light
+from .diagnostics import hardware_id, LightsHeard, reports, shared_address, why_no_light
 from .event_publisher import EventPublisher, PUBLICATIONS
 from .parameters import BeamGeometry, device_parameters
 from ..client import IlluminatorClient
@@ -162,6 +162,9 @@ class LightNode:
         """Do what is due."""
         if self._beam is not None:
             self._beam.poll()
+        light = self._light()
+        shared = shared_address(light.snapshot(self._host.link.clock())) if light else ''
+        self._log.write_conditions(filter(None, [shared]), 'shared address')
         if not self._mount_reported and (absence := self._mount_absence(self._host.link.clock())):
             self._mount_reported = True
             self._log.warning(f'{absence}; set mounted_on')
