@@ -209,6 +209,7 @@ def monitored() -> object:
     node.get_topic_names_and_types.return_value = [
         (f'/light_{number}/{name}', [type_name(topic.type)])
         for number in range(COUNT) for name, topic in VIEW.topics.items()]
+    node.get_node_names_and_namespaces.return_value = []
     node.create_subscription.return_value.handle.take_message.return_value = None
     graph = Graph(node, [VIEW], clock=lambda: 0.0)
     graph.poll()

@@ -79,8 +79,8 @@ class Rules:
         if not self._requests.are_calling:
             self.silence.calling_since = -math.inf
         if now >= self.silence_due(may_be_on=may_be_on):
-            self._put_off(Why.SILENCE, 'off_after_silence: no request has succeeded for '
-                          f'{format_seconds(self.silence.limit)}', now)
+            self._put_off(Why.SILENCE, 'off_after_silence '
+                          f'({format_seconds(self.silence.limit)})', now)
         if self.wants_off is not None and (self._twin.enabled or self.wants_off):
             self._put_off(Why.END, 'the end', now)
         self.forget_silenced(now)

@@ -184,7 +184,7 @@ class _TopicCalls(Generic[T]):
         try:
             value = self._command.read(message)
         except ValueError as error:
-            self._log.warning(f'~/{endpoint.name}: ignored: {error}', endpoint.name)
+            self._log.stream_failed(f'~/{endpoint.name}: ignored: {error}', endpoint.name)
             return
         if endpoint.qos is SWITCH_QOS:
             self._link.call(functools.partial(self._command.take, value))

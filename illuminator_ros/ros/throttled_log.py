@@ -8,6 +8,8 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 import logging
+import math
+import re
 import threading
 import time
 
@@ -19,6 +21,8 @@ from ..mavlink.messages import Address
 # Lines of one kind in PERIOD, s; the last of those left out is written after it.
 BURST = 10
 PERIOD = 10.0
+# s; failures of a stream that follow each other so closely are one failure that lasts.
+REPETITION = 2.0
 # How many kinds are limited separately.
 MAX_KINDS = 256
 # Characters of such a line, enough for a traceback: a frame_id may have megabytes.
@@ -48,6 +52,8 @@ class NodeLog:
         self._clock = clock
         self._kinds: dict[str, _Kind] = {}
         self._conditions: dict[str, frozenset[str]] = {}
+        # The last failure of each stream without its numbers, and when it was reported, s.
+        self._failures: dict[str, tuple[str, float]] = {}
         self._lock = threading.Lock()
 
     def info(self, text: str, kind: str = '') -> None:
@@ -88,6 +94,22 @@ class NodeLog:
             self.warning(text, kind)
         for text in sorted(before - now):
             self.info(f'no longer: {text}', kind)
+
+    def stream_failed(self, text: str, stream: str) -> None:
+        """
+        Warn that a message of a stream has failed, once for each reason.
+
+        The reason is the same if it differs in numbers only, such as the age of a heartbeat. It is
+        new after a pause of :data:`REPETITION`.
+
+        :param stream: such as the name of its topic.
+        """
+        reason, now = re.sub(r'[0-9.]+', '', text[:MAX_LENGTH]), self._clock()
+        with self._lock:
+            last, at = self._failures.get(stream, ('', -math.inf))
+            self._failures[stream] = reason, now
+        if reason != last or now >= at + REPETITION:
+            self.warning(text, stream)
 
     def flush(self) -> None:
         """Write the last line of each kind that was limited, once its period has ended."""

@@ -102,7 +102,7 @@ def test_an_on_under_way_ends_at_the_silence_with_an_off(
     pair.run(5.0)
 
     assert answer.result.message == (
-        f'off_after_silence: no request has succeeded for {silence * 1000:.0f} ms')
+        f'off_after_silence ({silence * 1000:.0f} ms)')
     sent = [command.param1 for command in pair.commands(ON_OFF, since=silent_at)]
     assert set(sent) == {0.0}
 

@@ -96,12 +96,12 @@ def text_of(one: Device) -> str:
 def test_report_begins_with_what_is_new_and_ends_with_the_values() -> None:
     one = light(enabled=True)
     one.action = 'on', DONE, 'confirmed', NOW
-    silence = 'off_after_silence: no request has succeeded for 30 s'
-    one.news = f'light 1/243 is switched off by {silence}', NOW
+    silence = 'off_after_silence (30 s)'
+    one.news = f'light 1/243 was switched off by {silence}', NOW
     one.diagnoses['lamp'] = Diagnosis(1, 'dimmed because it is hot', {'off_in_s': '12.3'})
 
     assert text_of(one).startswith(
-        f'on: done; is switched off by {silence}; off in 12 s '
+        f'on: done; was switched off by {silence}; off in 12 s '
         '(o: keep on); dimmed because it is hot; 40 %  41.5 C')
     # The request itself is said once.
     one.news = 'light 1/243 was switched on by service', NOW

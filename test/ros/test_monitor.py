@@ -134,8 +134,8 @@ def test_off_by_silence_is_announced_can_be_delayed_and_is_reported(
     def left(device: Device) -> float:
         return device.number('lamp', 'off_in_s') or 0.0
 
-    with (running_bridge(own_ros.domain, port, diagnostics_period=0.1, off_after_silence=1.5),
-          ServedLight(port)):
+    with (running_bridge(own_ros.domain, port, diagnostics_period=0.1,
+                         off_after_silence=1.5) as bridge, ServedLight(port)):
         monitor.wait(lambda device: device.state == 'off')
         monitor.press('space')
         monitor.wait(left)
@@ -149,6 +149,8 @@ def test_off_by_silence_is_announced_can_be_delayed_and_is_reported(
         CLOCK.forward(1.5)
         monitor.wait(lambda device: 'by off_after_silence' in device.news[0])
         monitor.wait(lambda device: device.state == 'off' and not device.view.notice(device))
+        # Once, when the light has shown it.
+        assert bridge.count('by off_after_silence (1.50 s)') == 1
 
 
 class FakeBridge:

@@ -80,3 +80,22 @@ def test_line_that_another_program_can_cause_is_cut_to_a_length(
     node_log.warning('x' * 2 * log.MAX_LENGTH, 'kind')
 
     assert lines(capfd) == ['x' * log.MAX_LENGTH, 'x' * log.MAX_LENGTH + '...']
+
+
+def test_a_stream_that_fails_is_logged_once_for_each_reason_and_again_after_a_pause(
+    node_log: log.NodeLog, clock: Clock, capfd: pytest.CaptureFixture[str],
+) -> None:
+    def fail(reason: str, stream: str = 'cmd/brightness') -> None:
+        clock.now += 0.5
+        node_log.stream_failed(reason, stream)
+
+    for number in range(20):
+        fail(f'light 1/243 is lost: no heartbeat for {number}.5 s')
+    assert lines(capfd) == ['light 1/243 is lost: no heartbeat for 0.5 s']
+    fail('refused')
+    fail('refused', 'cmd/enable')
+    fail('light 1/243 is lost: no heartbeat for 1.5 s')
+    assert len(lines(capfd)) == 3
+    clock.now += log.REPETITION
+    fail('light 1/243 is lost: no heartbeat for 9.5 s')
+    assert lines(capfd) == ['light 1/243 is lost: no heartbeat for 9.5 s']

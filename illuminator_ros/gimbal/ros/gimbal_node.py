@@ -296,7 +296,7 @@ class GimbalNode:
 
     def _refused(self, topic: str, reason: str) -> None:
         if reason:
-            self._log.warning(f'~/{topic}: ignored: {reason}', topic)
+            self._log.stream_failed(f'~/{topic}: ignored: {reason}', topic)
 
     # Diagnostics
 

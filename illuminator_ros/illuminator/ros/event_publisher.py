@@ -124,11 +124,10 @@ class EventPublisher:
             case events.DesiredStateFailed(source=source, message=message):
                 log.warning(f'{light} does not have the state that {source} requested: {message}',
                             'desired')
-            case events.AutomaticSwitch(on=on, reason=reason, failure=''):
-                log.warning(f'{light} is switched {_state(on)} by {reason}', 'automatic')
-            case events.AutomaticSwitch(on=on, failure=failure):
-                log.warning(f'{light}: {_state(on).upper()} is not confirmed and will be '
-                            f'repeated: {failure}', 'automatic')
+            # One that succeeds is logged when the light shows it.
+            case events.AutomaticSwitch(on=on, reason=reason, failure=failure) if failure:
+                log.warning(f'{light}: {_state(on).upper()} by {reason} is not confirmed and will '
+                            f'be repeated: {failure}', 'automatic')
             case events.ConfigurationChanged():
                 self._configuration_changed(event)
             case events.ConfigurationRestored(success=True, message=message):
@@ -138,10 +137,11 @@ class EventPublisher:
             case events.ConfigurationRestored(message=message):
                 log.error(f'{light} not configured: {message}', 'not configured')
             case events.SetpointFailed(message=message):
-                log.warning(f'~/{self._source}cmd/brightness: {message}', 'setpoint')
+                topic = f'{self._source}cmd/brightness'
+                log.stream_failed(f'~/{topic}: {message}', topic)
             case events.SetpointClipped(message=message):
-                log.warning(f'~/{self._source}cmd/brightness: {message}: the limit is sent',
-                            'clipped')
+                log.stream_failed(
+                    f'~/{self._source}cmd/brightness: {message}: the limit is sent', 'clipped')
             case events.LimitExceeded(excess=excess, impossible=impossible):
                 if impossible:
                     log.error(f'{light}: {impossible}', 'impossible limit')

@@ -219,7 +219,7 @@ class LightNode:
 
     def _warning_on(self, topic: str) -> ros_node.Answer:
         """Return a function that logs an answer, since a topic has none."""
-        return lambda success, message: self._log.warning(f'~/{topic}: {message}', topic)
+        return lambda success, message: self._log.stream_failed(f'~/{topic}: {message}', topic)
 
     def _switch(self, source: str, prefix: str, on: bool, now: float) -> None:
         warn = self._warning_on(f'{prefix}cmd/enable')
