@@ -117,7 +117,6 @@ def _ros() -> tuple[list[str], list[Finding]]:
     """Return the names of the nodes in the graph, and the findings on them."""
     from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
     import rclpy
-    from rclpy.parameter_client import AsyncParameterClient
 
     statuses: dict[tuple[str, str], DiagnosticStatus] = {}
 
@@ -130,43 +129,26 @@ def _ros() -> tuple[list[str], list[Finding]]:
     own = rclpy.create_node('_doctor', enable_rosout=False, start_parameter_services=False)
     try:
         own.create_subscription(DiagnosticArray, '/diagnostics', take, 100)
-
-        def spin(seconds: float) -> None:
-            end = time.monotonic() + seconds
-            while (left := end - time.monotonic()) > 0:
-                rclpy.spin_once(own, timeout_sec=left)
-
-        spin(ROS_TIME)
+        end = time.monotonic() + ROS_TIME
+        while (left := end - time.monotonic()) > 0:
+            rclpy.spin_once(own, timeout_sec=left)
         names = [f'{space.rstrip("/")}/{name}' for name, space in
                  own.get_node_names_and_namespaces() if not name.startswith('_')]
-        served = sorted({node for node, _ in statuses})
-        answers = {node: AsyncParameterClient(own, node).get_parameters(['geoid_separation'])
-                   for node in served}
-        spin(1.0 if served else 0.0)
-        zero = [node for node, answer in answers.items() if (result := answer.result())
-                and [(one.type, one.double_value) for one in result.values] == [(3, 0.0)]]
     finally:
         own.destroy_node()
         rclpy.shutdown()
+    served = ', '.join(sorted({node for node, _ in statuses})) or 'none'
     return names, [(True, f'{rclpy.get_rmw_implementation_identifier()}; nodes with a device: '
-                    f'{", ".join(served) or "none"}'), *on_nodes(names, zero), *(
+                    f'{served}'), *shared_names(names), *(
         (status.level == DiagnosticStatus.OK, f'{node}: {status.name}: {status.message}')
         for (node, _), status in sorted(statuses.items(), key=lambda one: one[0]))]
 
 
-def on_nodes(names: Iterable[str], zero: Iterable[str]) -> Iterator[Finding]:
-    """
-    Return the findings on nodes.
-
-    :param names: of all nodes.
-    :param zero: names of nodes whose geoid separation is 0.
-    """
+def shared_names(names: Iterable[str]) -> Iterator[Finding]:
+    """Return the names that several nodes have."""
     for name, count in Counter(names).items():
         if count > 1:
             yield False, f'{count} nodes are called {name}: rename one with -r __node:=NAME'
-    for name in zero:
-        yield False, (f'{name}: geoid_separation is 0: give the height of mean sea level above '
-                      'the ellipsoid at your place')
 
 
 def in_files(files: Sequence[Path], nodes: Sequence[str]) -> Iterator[Finding]:

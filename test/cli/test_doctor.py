@@ -9,7 +9,7 @@ from importlib import metadata
 from typing import Any
 
 from illuminator_ros.cli.discover.run import CONSOLE
-from illuminator_ros.cli.doctor import machine, OLDEST_TIME, on_nodes, on_ports
+from illuminator_ros.cli.doctor import machine, OLDEST_TIME, on_ports, shared_names
 from illuminator_ros.mavlink.listener import NOT_SENT_HERE, SILENT
 import pytest
 
@@ -51,11 +51,9 @@ def test_one_address_on_two_ports_fails() -> None:
                            'id, or connect it over one link only (doc/links.md)')
 
 
-def test_two_nodes_with_one_name_and_a_missing_geoid_separation_fail() -> None:
-    assert [*on_nodes(['/illuminator', '/gimbal', '/illuminator'], ['/gimbal'])] == [
-        (False, '2 nodes are called /illuminator: rename one with -r __node:=NAME'),
-        (False, '/gimbal: geoid_separation is 0: give the height of mean sea level above the '
-                'ellipsoid at your place')]
+def test_two_nodes_with_one_name_fail() -> None:
+    assert [*shared_names(['/illuminator', '/gimbal', '/illuminator'])] == [
+        (False, '2 nodes are called /illuminator: rename one with -r __node:=NAME')]
 
 
 def test_old_and_missing_packages_and_a_clock_without_a_battery_fail(
