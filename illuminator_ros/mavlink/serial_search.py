@@ -24,8 +24,8 @@ from .url import AutoUrl, SerialUrl, Url
 
 # s from the first device that fits to the decision, in which a second one may be heard.
 DECISION = 3.0
-# s without a device until the reason is reported, enough for each rate.
-PASS = 14.0
+# s without a device until the reason is reported, before the node logs that it has no device.
+PASS = 4.5
 # s between looks at the ports, and between requests for the identity of a device.
 TICK = 0.1
 # s until a port on which only others are heard is closed, since another search may look for these,
