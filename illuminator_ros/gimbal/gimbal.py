@@ -15,6 +15,7 @@ from .axes import known_ranges
 from .commands import Flag, setpoint_flags
 from .gimbal_reports import GimbalReports
 from .gimbal_requests import GimbalRequests, YawLock
+from .repetition import Repetition
 from .setpoint_stream import SetpointStream, SuspendedBy
 from ..mavlink.command_sender import CommandSender
 from ..mavlink.dialect import mavlink
@@ -31,6 +32,8 @@ from ..payload.rotation import Quaternion, Vector
 # s for which a release of control waits until an attitude shows that the gimbal stands; and at the
 # end of the process, which has less than a second.
 STOP_LIMIT, STOP_LIMIT_AT_END = 5.0, 0.45
+# rad; the largest difference of a reported attitude that shows the sent attitude.
+SHOWN_ANGLE = 0.02
 
 
 @dataclass(frozen=True)
@@ -82,6 +85,7 @@ class Gimbal:
             self._message, commands.send, settings.setpoint_timeout,
             lambda stands: emit(events.RateStopped(key, stands, self.setpoints.rate_stop.turns)))
         self._yaw_lock = YawLock(self.setpoints.hold)
+        self._repetition = Repetition()
         # Whether control must be taken as soon as no component has it.
         self._take_due = False
         # Whether a request for control is under way, or was neither refused nor confirmed.
@@ -97,6 +101,7 @@ class Gimbal:
     def components_lost(self, lost: Collection[Address], now: float, reason: str) -> None:
         """Record that some components cannot be reached, and the reason."""
         if self.reports.lose(lost, now, reason):
+            self._repetition.forget()
             self._yaw_lock.cancel(reason, now)
         if self.reports.manager.address in lost:
             self._requests.cancel(reason, now)
@@ -138,11 +143,13 @@ class Gimbal:
             self._settle(now)
             self._requests = GimbalRequests(self.key, reports.manager.address, self._commands)
         if reports.connect(now):
+            self._repetition.forget()
             self._take_due = self._settings.auto_take_control
         is_first = reports.last_control is None
         if not reports.update_control(now, is_releasing=self._requests.is_releasing,
                                       may_turn=setpoints.may_have_rate):
             return
+        self._repetition.forget()
         if not reports.in_control:
             self._yaw_lock.cancel(self.unavailable(now), now)
         if reports.control is None:
@@ -303,6 +310,7 @@ class Gimbal:
 
     def _end_commands(self, message: str, now: float, *, superseded: bool = False) -> None:
         """End the setpoint, and the requests that may turn the gimbal or stop it later."""
+        self._repetition.forget()
         self.setpoints.end(now)
         self._requests.cancel_moves(message, now, superseded=superseded)
         self._yaw_lock.cancel(message, now, superseded=superseded)
@@ -313,6 +321,7 @@ class Gimbal:
     def set_flag(self, flag: Flag, now: float, done: Done) -> None:
         """Turn to a pose; or stop, and lock or unlock the yaw (GM-3)."""
         self._begin(now)
+        self._repetition.forget()
         requests, message = self._requests, f'superseded by {flag.goal}'
         if reason := self.unavailable(now) or self.reports.missing(flag.needed):
             done(Result(False, reason), now)
@@ -332,11 +341,16 @@ class Gimbal:
         """
         Point at a place, or at none.
 
-        :param is_stream: whether its publisher repeats it, so that a newer one replaces it.
+        :param is_stream: whether its publisher repeats it, so that a newer one replaces it. An
+            equal one is sent once a second, as no status shows it, and else not answered.
         """
         self._begin(now)
         if reason := self.unavailable(now):
             done(Result(False, reason), now)
+            return
+        if not is_stream:
+            self._repetition.forget()
+        elif self._repetition.is_needless(place, now, is_shown=False, moves=False):
             return
         self.setpoints.suspend(now, SuspendedBy.PLACE, is_place=place is not None)
         self._requests.set_place(place, now, done, is_stream=is_stream)
@@ -346,7 +360,7 @@ class Gimbal:
 
     def set_attitude(self, rotation: Quaternion, frame: YawFrame, now: float) -> str:
         """
-        Send an attitude.
+        Send an attitude, unless it equals the one before and the gimbal shows it.
 
         :param rotation: with norm 1, from the FLU axes of the gimbal as in
             :class:`~..payload.mount_attitude.MountAttitude`.
@@ -357,7 +371,13 @@ class Gimbal:
             mavlink.GIMBAL_DEVICE_CAP_FLAGS_HAS_YAW_LOCK,
             mavlink.GIMBAL_DEVICE_CAP_FLAGS_SUPPORTS_YAW_IN_EARTH_FRAME,
         ) if frame is YawFrame.EARTH else '')
-        if not reason:
+        attitude = self.reports.device.attitude
+        shown = None if attitude is None else attitude.seen_from(frame)
+        # Angles that leave an axis as it is have rounded values.
+        if not reason and not self._repetition.is_needless(
+                (*(round(one, 6) for one in rotation), frame), now,
+                is_shown=shown is not None and shown.angle_to(rotation) < SHOWN_ANGLE,
+                moves=self.setpoints.rate_stop.turns is not False):
             self._requests.cancel_moves('superseded by a setpoint', now, superseded=True)
             self.setpoints.set_attitude(rotation, frame, now)
         return reason
@@ -394,6 +414,7 @@ class Gimbal:
         self._begin(now)
         reason = self.unavailable(now)
         if not reason:
+            self._repetition.forget()
             self._requests.cancel_moves('superseded by a setpoint', now, superseded=True)
             self.setpoints.set_rates(rates, now)
         return reason

@@ -80,11 +80,90 @@ def test_attitude_is_sent_again_a_few_times_unless_another_replaces_it() -> None
     rig.run(5.0)
 
     assert [at - start for at, _ in setpoints(rig)] == approx([0.0, *REPEATS], abs=0.03)
-    rig.gimbal.set_attitude(Quaternion(), VEHICLE, rig.now)
-    rig.gimbal.set_attitude(Quaternion.from_euler(*DOWN_LEFT), VEHICLE, rig.now)
+    for rotation in (Quaternion.from_euler(0.0, 0.2, 0.0), Quaternion.from_euler(*DOWN_LEFT)):
+        rig.gimbal.set_attitude(rotation, VEHICLE, rig.now)
     rig.run(5.0)
-    assert [one.q[0] == 1.0 for _, one in setpoints(rig)[1 + len(REPEATS):]] == [
+    assert [one.q[3] == 0.0 for _, one in setpoints(rig)[1 + len(REPEATS):]] == [
         True, *[False] * (1 + len(REPEATS))]
+
+
+def hold_button(rig: Rig, press: Callable[[], object], seconds: float = 5.0) -> int:
+    """Repeat a message at 50 Hz; return how many setpoints and places reach the manager."""
+    manager = rig.managers[0]
+    places = mavlink.MAV_CMD_DO_SET_ROI_LOCATION
+    manager.received.clear()
+    manager.commands.clear()
+    for _ in range(round(seconds * 50)):
+        press()
+        rig.run(0.02)
+    return len(manager.received) + sum(one.command == places for one in manager.commands)
+
+
+@pytest.mark.parametrize('angles', [(0.0, 0.0, 0.0), (NAN, 0.0, NAN)])
+def test_equal_angles_are_not_sent_again_while_a_standing_gimbal_shows_them(
+        angles: Vector) -> None:
+    rig = in_control()
+    rig.managers[0].rates = STANDING
+
+    def press() -> None:
+        assert rig.gimbal.set_angles(angles, VEHICLE, rig.now) == ''
+
+    hold_button(rig, press)
+
+    assert hold_button(rig, press) == 0
+    rig.gimbal.set_angles((0.0, 0.1, 0.0), VEHICLE, rig.now)
+    rig.run(3.0)
+    assert hold_button(rig, press) > 0
+
+
+@pytest.mark.parametrize(('rates', 'least', 'most'), [(STANDING, 5, 25), (TURNING, 250, 300)])
+def test_equal_angles_that_a_gimbal_does_not_show_are_sent_once_a_second_or_while_it_moves(
+        rates: Vector, least: int, most: int) -> None:
+    rig = in_control()
+    rig.managers[0].rates = rates
+
+    def press() -> None:
+        rig.gimbal.set_angles(DOWN_LEFT, VEHICLE, rig.now)
+
+    hold_button(rig, press)
+
+    assert least <= hold_button(rig, press) <= most
+
+
+def test_equal_rates_are_always_sent_and_equal_places_once_a_second() -> None:
+    rig = in_control()
+
+    assert hold_button(rig, lambda: turn(rig)) == 250
+    rig.managers[0].rates = STANDING
+    rig.gimbal.set_rates(STILL, rig.now)
+    rig.run(3.0)
+    assert hold_button(rig, lambda: rig.gimbal.set_roi(
+        PLACE, rig.now, rig.done, is_stream=True)) == 5
+
+
+@pytest.mark.parametrize('between', [
+    lambda rig: rig.gimbal.release('default', rig.now),
+    lambda rig: set_neutral(rig.gimbal, rig.now, rig.done),
+    lambda rig: rig.gimbal.set_rates(STILL, rig.now),
+    lambda rig: rig.component.components_lost([DEVICE], rig.now, 'cut')],
+    ids=['end of the claim', 'request', 'rate', 'loss'])
+def test_an_equal_attitude_is_sent_after_something_else(
+        between: Callable[[Rig], object]) -> None:
+    rig = in_control(sources=SourceSettings(('default',)))
+    rig.managers[0].rates = STANDING
+    rig.gimbal.claim('default', rig.now)
+    for _ in range(2):
+        send_attitude(rig)
+        rig.run(3.0)
+    between(rig)
+    rig.run(2.0)
+    before = len(setpoints(rig))
+
+    rig.gimbal.claim('default', rig.now)
+    send_attitude(rig)
+    rig.run(0.1)
+
+    assert len(setpoints(rig)) > before
 
 
 def test_rate_is_a_message_in_rad_per_s_and_ends_with_a_zero() -> None:
