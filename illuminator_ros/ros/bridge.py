@@ -122,8 +122,8 @@ class Bridge:
         steady = Clock(clock_type=ClockType.STEADY_TIME)
         # Runs once after each reset.
         self._check = node.create_timer(CHECK_INTERVAL, self._work, clock=steady)
-        # rclpy's EventsExecutor queues an event for each message, without a bound, and after a flood
-        # of a best-effort topic it takes longer for each: requests wait for minutes (rclpy 7.1.6).
+        # rclpy's EventsExecutor queues an event for each message, without a bound. After a flood
+        # of a best-effort topic it takes longer for each: requests wait for minutes (7.1.6).
         self._executor = SingleThreadedExecutor(context=node.context)
         self._nodes = NodeManager(
             node, arguments, self.log, self._executor, self._wake)
