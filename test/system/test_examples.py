@@ -89,6 +89,27 @@ def test_the_searchlight_dims_while_it_is_hot_and_goes_off_however_the_program_e
             assert (status, light.enabled) == (0, False), program.log
 
 
+@pytest.mark.parametrize(('fault', 'lines'), [
+    ('refuse', ['no brightness of 40 % within 1 s: the light reports 100 %.*']),
+    ('silent', ['no brightness of 40 % within 1 s: the light reports none.*',
+                'off failed: no light connected.*'])])
+def test_the_searchlight_says_why_it_cannot_be_used_each_failure_once(
+        own_ros: Ros, tmp_path: Path, fault: str, lines: list[str]) -> None:
+    port, light = free_port(), SimulatedIlluminator(IlluminatorProperties())
+    with (node(own_ros, 'bridge', port), contextlib.ExitStack() as stack):
+        if fault == 'refuse':
+            link = stack.enter_context(served(port, light))
+            link.ask(lambda now: light.behave(light.faults.add(light.behaviour, 'refuse'), now))
+            own_ros.subscribe(Bool, '/illuminator/connected').wait_value(True)
+        program = stack.enter_context(ended(
+            example(own_ros, 'searchlight', tmp_path, TIMEOUT='1.0')))
+
+        assert program.wait() == 1
+        found = program.log.splitlines()
+        assert len(found) == len(lines)
+        assert all(map(re.match, lines, found)), found
+
+
 def test_the_search_looks_in_each_direction_with_the_light_on_and_releases_the_gimbal(
         own_ros: Ros, tmp_path: Path) -> None:
     port, light = free_port(), SimulatedIlluminator(IlluminatorProperties())
