@@ -178,7 +178,7 @@ class InputStates:
         """Take a message in the context, which raises ValueError with the reason to refuse it."""
         tracker = self._trackers[name]
         if not tracker.is_fresh(now):
-            # What waited before a pause of the input has been dropped.
+            # A message that waited before a pause of the input has been dropped.
             tracker.waits_since = math.inf
         try:
             yield
