@@ -68,6 +68,9 @@ MAX_DELIVERY, LEAST_FRESH = 1.0, 0.25
 
 def publish(flight: Flight) -> None:
     """Publish the flight as ROS topics; print the time of the take-off (UTC, s) before it."""
+    # The middleware writes its errors into standard output.
+    output = os.fdopen(os.dup(1), 'w')
+    os.dup2(2, 1)
     from geometry_msgs.msg import Quaternion as QuaternionMessage
     from geometry_msgs.msg import QuaternionStamped, TwistStamped
     import rclpy
@@ -90,7 +93,7 @@ def publish(flight: Flight) -> None:
             raise TimeoutError('the node rededge does not subscribe to the topics')
         time.sleep(0.05)
     begin = time.time() + LEAD_TIME
-    print(f'{begin:.6f}', flush=True)
+    print(f'{begin:.6f}', file=output, flush=True)
 
     def rotation(one: Quaternion) -> QuaternionMessage:
         return QuaternionMessage(w=one.w, x=one.x, y=one.y, z=one.z)
