@@ -10,6 +10,7 @@ import contextlib
 import io
 import os
 import re
+import signal
 import sys
 
 from .termination import Termination
@@ -54,6 +55,13 @@ def run_program(name: str, run: Callable[[Termination], int]) -> int:
     status = explained(name, lambda: run(termination))
     termination.finish()
     return status
+
+
+def end_on_signals() -> None:
+    """Have signals end this process with status 1, until the run handles them."""
+    for one in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGQUIT):
+        if signal.getsignal(one) != signal.SIG_IGN:
+            signal.signal(one, lambda *_: os._exit(1))
 
 
 def escape_output() -> None:

@@ -210,6 +210,33 @@ def test_signals_are_handled_before_anything_slow_is_imported(name: str) -> None
     assert slow & set(loaded) == set()
 
 
+# Sends a signal when the program imports its run.
+EARLY = """
+import os, sys
+from illuminator_ros.cli.{name} import main
+
+class Run:
+    def __getattr__(self, name):
+        os.kill(os.getpid(), {number})
+        return lambda *_: 0
+
+sys.modules['illuminator_ros.cli.{name}.run'] = Run()
+sys.exit(main())
+"""
+
+
+@pytest.mark.parametrize('name', ['conformance', 'discover'])
+@pytest.mark.parametrize('number', [
+    signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGQUIT])
+def test_signal_before_the_run_ends_with_status_1_and_without_a_traceback(
+    name: str, number: int,
+) -> None:
+    program = Program(sys.executable, '-c', EARLY.format(name=name, number=int(number)))
+
+    assert program.wait() == 1
+    assert program.log == ''
+
+
 def test_program_under_nohup_outlives_its_terminal(port: int) -> None:
     program = Program('sh', '-c', 'trap "" HUP; exec "$@"', 'sh', sys.executable, '-m',
                       'illuminator_ros.simulator', f'udpout://127.0.0.1:{port}')

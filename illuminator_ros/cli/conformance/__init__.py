@@ -6,9 +6,8 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-import signal
 
-from ..entry_point import escape_output, explained
+from ..entry_point import end_on_signals, escape_output, explained
 from ..payloads import PAYLOADS
 from ...payload.payload_type import PayloadType
 
@@ -22,8 +21,7 @@ def main(
     :param args: the command line without the program's name, by default from ``sys.argv``.
     :param payloads: the kinds of payloads that ``--payload`` may name.
     """
-    # End without a traceback until the run handles signals.
-    signal.signal(signal.SIGINT, signal.SIG_DFL)
+    end_on_signals()
     escape_output()
 
     def start() -> int:

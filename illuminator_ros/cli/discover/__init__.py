@@ -5,9 +5,7 @@
 
 from __future__ import annotations
 
-import signal
-
-from ..entry_point import escape_output, explained
+from ..entry_point import end_on_signals, escape_output, explained
 
 
 def main(args: list[str] | None = None) -> int:
@@ -16,8 +14,7 @@ def main(args: list[str] | None = None) -> int:
 
     :param args: the command line without the program's name, by default from ``sys.argv``.
     """
-    # End without a traceback until the run handles signals.
-    signal.signal(signal.SIGINT, signal.SIG_DFL)
+    end_on_signals()
     escape_output()
 
     def start() -> int:
