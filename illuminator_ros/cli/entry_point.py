@@ -36,6 +36,9 @@ OLDEST = {
     'textual_serve': ('textual_serve', '1.1', _MONITOR),
 }
 
+# Domains above have no ports.
+MAX_DOMAIN = 232
+
 # The beginning of an error, once the arguments have been parsed.
 CANNOT_CREATE = 'cannot create the node'
 
@@ -206,10 +209,28 @@ def start_ros(name: str, arguments: Sequence[str]) -> None:
     """
     import rclpy
     from rclpy.signals import SignalHandlerOptions
-    if refusal := log_directory_refusal():
+    if refusal := environment_refusal() or log_directory_refusal():
         raise Refusal(refusal)
     with refusing(_wrong_arguments(name)):
         rclpy.init(args=[name, *arguments], signal_handler_options=SignalHandlerOptions.NO)
+
+
+def environment_refusal() -> str:
+    """
+    Return which variable of the environment prevents the start of ROS, '' if none does.
+
+    Fast DDS ends the process at once if the domain is out of range, and rcl gives no reason if
+    there is no keystore.
+    """
+    domain = os.environ.get('ROS_DOMAIN_ID', '')
+    if domain and not (re.fullmatch(r'\d{1,3}', domain) and int(domain) <= MAX_DOMAIN):
+        return f'ROS_DOMAIN_ID: {domain!r} is not a number from 0 to {MAX_DOMAIN}'
+    security = [os.environ.get(f'ROS_SECURITY_{name}', '') for name in ('ENABLE', 'STRATEGY')]
+    keystore = os.environ.get('ROS_SECURITY_KEYSTORE', '')
+    if security == ['true', 'Enforce'] and not os.path.isdir(keystore):
+        return (f'ROS_SECURITY_KEYSTORE: {keystore!r} is not a folder, but '
+                'ROS_SECURITY_ENABLE is true')
+    return ''
 
 
 def log_directory_refusal() -> str:

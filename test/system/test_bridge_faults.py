@@ -112,6 +112,21 @@ def test_directory_for_log_files_that_cannot_be_written_is_named(
     assert program.log.count('\n') == 1
 
 
+@pytest.mark.parametrize('module', [BRIDGE, 'illuminator_ros.monitor'])
+@pytest.mark.parametrize(('env', 'reason'), [
+    ({'ROS_DOMAIN_ID': '500'}, "ROS_DOMAIN_ID: '500' is not a number from 0 to 232"),
+    ({'ROS_DOMAIN_ID': 'robot1'}, "ROS_DOMAIN_ID: 'robot1' is not a number from 0 to 232"),
+    ({'ROS_SECURITY_ENABLE': 'true', 'ROS_SECURITY_STRATEGY': 'Enforce'},
+     "ROS_SECURITY_KEYSTORE: '' is not a folder, but ROS_SECURITY_ENABLE is true")])
+def test_wrong_environment_of_ros_is_one_line_with_status_2(
+    module: str, env: dict[str, str], reason: str,
+) -> None:
+    program = python(module, env=env)
+
+    assert program.wait() == 2
+    assert program.log.partition(': ')[2].rstrip() == reason
+
+
 def test_reason_is_printed_if_ros_itself_ends_the_start() -> None:
     # The import of rclpy exits if this middleware is not installed.
     program = start_interpreter(BRIDGE, env={'RMW_IMPLEMENTATION': 'rmw_missing_cpp'})
