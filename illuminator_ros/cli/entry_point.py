@@ -36,6 +36,8 @@ OLDEST = {
     'textual_serve': ('textual_serve', '1.1', _MONITOR),
 }
 
+OLDEST_PYTHON = (3, 10)
+
 # Domains above have no ports.
 MAX_DOMAIN = 232
 
@@ -80,6 +82,10 @@ def escape_output() -> None:
 
 def explained(name: str, run: Callable[[], int]) -> int:
     """Run a program and return its exit status; name a refusal, or a missing or old package."""
+    if sys.version_info[:2] < OLDEST_PYTHON:
+        print(f'{name}: Python {sys.version.split()[0]} is too old; '
+              f'{".".join(map(str, OLDEST_PYTHON))} or newer is needed', file=sys.stderr)
+        return 1
     try:
         return run()
     except Exception as error:

@@ -5,10 +5,12 @@
 
 import os
 from pathlib import Path
+import platform
 import re
 import shlex
 
 from illuminator_ros import __version__
+from illuminator_ros.cli import entry_point
 from illuminator_ros.cli.simulator.options import parser
 from illuminator_ros.illuminator.ros.parameters import DEVICE_PARAMETERS, LIGHT_PARAMETERS
 from illuminator_ros.ros.parameters import LINK_PARAMETERS
@@ -187,6 +189,18 @@ def test_old_package_is_one_line_with_its_version_and_remedy_and_status_1(
 
     assert (outcome.returncode, outcome.stderr) == (
         1, f'{program}: {name} {version} is too old; {oldest} or newer is needed: {remedy}\n')
+
+
+def test_old_python_is_one_line_with_its_version_and_status_1(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str],
+) -> None:
+    monkeypatch.setattr(entry_point, 'OLDEST_PYTHON', (99, 1))
+
+    assert entry_point.explained('bridge', lambda: 0) == 1
+
+    version = platform.python_version()
+    assert capsys.readouterr().err == (
+        f'bridge: Python {version} is too old; 99.1 or newer is needed\n')
 
 
 @pytest.mark.parametrize(('program', 'option', 'unbuffered'), [
