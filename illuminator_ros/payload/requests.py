@@ -259,7 +259,7 @@ class Requests:
                 self.end(old, Result(False, text, superseded=True), now)
         if new.values.get('enabled') is False:
             # An OFF ends an ON that is remembered, though it may fail.
-            self.forget({'enabled': True}, new.source if is_request else None)
+            self.forget({'enabled': True}, new.source if is_request else None, text)
 
     def _take_from(self, old: Request, text: str, now: float) -> None:
         """End a request of a source that another one replaces; a claimed wish is kept."""
@@ -269,36 +269,42 @@ class Requests:
         elif old.is_open:
             self.reply(old, result)
 
-    def forget(self, values: Values, source: str | None = None) -> None:
-        """Forget the wishes for some values, of one source or of all."""
+    def forget(self, values: Values, source: str | None = None, text: str = '') -> None:
+        """
+        Forget the wishes for some values, of one source or of all.
+
+        :param values: None for any value of a field.
+        :param text: the answer to those that are open.
+        """
         for old in [*self.standing]:
             if old.is_wish and source in (None, old.source):
                 self.drop(old, [name for name, value in values.items()
-                                if name in old.values and value in (None, old.values[name])])
+                                if name in old.values and value in (None, old.values[name])], text)
 
-    def drop(self, old: Request, names: Collection[str]) -> None:
+    def drop(self, old: Request, names: Collection[str], text: str = '') -> None:
         """Remove some fields of a request, and the request if no field is left."""
-        if names:
-            old.values = {name: value for name, value in old.values.items() if name not in names}
-            if not old.values:
-                old.is_open = False
-                self.standing.remove(old)
-                self.reply(old, Result(False, 'superseded', superseded=True))
+        if not names:
+            return
+        old.values = {name: value for name, value in old.values.items() if name not in names}
+        if not old.values:
+            old.is_open = False
+            self.standing.remove(old)
+            self.reply(old, Result(False, text, superseded=True))
 
     def _remember(self, new: Request, now: float) -> None:
         """Keep the wish of a source in place of its older ones for the same fields."""
         self.claim(new.source, now)
-        for old in [*self.standing]:
-            if old.is_wish and old.source == new.source and old.since <= new.since:
-                if old.is_open and not old.is_under_way:
-                    self.reply(old, Result(
-                        False, f'superseded by {self._describe(new.values)}', superseded=True))
-                elif old.is_under_way and not old.values.keys().isdisjoint(new.values):
-                    # Its attempt ends it. Other fields stay wanted.
-                    self.standing.remove(old)
-                    old = replace(old, done=no_reply, is_under_way=False)
-                    self.standing.append(old)
-                self.drop(old, [*new.values.keys() & old.values.keys()])
+        text = f'superseded by {self._describe(new.values)}'
+        for old in self.wishes(new.source):
+            names = old.values.keys() & new.values.keys()
+            if not names or old.since > new.since:
+                continue
+            if old.is_under_way:
+                # Its attempt ends it. Other fields stay wanted.
+                self.standing.remove(old)
+                old = replace(old, done=no_reply, is_under_way=False)
+                self.standing.append(old)
+            self.drop(old, names, text)
         self.standing.append(new)
 
     def claim(self, source: str, now: float) -> None:
