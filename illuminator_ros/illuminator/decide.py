@@ -65,7 +65,7 @@ def decide(requests: Requests, shown: Shown, limits: SafetyLimits, now: float) -
     :param limits: clip each configuration.
     """
     live = requests.live()
-    switch = _switch([one for one in live if 'enabled' in one.values and now >= one.due])
+    switch = Goal.strongest(live, 'enabled', now)
     hidden: tuple[str, ...] = ()
     if switch is not None and not switch.values and shown.brightness_is_switch is not False:
         # Only a call may send a configuration that might undo an OFF.
@@ -82,15 +82,6 @@ def decide(requests: Requests, shown: Shown, limits: SafetyLimits, now: float) -
         return Goals(switch)
     return _configuration(wanted, shown, limits, now, may_light_up='brightness' not in hidden
                           )._replace(switch=switch)
-
-
-def _switch(ranked: list[Request]) -> Goal | None:
-    """Return the goal of the strongest reason, and of one reason that of the newest request."""
-    if not ranked:
-        return None
-    first = min(reversed(ranked), key=lambda one: (one.why, -one.since))
-    on = first.values['enabled']
-    return Goal.of(on, tuple(one for one in ranked if one.values['enabled'] == on))
 
 
 def _configuration(

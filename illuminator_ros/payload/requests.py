@@ -6,7 +6,7 @@
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Callable, Collection, Mapping
+from collections.abc import Callable, Collection, Iterable, Mapping
 from dataclasses import dataclass, replace
 from enum import IntEnum
 import math
@@ -144,6 +144,21 @@ class Goal(NamedTuple):
     is_last: bool = False
 
     @classmethod
+    def strongest(cls, some: Iterable[Request], field: str, now: float) -> Goal | None:
+        """
+        Return the goal of the strongest of some requests for a field, None if none is due.
+
+        The newest is the strongest of those with one reason.
+        """
+        due = [one for one in some if field in one.values and now >= one.due]
+        if not due:
+            return None
+        value = min(reversed(due), key=lambda one: (one.why, -one.since)).values[field]
+        serves = tuple(one for one in due if one.values[field] == value)
+        until = max((one.until for one in serves if one.is_call), default=math.inf)
+        return cls.of(value, serves, until=until)
+
+    @classmethod
     def of(cls, values: Any, serves: tuple[Request, ...], **how: Any) -> Goal:
         """Return the goal that serves some requests; ``how`` has the first of the other fields."""
         reasons = {one.why for one in serves}
@@ -168,8 +183,9 @@ class Requests:
     """
 
     def __init__(
-        self, device: str, settings: SourceSettings | None, describe: Callable[[Values], str],
-        report: Callable[[HolderChanged[str], float], None],
+        self, device: str, settings: SourceSettings | None = None,
+        describe: Callable[[Values], str] = str,
+        report: Callable[[HolderChanged[str], float], None] = lambda change, now: None,
     ) -> None:
         ranked = settings or SourceSettings((DEFAULT,))
         self.are_ranked = settings is not None

@@ -82,10 +82,12 @@ class Property(Generic[S]):
         if self._under_way:
             self._under_way = {value: end for value, end in self._under_way.items() if now < end}
         fence = Fence(self.fence, self._frames if now < self.fence else 0,
-                      self._is_proved(change, goal, newest))
+                      self._is_proved(change, goal, now, newest))
         self.attempt = Attempt(self._target, change, goal, parts, now, fence=fence, gap=gap)
 
-    def _is_proved(self, change: Change[S], goal: Goal, newest: S | None) -> bool:
+    def _is_proved(
+        self, change: Change[S], goal: Goal, now: float, newest: S | None,
+    ) -> bool:
         """
         Return whether a status that shows a change proves it though other frames are under way.
 
@@ -93,7 +95,7 @@ class Property(Generic[S]):
         an equal one and this one. Only a value that has no time to await the end of the fence
         needs that: a program that sets it each second would be locked out by one failure.
         """
-        if goal.until == math.inf:
+        if goal.until > now + FENCE:
             return False
         under_way = self._under_way
         has_others = bool(under_way.keys() - {change.value})

@@ -21,7 +21,7 @@ from illuminator_ros.mavlink.messages import (
     Heartbeat,
     Message,
 )
-from illuminator_ros.payload.confirmed_command import Result
+from illuminator_ros.payload.requests import Result
 from illuminator_ros.simulation.simulated import SimulatedComponents
 from payloads.winch import WINCH, WinchClient, WinchReport
 import pytest

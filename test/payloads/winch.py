@@ -22,12 +22,13 @@ from illuminator_ros.mavlink.command_sender import CommandSender
 from illuminator_ros.mavlink.component import Payload
 from illuminator_ros.mavlink.dialect import mavlink
 from illuminator_ros.mavlink.messages import Address, AnyCommand, Heartbeat, Message
-from illuminator_ros.payload.confirmed_command import Change, Desired, Done, Result, Target
-from illuminator_ros.payload.device_property import answer, Caller, Property
+from illuminator_ros.payload.attempt import Change, Sending, Served, Target
 from illuminator_ros.payload.discovery import Discovery
 from illuminator_ros.payload.listeners import Listeners
 from illuminator_ros.payload.liveness import Liveness
 from illuminator_ros.payload.payload_type import PayloadType
+from illuminator_ros.payload.requests import Done, Goal, Request, Requests, Result, Why
+from illuminator_ros.payload.steered_property import Property
 from illuminator_ros.simulation import simulated
 from illuminator_ros.simulation.faults import Behaviour
 
@@ -51,7 +52,7 @@ def release(length: float, line_length: float) -> Change[WinchStatus]:
     # A winch that gets the command twice releases twice the length.
     return Change(
         mavlink.MAV_CMD_DO_WINCH, (1, mavlink.WINCH_RELATIVE_LENGTH_CONTROL, length),
-        f'{line_length:g} m released', is_idempotent=False,
+        f'{line_length:g} m released', sending=Sending.ONCE,
         shown_by=lambda status: abs(status.line_length - line_length) < 0.01,
         actual=lambda status: f'{status.line_length:g} m')
 
@@ -62,17 +63,20 @@ class Winch:
     def __init__(self, address: Address, commands: CommandSender) -> None:
         self.liveness = Liveness(timeout=3.0)
         self.was_commanded = False
+        self._requests = Requests(f'winch {address}')
+        self._status: WinchStatus | None = None
         self._length: Property[WinchStatus] = Property(
-            Target(address, commands, 'winch', WinchStatus.id, WinchStatus.msgname))
+            Target(address, commands, 'winch', WinchStatus.id, WinchStatus.msgname), self._plan)
 
     @property
     def lost_at(self) -> float:
         return self.liveness.lost_at
 
     def take_status(self, status: WinchStatus, now: float) -> None:
+        gap = now - self.liveness.heard_at
         self.liveness.hear(now)
-        self._length.reported(status, now)
-        self._answer(now)
+        self._status = status
+        self._end(self._length.reported(status, gap, now), now)
 
     def release(self, length: float, now: float, done: Done) -> None:
         """
@@ -81,25 +85,36 @@ class Winch:
         A release that is under way is not replaced: it may have been executed.
         """
         self.was_commanded = True
-        if self._length.desired is not None:
+        if self._length.attempt is not None:
             done(Result(False, 'a release is under way'), now)
         else:
-            out = self._length.newest.line_length if self._length.newest else 0.0
-            self._length.want(Desired(release(length, out + length)), now, Caller(done, now))
+            self._requests.put(Request({'length': length}, Why.REQUEST, now, done=done,
+                                       is_call=True), now)
+            self._step(now)
 
-    def _answer(self, now: float) -> None:
-        while self._length.outcomes:
-            outcome = self._length.outcomes.popleft()
-            answer(outcome.callers, outcome.result, now)
+    def _plan(self, goal: Goal) -> tuple[Change[WinchStatus], dict[Request, Change[WinchStatus]]]:
+        out = self._status.line_length if self._status else 0.0
+        change = release(goal.values, out + goal.values)
+        return change, dict.fromkeys(goal.serves, change)
+
+    def _step(self, now: float) -> None:
+        """Send what is wanted, and answer those whose requests have ended."""
+        goal = Goal.strongest(self._requests.live(), 'length', now)
+        self._length.steer(goal, now, self._status, 0.0 if self._status else None)
+        self._requests.answer(now)
+
+    def _end(self, served: list[Served[WinchStatus]], now: float) -> None:
+        for one in served:
+            self._requests.end(one.request, one.result, now)
+        self._step(now)
 
     def poll(self, now: float) -> None:
         if now >= self.liveness.silent_at:
             self.liveness.lose(now)
-        self._length.poll(now)
-        self._answer(now)
+        self._end(self._length.poll(now), now)
 
     def next_deadline(self) -> float:
-        return min(self.liveness.silent_at, self._length.next_deadline())
+        return min(self.liveness.silent_at, self._length.due)
 
 
 class WinchClient(Payload):

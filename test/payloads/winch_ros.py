@@ -5,7 +5,7 @@
 
 from __future__ import annotations
 
-from illuminator_ros.payload.confirmed_command import Result
+from illuminator_ros.payload.requests import Result
 from illuminator_ros.ros import monitor_view as shared
 from illuminator_ros.ros.monitor_view import Device, Key, Request, Topic
 from illuminator_ros.ros.node import CommandTopic, Interface, NodeInterface, SWITCH_QOS
