@@ -1,165 +1,158 @@
 # Copyright 2026 The illuminator_ros developers
 # SPDX-License-Identifier: Apache-2.0
 
-"""
-A property moves a device to its desired value, and answers each caller once.
-
-test_confirmed_command.py has the evidence for one command.
-"""
+"""One property: the command that is under way to it, the fence, and who is answered when."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 import functools
 import math
 from typing import Any
 
 from hypothesis import given, strategies
-from illuminator_ros.payload.confirmed_command import Desired, FENCE, Result
-from illuminator_ros.payload.device_property import (
-    answer,
-    Caller,
-    LATE_TIME,
-    MAX_CALLERS,
-    MAX_VALUES,
-    Outcome,
-    Property,
-)
+from illuminator_ros.payload.attempt import Change, FENCE, Served
+from illuminator_ros.payload.requests import Goal, MAX_CALLS, Request, Requests, Result, Why
+from illuminator_ros.payload.steered_property import LATE_TIME, MAX_VALUES, Property
 import pytest
 from support.level_device import ACCEPTED, Bench, DENIED, level_change
 
 ROUND_TRIP = 0.02
 
 
+def plan(goal: Goal) -> tuple[Change[int | None], Mapping[Request, Change[int | None]]]:
+    change = level_change(goal.values)
+    return change, dict.fromkeys(goal.serves, change)
+
+
 class PropertyBench(Bench):
-    """The level of the device as a property."""
+    """The level of the device as a property, and the requests for it."""
 
     def __init__(self, level: int | None = 0, *results: Any, **device: Any) -> None:
         super().__init__(level, *results, **device)
-        self.property: Property[int | None] = Property(self.target())
+        self.table = Requests('device 1/7', None, lambda values: f'level {values["level"]}')
+        self.property: Property[int | None] = Property(self.target(), plan)
+        self.newest: int | None = None
+        self.newest_at = -math.inf
+        self.ends: list[Served[int | None]] = []
 
-    def want(self, level: int, *, is_stream: bool = False, asked_at: float | None = None,
-             **desired: Any) -> list[Result]:
+    def want(self, level: int, why: Why = Why.REQUEST, *, is_stream: bool = False,
+             limit: float = math.inf) -> list[Result]:
         """Want a level, and return the list that gets its results."""
         results: list[Result] = []
-        self.property.want(Desired(level_change(level), **desired), self.now, Caller(
-            lambda result, now: results.append(result),
-            self.now if asked_at is None else asked_at, is_stream=is_stream))
-        self.flush()
+        self.table.put(Request(
+            {'level': level}, why, self.now, detail=why.name, is_call=not is_stream,
+            done=lambda result, now: results.append(result), until=self.now + limit), self.now)
+        self.steer()
         return results
+
+    def steer(self, *ended: Served[int | None]) -> None:
+        """End requests, and have what is wanted under way."""
+        for one in ended:
+            self.ends.append(one)
+            self.table.end(one.request, one.result, self.now)
+        gap = None if self.newest_at == -math.inf else self._gap
+        served = self.property.steer(
+            Goal.strongest(self.table.live(), 'level', self.now), self.now, self.newest, gap)
+        for one in served:
+            if one.request not in self.table.standing:
+                self.table.end(one.request, one.result, self.now)
+        self.table.answer(self.now)
+        self.flush()
+
+    _gap = 0.0
 
     def report(self, level: int | None = 0) -> PropertyBench:
         """Report a status out of turn."""
         self.reported(level)
         return self
 
-    def outcomes(self) -> list[Outcome[int | None]]:
-        """Take the outcomes and answer their callers."""
-        outcomes = list(self.property.outcomes)
-        self.property.outcomes.clear()
-        for outcome in outcomes:
-            for caller in outcome.callers:
-                caller.done(outcome.result, self.now)
-        return outcomes
+    def withdraw(self) -> None:
+        """End all requests, and send nothing more."""
+        for one in [*self.table.standing]:
+            self.table.end(one, Result(False, 'cancelled'), self.now)
+        self.steer()
 
-    def ended(self, level: int, **desired: Any) -> tuple[bool, float]:
+    def ended(self, level: int, **how: Any) -> tuple[bool, float]:
         """Want a level; return the success, and how long it took, s."""
-        begun, results = self.now, self.want(level, **desired)
+        begun, results = self.now, self.want(level, **how)
         while not results:
             self.step()
-            self.outcomes()
         return results[0].success, round(self.now - begun, 3)
 
     def reported(self, level: int | None) -> None:
-        self.property.reported(level, self.now)
+        self._gap = self.now - self.newest_at if self.newest_at != -math.inf else 0.0
+        self.newest, self.newest_at = level, self.now
+        self.steer(*self.property.reported(level, self._gap, self.now))
 
     def poll(self) -> None:
-        self.property.poll(self.now)
+        self.steer(*self.property.poll(self.now))
 
     def next_deadline(self) -> float:
-        command = self.property.command
-        return math.inf if command is None else command.next_deadline()
+        return self.property.due
 
 
 def messages(*answers: Sequence[Result]) -> list[str]:
     return [answer[0].message.partition(' (')[0] if answer else '' for answer in answers]
 
 
-# Callers
+# Requests
 
 def test_a_value_replaces_another_and_an_equal_one_joins_the_next_command() -> None:
     bench = PropertyBench(executes=[]).report()
     first, second = bench.want(3), bench.want(3)
     assert len(bench.tries) == 1
     other = bench.want(4)
-    bench.outcomes()
     assert messages(first, second, other) == ['superseded by level 4', 'superseded by level 4', '']
     assert first[0].superseded
-    bench.run()
-    reason = bench.want(5, reason='silence')
-    last = bench.want(6, reason='the end')
-    bench.outcomes()
-    assert messages(other, reason, last) == [
-        'level 4 not confirmed: MAV_RESULT_ACCEPTED, but STATUS shows level 0', 'the end', '']
-    bench.property.cancel('held by joystick', bench.now)
-    bench.outcomes()
-    assert (messages(last), last[0].superseded) == (['held by joystick'], False)
+    bench.run(10.0)
+    assert messages(other) == [
+        'level 4 not confirmed: MAV_RESULT_ACCEPTED, but STATUS shows level 0']
     assert len(bench.commands) == 0
 
 
 @pytest.mark.parametrize('result', [ACCEPTED, DENIED])
-def test_callers_of_an_equal_value_wait_for_a_command_sent_after_they_asked(result: int) -> None:
+def test_requests_for_an_equal_value_wait_for_a_command_sent_after_they_were_made(
+    result: int,
+) -> None:
     bench = PropertyBench(0, result).report()
     first = bench.want(3)
     bench.run(0.015)
     later = [bench.want(3) for _ in range(2)]
     bench.run(2 * FENCE)
-    outcomes = bench.outcomes()
-    assert [len(outcome.callers) for outcome in outcomes] == [1, 2]
-    assert [outcome.status for outcome in outcomes] == [3 if result == ACCEPTED else None] * 2
+    assert [one.status for one in bench.ends] == [3 if result == ACCEPTED else None] * 3
     assert [one[0].success for one in (first, *later)] == [result == ACCEPTED] * 3
     assert bench.tries[:2] == [0.0, ROUND_TRIP]
 
 
-def test_callers_are_bounded_and_of_a_stream_the_newest_waits() -> None:
+def test_calls_are_bounded() -> None:
     bench = PropertyBench().report()
-    answers = [bench.want(3) for _ in range(MAX_CALLERS + 2)]
-    bench.outcomes()
-    assert [bool(answer) for answer in answers] == [*[False] * MAX_CALLERS, True, True]
+    answers = [bench.want(3) for _ in range(MAX_CALLS + 2)]
+    assert [bool(answer) for answer in answers] == [*[False] * MAX_CALLS, True, True]
     assert answers[-1][0].message == '32 requests are waiting for device 1/7 already'
-    stream = [bench.want(3, is_stream=True) for _ in range(3)]
-    bench.outcomes()
-    assert messages(*stream) == ['superseded by level 3', 'superseded by level 3', '']
     bench.run(1.0)
-    bench.outcomes()
-    assert {len(answer) for answer in (*answers, *stream)} == {1}
+    assert {len(answer) for answer in answers} == {1}
+
+
+def test_of_a_topic_the_newest_message_counts() -> None:
+    bench = PropertyBench().report()
+    stream = [bench.want(level, is_stream=True) for level in (3, 4, 5)]
+    bench.run(2 * FENCE)
+    assert messages(*stream[:2]) == ['superseded by level 4', 'superseded by level 5']
     assert stream[-1][0].success
-    assert len(bench.tries) == 2
 
 
-def test_callers_who_ask_at_one_time_share_a_command_and_are_answered_in_that_order() -> None:
+def test_requests_of_one_time_share_a_command_and_are_answered_in_their_order() -> None:
     bench, order = PropertyBench(executes=[]).report(), list[int]()
     for number in range(3):
-        bench.property.want(Desired(level_change(3), limit=0.9), bench.now, Caller(
-            functools.partial(lambda number, result, now: order.append(number), number),
-            bench.now))
+        done = functools.partial(lambda number, result, now: order.append(number), number)
+        bench.table.put(Request({'level': 3}, Why.REQUEST, bench.now, done=done, is_call=True,
+                                until=0.9), bench.now)
+    bench.steer()
     bench.run(1.0)
-    (outcome,) = bench.property.outcomes
-    answer(outcome.callers, outcome.result, bench.now)
 
     assert order == [0, 1, 2]
-    assert bench.tries == [0.0]
-
-
-def test_a_caller_whose_time_is_over_gets_the_outcome_of_the_command_before() -> None:
-    bench = PropertyBench(executes=[]).report()
-    first = bench.want(3, limit=0.9)
-    bench.run(0.015)
-    second = bench.want(3, limit=0.9)
-    bench.run(1.0)
-    bench.outcomes()
-    assert len(first) == len(second) == 1
-    assert 'not confirmed: MAV_RESULT_ACCEPTED' in first[0].message == second[0].message
+    assert bench.tries[0] == 0.0
 
 
 def test_the_time_of_the_last_try_is_kept_when_the_command_ends() -> None:
@@ -169,30 +162,17 @@ def test_the_time_of_the_last_try_is_kept_when_the_command_ends() -> None:
     assert bench.property.sent_at == 1.75
     bench.run(4.0)
 
-    assert not bench.property.command
+    assert not bench.property.attempt
     assert bench.property.sent_at == 1.75
 
 
-def test_the_limit_counts_from_the_request() -> None:
+def test_a_request_that_insists_waits_for_an_equal_command_and_the_end_does_not() -> None:
     bench = PropertyBench(executes=[]).report()
-    bench.run(1.0)
-    answer = bench.want(3, asked_at=0.8, limit=0.5)
-    bench.run(1.31)
-    bench.outcomes()
-    assert answer[0].message.endswith('(1 try, 500 ms)')
-
-
-@pytest.mark.parametrize('changes', [{'insists': True}, {'insists': True, 'is_last': True}])
-def test_an_equal_value_that_is_sent_in_another_way_replaces_the_command(
-    changes: dict[str, bool],
-) -> None:
-    bench = PropertyBench().report()
     bench.want(3)
-    bench.want(3, reason='silence', **changes)
-    (outcome,) = bench.outcomes()
-    assert outcome.result.message == 'silence'
-    assert bench.property.desired is not None
-    assert bench.property.desired.insists
+    bench.want(3, Why.SILENCE)
+    assert len(bench.tries) == 1
+    bench.want(3, Why.END)
+    assert len(bench.tries) == 2
 
 
 # The fence
@@ -217,7 +197,7 @@ def test_within_the_fence_a_status_counts_that_only_this_value_can_have_caused(
         bench.report(first)
     for value in values[:-1]:
         bench.want(value)
-        bench.property.cancel('', bench.now)
+        bench.withdraw()
     if limit < FENCE:
         assert bench.ended(values[-1], limit=limit) == (
             (True, ROUND_TRIP) if is_proved_at_once else (False, limit))
@@ -259,11 +239,28 @@ def test_acknowledgements_within_the_fence_do_not_count_as_those_of_the_command(
     assert took == pytest.approx(last_sent + FENCE - (bench.now - took), abs=ROUND_TRIP + 0.001)
 
 
+@pytest.mark.parametrize(('results', 'is_fenced'), [
+    ([ACCEPTED], False), ([ACCEPTED, None, ACCEPTED], True),
+    ([ACCEPTED, (ACCEPTED, ACCEPTED), ACCEPTED], True),
+    ([ACCEPTED, (ACCEPTED, ACCEPTED), None, ACCEPTED], True)],
+    ids=['each answered', 'one lost', 'one copied', 'one copied and one lost'])
+def test_a_command_that_is_shown_after_its_fence_leaves_one_only_if_a_frame_may_be_under_way(
+    results: list[Any], is_fenced: bool,
+) -> None:
+    bench = PropertyBench(0, *results).report()
+    bench.want(3)
+    assert bench.ended(4) == (True, FENCE + ROUND_TRIP)
+
+    success, took = bench.ended(5)
+    assert success
+    assert took == pytest.approx(FENCE if is_fenced else ROUND_TRIP)
+
+
 def test_values_from_before_the_fence_are_forgotten_after_it() -> None:
     bench = PropertyBench().report()
     bench.want(3)
     bench.want(4)
-    bench.property.cancel('', bench.now)
+    bench.withdraw()
     bench.run(FENCE)
     bench.results = [None, None, None, None, ACCEPTED]
     bench.report(0)
@@ -283,7 +280,7 @@ def test_a_change_that_ended_unconfirmed_may_take_effect_until_a_status_shows_it
 ) -> None:
     bench = PropertyBench(0, None).report()
     bench.want(3)
-    bench.property.cancel('', bench.now)
+    bench.withdraw()
     assert bench.property.unconfirmed(bench.now) == level_change(3)
     bench.run(after)
     if event.startswith('another'):
@@ -309,21 +306,18 @@ def test_the_interval_of_the_statuses_tells_when_the_next_one_is_due(
     begun = bench.now
     answer = bench.want(3)
     bench.run(begun + 1.1)
-    bench.outcomes()
     assert text in answer[0].message
-    assert bench.property.newest_at == max(reports, default=-math.inf)
 
 
-def test_the_first_status_after_a_restart_confirms_nothing_and_is_the_newest() -> None:
+def test_the_first_status_after_a_restart_confirms_nothing() -> None:
     bench = PropertyBench(sends_status=False).report()
     answer = bench.want(3)
     bench.run(0.1)
-    bench.property.restarted(3, bench.now)
-    assert (bench.property.newest, bench.property.newest_at) == (3, 0.1)
-    assert not bench.property.outcomes
+    bench.newest, bench.newest_at = 3, bench.now
+    bench.property.restarted(bench.now)
+    assert not answer
     bench.sends_status = True
     bench.run(3.0)
-    bench.outcomes()
     assert answer[0].success
     assert 'the device restarted meanwhile (8 tries, 1.62 s)' in answer[0].message
 
@@ -331,7 +325,7 @@ def test_the_first_status_after_a_restart_confirms_nothing_and_is_the_newest() -
 @given(strategies.lists(strategies.tuples(
     strategies.sampled_from(['want', 'stream', 'report', 'ack', 'restart', 'cancel', 'wait']),
     strategies.integers(0, 3)), max_size=40))
-def test_each_caller_is_answered_once_and_each_success_is_shown_after_it_was_asked(
+def test_each_request_is_answered_once_and_each_success_is_shown_after_it_was_made(
     steps: list[tuple[str, int]],
 ) -> None:
     bench = PropertyBench(0, None, sends_status=False).report(9)
@@ -348,12 +342,11 @@ def test_each_caller_is_answered_once_and_each_success_is_shown_after_it_was_ask
         elif action == 'ack':
             bench.acknowledge(ACCEPTED if number else DENIED)
         elif action == 'restart':
-            bench.property.restarted(number, bench.now)
+            bench.property.restarted(bench.now)
         elif action == 'cancel':
-            bench.property.cancel('cancelled', bench.now)
+            bench.withdraw()
         else:
             bench.run(bench.now + 0.3 * number)
-        bench.outcomes()
         for place, (level, since, results) in enumerate(answers):
             if results and place not in checked:
                 checked.add(place)

@@ -16,7 +16,7 @@ from typing import Any
 from illuminator_ros.mavlink.command_sender import CommandSender
 from illuminator_ros.mavlink.dialect import mavlink
 from illuminator_ros.mavlink.messages import Address, CommandAck
-from illuminator_ros.payload.confirmed_command import Change, Target
+from illuminator_ros.payload.attempt import Change, Target
 
 US, DEVICE = Address(1, 194), Address(1, 7)
 SET_LEVEL, STATUS_ID = 31000, 40000

@@ -9,13 +9,8 @@ import math
 from typing import Any
 
 from illuminator_ros.mavlink.command_sender import CommandStatus, timing
-from illuminator_ros.payload.confirmed_command import (
-    Change,
-    ConfirmedCommand,
-    Desired,
-    FENCE,
-    Result,
-)
+from illuminator_ros.payload.attempt import Attempt, Change, FENCE, Fence, Sending, Served
+from illuminator_ros.payload.requests import Goal, Request, Result, Why
 import pytest
 from support.level_device import (
     ACCEPTED,
@@ -38,16 +33,19 @@ class CommandBench(Bench):
         """Send the command; return this bench."""
         self.result: Result | None = None
         self.ended_at = math.nan
-        self.command: ConfirmedCommand[int | None] = ConfirmedCommand(
-            self.target(**target or {}), Desired(change, **{
-                name: arguments.pop(name) for name in ('limit', 'insists', 'is_last')
-                if name in arguments}), self.now, asked_at=self.now, gap=gap, **arguments)
+        fence = Fence(arguments.pop('fence', -math.inf), 0, arguments.pop('is_sole_cause', False))
+        request = Request({'level': 5}, Why.REQUEST, self.now, is_call=True)
+        goal = Goal(5, (request,), self.now + arguments.pop('limit', math.inf), is_awaited=True,
+                    **arguments)
+        self.command: Attempt[int | None] = Attempt(
+            self.target(**target or {}), change, goal, {request: change}, self.now, fence=fence,
+            gap=gap)
         self.gap = gap
         return self
 
-    def _take(self, result: Result | None) -> None:
-        if result is not None and self.result is None:
-            self.result, self.ended_at = result, round(self.now, 3)
+    def _take(self, ended: list[Served[int | None]]) -> None:
+        if ended and self.result is None:
+            self.result, self.ended_at = ended[0].result, round(self.now, 3)
             self.command.withdraw(self.now)
 
     def reported(self, level: int | None) -> None:
@@ -59,7 +57,7 @@ class CommandBench(Bench):
             self._take(self.command.poll(self.now))
 
     def next_deadline(self) -> float:
-        return math.inf if self.result else self.command.next_deadline()
+        return math.inf if self.result else self.command.due
 
     @property
     def ended(self) -> Result:
@@ -83,8 +81,8 @@ IN_PROGRESS_STOPPED = ('no final acknowledgement, last answer MAV_RESULT_IN_PROG
 HIDES: dict[str, Any] = {'level': None, 'executes': []}
 OBEYS: dict[str, Any] = {'results': [None], 'executes': [None]}
 MUTE: dict[str, Any] = {'sends_status': False}
-SINGLE, REPEATED = ({'change': level_change(5, is_idempotent=False)},
-                    {'change': level_change(5, is_repeated=True)})
+SINGLE, REPEATED = ({'change': level_change(5, sending=Sending.ONCE)},
+                    {'change': level_change(5, sending=Sending.UNTIL_OBEYED)})
 
 
 # The device and the command -> success, message, when it was sent and ended, flags of the result.
@@ -243,7 +241,7 @@ def test_a_restart_confirms_nothing_and_a_command_that_may_be_repeated_is_sent_a
     bench.run(0.1)
     bench.level, bench.sends_status = 0, True
     bench.command.restarted(bench.now)
-    if change.is_idempotent:
+    if change.sending is not Sending.ONCE:
         bench.later(0.0, lambda: bench.reported(5))
     bench.run()
     assert bench.ended.message == (
