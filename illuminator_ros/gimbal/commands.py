@@ -14,7 +14,7 @@ from .messages import GimbalManagerStatus, NO_COMPONENT, REMOVE_SENDER, UNCHANGE
 from ..mavlink.command_sender import CommandPosition
 from ..mavlink.dialect import flag_names, mavlink
 from ..mavlink.messages import Address
-from ..payload.confirmed_command import Change
+from ..payload.attempt import Change
 from ..payload.messages import GeoPoint, GimbalDeviceAttitudeStatus
 from ..payload.mount_attitude import YawFrame
 

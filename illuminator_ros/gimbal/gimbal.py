@@ -5,28 +5,37 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection
+from collections.abc import Callable, Collection, Iterable
 from dataclasses import dataclass
 import math
+from typing import Any
 
 from . import events
 from . import messages as gimbal
 from .axes import known_ranges
 from .commands import Flag, setpoint_flags
 from .gimbal_reports import GimbalReports
-from .gimbal_requests import GimbalRequests, YawLock
+from .gimbal_requests import (
+    CONTROL,
+    describe,
+    GimbalRequests,
+    PLACE,
+    POSE,
+    REQUEST_LIMIT,
+    YAW_LOCK,
+    YawLock,
+)
 from .repetition import Repetition
 from .setpoint_stream import SetpointStream, SuspendedBy
 from ..mavlink.command_sender import CommandSender
 from ..mavlink.dialect import mavlink
 from ..mavlink.messages import Address
-from ..payload.arbitration import Cause, HolderChanged
-from ..payload.command_sources import Sources, SourceSettings
-from ..payload.confirmed_command import Done, Result
+from ..payload.attempt import Served
+from ..payload.command_sources import DEFAULT, SourceSettings
 from ..payload.device_events import DeviceHeld
-from ..payload.device_property import answer
 from ..payload.messages import GeoPoint, GimbalDeviceAttitudeStatus
 from ..payload.mount_attitude import STILL, Wxyz, YawFrame
+from ..payload.requests import Done, Request, Requests, Result, Why
 from ..payload.rotation import Quaternion, Vector
 
 # s for which a release of control waits until an attitude shows that the gimbal stands; and at the
@@ -34,6 +43,16 @@ from ..payload.rotation import Quaternion, Vector
 STOP_LIMIT, STOP_LIMIT_AT_END = 5.0, 0.45
 # rad; the largest difference of a reported attitude that shows the sent attitude.
 SHOWN_ANGLE = 0.02
+
+
+SUSPENDED_BY = {POSE: SuspendedBy.POSE, PLACE: SuspendedBy.PLACE}
+
+
+def wish(field: str, value: Any) -> str:
+    """Return what a request asks for, for people."""
+    if field == CONTROL:
+        return 'take control' if value else 'release control'
+    return describe({field: value}) if field == PLACE else str(value.wish)
 
 
 @dataclass(frozen=True)
@@ -65,6 +84,7 @@ class Gimbal:
     :param manager: has announced it.
     :param emit: takes its events.
     :ivar was_commanded: whether a user has ever sent it a request or a setpoint.
+    :ivar requests: for poses, places and the yaw lock, and the claims of their sources.
     :ivar setpoints: of this component.
     :ivar reports: of its managers and its device; :meth:`update` follows each change of them.
     """
@@ -76,15 +96,17 @@ class Gimbal:
         self.key = key
         self.was_commanded = False
         self.reports = GimbalReports(key, manager, commands, settings.attitude_interval, emit)
-        self.sources = Sources(settings.sources)
+        self.requests = Requests(
+            f'gimbal {key}', settings.sources, describe,
+            lambda change, now: emit(DeviceHeld(key, change)))
         self._commands = commands
         self._settings = settings
         self._emit = emit
-        self._requests = GimbalRequests(key, manager, commands)
+        self._commanded = GimbalRequests(key, manager, commands, self.requests)
         self.setpoints = SetpointStream(
             self._message, commands.send, settings.setpoint_timeout,
             lambda stands: emit(events.RateStopped(key, stands, self.setpoints.rate_stop.turns)))
-        self._yaw_lock = YawLock(self.setpoints.hold)
+        self._yaw_lock = YawLock(self.requests, self.setpoints.hold)
         self._repetition = Repetition()
         # Whether control must be taken as soon as no component has it.
         self._take_due = False
@@ -102,11 +124,11 @@ class Gimbal:
         """Record that some components cannot be reached, and the reason."""
         if self.reports.lose(lost, now, reason):
             self._repetition.forget()
-            self._yaw_lock.cancel(reason, now)
+            self._end(reason, now, YAW_LOCK)
         if self.reports.manager.address in lost:
-            self._requests.cancel(reason, now)
+            self._end(reason, now, CONTROL, POSE, PLACE)
         self.update(now)
-        self._settle(now)
+        self._step(now)
 
     def take_status(
         self, source: Address, status: gimbal.GimbalManagerStatus, now: float,
@@ -116,8 +138,9 @@ class Gimbal:
         if manager is not None and manager.take_status(status, now):
             self.update(now)
             if manager is self.reports.manager:
-                self._requests.control.reported(status, now)
-            self._settle(now)
+                self._step(now, self._commanded.reported(CONTROL, status, now))
+            else:
+                self._step(now)
 
     def take_attitude(self, status: GimbalDeviceAttitudeStatus, now: float) -> None:
         """Take GIMBAL_DEVICE_ATTITUDE_STATUS of the device."""
@@ -125,13 +148,12 @@ class Gimbal:
         if not device.take_status(status, now):
             return
         self.update(now)
-        requests = self._requests
-        requests.pose.reported(status, now)
-        self._settle(now)
+        self._step(now, self._commanded.reported(POSE, status, now))
         self._yaw_lock.reported(status, now)
         setpoints.reported(status, now)
         if not setpoints.may_turn:
-            requests.release_due = -math.inf
+            self._commanded.release_now(now)
+        self._step(now)
         self._emit(events.AttitudeReceived(
             self.key, device.attitude, device.flags, device.errors))
 
@@ -139,19 +161,20 @@ class Gimbal:
         """Follow changes of the manager, of the connection, and of control."""
         reports, setpoints = self.reports, self.setpoints
         if reports.choose(now):
-            self._requests.cancel('the manager was lost', now)
-            self._settle(now)
-            self._requests = GimbalRequests(self.key, reports.manager.address, self._commands)
+            self._end('the manager was lost', now, CONTROL, POSE, PLACE)
+            self._step(now)
+            self._commanded = GimbalRequests(
+                self.key, reports.manager.address, self._commands, self.requests)
         if reports.connect(now):
             self._repetition.forget()
             self._take_due = self._settings.auto_take_control
         is_first = reports.last_control is None
-        if not reports.update_control(now, is_releasing=self._requests.is_releasing,
+        if not reports.update_control(now, is_releasing=bool(self._commanded.releases),
                                       may_turn=setpoints.may_have_rate):
             return
         self._repetition.forget()
         if not reports.in_control:
-            self._yaw_lock.cancel(self.unavailable(now), now)
+            self._end(self.unavailable(now), now, YAW_LOCK)
         if reports.control is None:
             # The manager that had shown this component in control takes the zero.
             manager = reports.manager
@@ -175,7 +198,7 @@ class Gimbal:
         return (self._commands.refusal or self._commands.lateness(now)
                 or self.reports.lack_of_control(now)
                 or (f'control of gimbal {self.key} is being released'
-                    if self._requests.is_releasing else ''))
+                    if self._commanded.releases else ''))
 
     def _begin(self, now: float) -> None:
         """Begin a request or a setpoint of a user, which may come before the poll that is due."""
@@ -201,90 +224,106 @@ class Gimbal:
         """
         self._begin(now)
         # Nothing that comes after the zero may turn the gimbal, as ArduPilot would let it.
-        may_turn = self.setpoints.may_turn
+        may_turn, due = self.setpoints.may_turn, -math.inf
         self._end_commands('superseded by a release of control', now, superseded=True)
         reports = self.reports
         if may_turn and reports.may_have_control and reports.manager.liveness.is_heard(now):
             # No command stops a gimbal everywhere: PX4 reads unset angles as 0.
             self.setpoints.set_rates(STILL, now)
-            self._requests.release_due = now + (
-                STOP_LIMIT_AT_END if self._commands.refusal else STOP_LIMIT)
-        self._request_control(False, now, done)
+            due = now + (STOP_LIMIT_AT_END if self._commands.refusal else STOP_LIMIT)
+        self._request_control(False, now, done, due=due)
 
-    def _request_control(self, take: bool, now: float, done: Done) -> None:
+    def _request_control(
+        self, take: bool, now: float, done: Done, *, due: float = -math.inf,
+    ) -> None:
         control = self.reports.control
         if refusal := (self._commands.refusal if take else '') or self.reports.absence(now):
             done(Result(False, refusal), now)
         elif not take and control is not None and not self.has_any_control:
             # PX4 would take the system id from another component of our system.
-            done(self._released(Result(True, f'not in control: {control}')), now)
+            done(_with_stop(self.setpoints, Result(True, f'not in control: {control}')), now)
         else:
             self._may_have_control |= take
-            self._requests.request_control(take, now, done)
-        self._settle(now)
+            self._commanded.request_control(
+                take, now, done, due=due, is_end=bool(self._commands.refusal))
+        self._step(now)
 
-    def _released(self, result: Result) -> Result:
-        """Take the result of a release of control."""
-        self._requests.release_due = -math.inf
-        if result.success and self.setpoints.may_turn:
-            return result._replace(message=f'{result.message}; {self.setpoints.lack_of_stop}')
-        return result
+    def _step(self, now: float, ended: Iterable[Served[Any]] = ()) -> None:
+        """
+        Send what is wanted, and answer those whose requests have ended.
 
-    def _settle(self, now: float) -> None:
-        """Answer the callers whose requests have ended."""
-        for kind, outcome in self._requests.take_outcomes():
-            result = outcome.result
-            if kind is not None:
-                self.setpoints.request_ended(kind, result, now)
-            else:
-                is_release = outcome.desired.change.params[0] == gimbal.REMOVE_SENDER
-                if result.success or result.refused and not is_release:
-                    self._may_have_control = False
-                if is_release:
-                    result = self._released(result)
-                elif result.success and not self.reports.manager.enforces_control:
-                    result = result._replace(message=f'{result.message}; ArduPilot also obeys '
-                                                     'components without control')
-            if result.refused:
-                wish = outcome.callers[0].detail if outcome.callers else ''
-                result = self.reports.explained(result, wish, now)
-            answer(outcome.callers, result, now)
+        :param ended: the requests that a command has ended.
+        """
+        for served in ended:
+            self._end_one(served.request, served.result, now)
+        if not self._commands.refusal and self.setpoints.may_turn:
+            for one in self._commanded.releases:
+                if -math.inf < one.due <= now and not one.is_under_way:
+                    self._end_one(one, Result(
+                        False, f'{self.setpoints.lack_of_stop}, {STOP_LIMIT:g} s after a rate of '
+                        'zero: control is kept, and the zero is sent again'), now)
+        for served in self._commanded.step(now):
+            self._end_one(served.request, served.result, now)
+        self._yaw_lock.step(now)
+        self.requests.answer(now)
+        self._commanded.control.answer(now)
+
+    def _end_one(self, one: Request, result: Result, now: float) -> None:
+        (field, value), = one.values.items()
+        if field in (POSE, PLACE):
+            self.setpoints.request_ended(SUSPENDED_BY[field], result, now)
+        elif field == CONTROL:
+            if result.success or result.refused and value:
+                self._may_have_control = False
+            if not value:
+                result = _with_stop(self.setpoints, result)
+            elif result.success and not self.reports.manager.enforces_control:
+                result = result._replace(message=f'{result.message}; ArduPilot also obeys '
+                                                 'components without control')
+        if result.refused:
+            result = self.reports.explained(result, wish(field, value), now)
+        (self._commanded.control if field == CONTROL else self.requests).end(one, result, now)
+
+    def _end(self, message: str, now: float, *fields: str, superseded: bool = False) -> None:
+        """End the open requests for some fields."""
+        result = Result(False, message, superseded=superseded)
+        for one in (*self.requests.standing, *self._commanded.control.standing):
+            if one.is_open and not one.values.keys().isdisjoint(fields):
+                self._end_one(one, result, now)
 
     def close(self, now: float) -> None:
         """Answer all requests; :meth:`release_control` is still possible."""
-        self._yaw_lock.cancel(self._commands.refusal, now, superseded=True)
-        self._requests.cancel(self._commands.refusal, now, superseded=True)
-        self._settle(now)
+        refusal = self._commands.refusal
+        self._end(refusal, now, YAW_LOCK, CONTROL, POSE, PLACE, superseded=True)
+        self.requests.close(Result(False, refusal, superseded=True), now)
+        self._step(now)
 
     def change_settings(self, settings: GimbalSettings, now: float) -> None:
         """Take other settings: ``setpoint_timeout`` and the time-out of ``sources`` may differ."""
         self._settings = settings
         self.setpoints.change_timeout(settings.setpoint_timeout, now)
         if settings.sources:
-            self.sources.set_lease(settings.sources.timeout)
-            self._take_holder(self.sources.poll(now), now)
+            self.requests.claims.set_lease(settings.sources.timeout)
+            self._expire(now)
 
     # Sources
 
     def claim(self, source: str, now: float, *, is_call: bool = False) -> str:
         """
-        Let a source command the gimbal; return why it may not, '' if it may.
+        Let a source command the gimbal, and end what other sources have sent.
 
-        A stream claims the gimbal at once, a call when :meth:`end_call` notes that it succeeded.
+        A stream claims the gimbal at once, a call when it has succeeded.
+
+        :return: why the source may not command the gimbal, '' if it may.
         """
-        self._take_holder(self.sources.poll(now), now)
-        refusal = self.sources.refusal(source)
-        if self.sources.takes_over(source):
+        self._expire(now)
+        requests = self.requests
+        refusal = requests.refusal(source)
+        if requests.are_ranked and not refusal and requests.commander != source:
             self._end_commands(f'held by {source}', now)
         if not is_call:
-            self._take_holder(self.sources.claim(source, now), now)
-        elif not refusal:
-            self.sources.begin_call(source)
+            requests.claim(source, now)
         return refusal
-
-    def end_call(self, source: str, now: float, *, success: bool) -> None:
-        """End a call, which claims the gimbal if it has succeeded."""
-        self._take_holder(self.sources.end_call(source, now, success=success), now)
 
     def release(self, source: str, now: float) -> str:
         """
@@ -292,51 +331,55 @@ class Gimbal:
 
         :return: the source that holds it now, '' if none does.
         """
-        self._take_holder(self.sources.poll(now), now)
-        if source == self.sources.commander:
+        self._expire(now)
+        if self.requests.are_ranked and source == self.requests.commander:
             self._end_commands(f'{source} has released the gimbal', now)
-        self._take_holder(self.sources.release(source, now), now)
-        return self.sources.holder or ''
+        self.requests.release(source, now)
+        self._step(now)
+        return self.requests.shown_holder or ''
 
-    def _take_holder(self, change: HolderChanged[str] | None, now: float) -> None:
-        """Take a change of the source that holds the gimbal."""
-        if change is None:
-            return
-        silent = change.before if change.cause is Cause.SILENCE else None
+    def _expire(self, now: float) -> None:
+        """End the hold of a source that was silent."""
+        before = self.requests.claims.holder
+        change = self.requests.expire(now)
         # The call of a higher source may be under way.
-        if silent and not self.sources.refusal(silent):
-            self._end_commands(f'the hold of {silent} has ended (source_timeout)', now)
-        self._emit(DeviceHeld(self.key, change))
+        if change is not None and before is not None and not self.requests.refusal(before):
+            self._end_commands(f'the hold of {before} has ended (source_timeout)', now)
 
     def _end_commands(self, message: str, now: float, *, superseded: bool = False) -> None:
         """End the setpoint, and the requests that may turn the gimbal or stop it later."""
         self._repetition.forget()
         self.setpoints.end(now)
-        self._requests.cancel_moves(message, now, superseded=superseded)
-        self._yaw_lock.cancel(message, now, superseded=superseded)
-        self._settle(now)
+        self._end(message, now, POSE, PLACE, YAW_LOCK, superseded=superseded)
+        self._step(now)
 
     # Requests
 
-    def set_flag(self, flag: Flag, now: float, done: Done) -> None:
+    def set_flag(
+        self, flag: Flag, now: float, done: Done, *, source: str = DEFAULT,
+    ) -> None:
         """Turn to a pose; or stop, and lock or unlock the yaw (GM-3)."""
         self._begin(now)
         self._repetition.forget()
-        requests, message = self._requests, f'superseded by {flag.goal}'
-        if reason := self.unavailable(now) or self.reports.missing(flag.needed):
+        message = f'superseded by {flag.goal}'
+        if reason := (self.claim(source, now, is_call=True) or self.unavailable(now)
+                      or self.reports.missing(flag.needed)):
             done(Result(False, reason), now)
-        elif flag.is_pose:
-            requests.cancel_places(message, now, superseded=True)
-            self._yaw_lock.cancel(message, now, superseded=True)
+            return
+        if flag.is_pose:
+            self._end(message, now, PLACE, YAW_LOCK, superseded=True)
             self.setpoints.suspend(now, SuspendedBy.POSE)
-            requests.set_pose(flag, now, done)
         else:
-            requests.cancel_moves(message, now, superseded=True)
-            self._yaw_lock.want(flag, now, done)
-        self._settle(now)
+            self._end(message, now, POSE, PLACE, superseded=True)
+        until = now + REQUEST_LIMIT if flag.is_pose else math.inf
+        self.requests.put(Request(
+            {POSE if flag.is_pose else YAW_LOCK: flag}, Why.REQUEST, now, source, done,
+            is_call=True, until=until), now)
+        self._step(now)
 
     def set_roi(
         self, place: GeoPoint | None, now: float, done: Done, *, is_stream: bool = False,
+        source: str = DEFAULT,
     ) -> None:
         """
         Point at a place, or at none.
@@ -345,7 +388,7 @@ class Gimbal:
             equal one is sent once a second, as no status shows it, and else not answered.
         """
         self._begin(now)
-        if reason := self.unavailable(now):
+        if reason := self.claim(source, now, is_call=True) or self.unavailable(now):
             done(Result(False, reason), now)
             return
         if not is_stream:
@@ -353,8 +396,10 @@ class Gimbal:
         elif self._repetition.is_needless(place, now, is_shown=False, moves=False):
             return
         self.setpoints.suspend(now, SuspendedBy.PLACE, is_place=place is not None)
-        self._requests.set_place(place, now, done, is_stream=is_stream)
-        self._settle(now)
+        self.requests.put(Request(
+            {PLACE: place}, Why.REQUEST, now, source, done, is_call=not is_stream,
+            until=now + REQUEST_LIMIT), now)
+        self._step(now)
 
     # Setpoints
 
@@ -378,7 +423,8 @@ class Gimbal:
                 (*(round(one, 6) for one in rotation), frame), now,
                 is_shown=shown is not None and shown.angle_to(rotation) < SHOWN_ANGLE,
                 moves=self.setpoints.rate_stop.turns is not False):
-            self._requests.cancel_moves('superseded by a setpoint', now, superseded=True)
+            self._end('superseded by a setpoint', now, POSE, PLACE, superseded=True)
+            self._step(now)
             self.setpoints.set_attitude(rotation, frame, now)
         return reason
 
@@ -415,7 +461,8 @@ class Gimbal:
         reason = self.unavailable(now)
         if not reason:
             self._repetition.forget()
-            self._requests.cancel_moves('superseded by a setpoint', now, superseded=True)
+            self._end('superseded by a setpoint', now, POSE, PLACE, superseded=True)
+            self._step(now)
             self.setpoints.set_rates(rates, now)
         return reason
 
@@ -437,16 +484,11 @@ class Gimbal:
                 self._emit(events.AutomaticTakeFailed(self.key, result.message))
 
         self.update(now)
-        self._take_holder(self.sources.poll(now), now)
-        if -math.inf < self._requests.release_due <= now and not self._commands.refusal:
-            self._requests.end_release(Result(
-                False, f'{self.setpoints.lack_of_stop}, {STOP_LIMIT:g} s after a rate of zero: '
-                'control is kept, and the zero is sent again'))
-        self._requests.poll(now)
+        self._expire(now)
         self._yaw_lock.poll(now)
-        self._settle(now)
+        self._step(now, self._commanded.poll(now))
         if self.reports.in_control:
-            self.setpoints.poll(now, may_stop=not self._requests.may_turn)
+            self.setpoints.poll(now, may_stop=not self._commanded.may_turn)
         control = self.reports.control
         if self._take_due and self.reports.is_connected and control is not None:
             self._take_due = False
@@ -459,14 +501,14 @@ class Gimbal:
         reports = self.reports
         if self._take_due and reports.is_connected and reports.control is not None:
             return -math.inf
-        return min(self.sources.next_deadline(), self._yaw_lock.next_deadline(),
-                   self._requests.next_deadline(), reports.next_deadline(),
-                   self.setpoints.next_deadline(may_stop=not self._requests.may_turn)
+        return min(self.requests.claims.next_deadline(), self._yaw_lock.next_deadline(),
+                   self._commanded.next_deadline(), reports.next_deadline(),
+                   self.setpoints.next_deadline(may_stop=not self._commanded.may_turn)
                    if reports.in_control else math.inf)
 
     def snapshot(self, now: float) -> events.GimbalSnapshot:
         """Return the gimbal at this moment."""
-        reports, device, sources = self.reports, self.reports.device, self.sources
+        reports, device, requests = self.reports, self.reports.device, self.requests
         manager, information = reports.manager, reports.manager.information
         is_free = reports.control is None or reports.control.primary in (
             None, self._commands.address)
@@ -478,4 +520,11 @@ class Gimbal:
             manager.status_at, manager.enforces_control, self.setpoints.sent,
             self.setpoints.has_place, self.setpoints.unstopped_since if is_free else None,
             self.setpoints.rate_stop.turns,
-            sources.shown_holder, sources.since)
+            requests.shown_holder, requests.claims.since)
+
+
+def _with_stop(setpoints: SetpointStream, result: Result) -> Result:
+    """Return the result of a release of control, which names a gimbal that may still turn."""
+    if result.success and setpoints.may_turn:
+        return result._replace(message=f'{result.message}; {setpoints.lack_of_stop}')
+    return result

@@ -22,11 +22,11 @@ from ..mavlink.command_sender import (
 from ..mavlink.dialect import mavlink, short_names
 from ..mavlink.messages import Address, result_name
 from ..mavlink.retries import GIMBAL_MESSAGE, Retries
-from ..payload.confirmed_command import Result
 from ..payload.device_events import DeviceConnected, DeviceDisconnected
 from ..payload.liveness import Liveness
 from ..payload.messages import GimbalDeviceAttitudeStatus
 from ..payload.mount_attitude import MountAttitude
+from ..payload.requests import Result
 
 # s of silence after which a manager or a device is lost.
 SILENCE_LIMIT = 3.0

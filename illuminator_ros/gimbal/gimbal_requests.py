@@ -1,26 +1,26 @@
 # Copyright 2026 The illuminator_ros developers
 # SPDX-License-Identifier: Apache-2.0
 
-"""The requests to the manager of a gimbal: for control, a pose, a place, the yaw lock."""
+"""The commands to the manager of a gimbal: for control, a pose, a place; and the yaw lock."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
-from dataclasses import replace
+from collections.abc import Callable, Mapping
 import math
 from typing import Any
 
 from .commands import configure, Flag, point
 from .events import GimbalKey
 from .messages import GimbalManagerStatus
-from .setpoint_stream import REPEATS, SuspendedBy
+from .setpoint_stream import REPEATS
 from ..mavlink.command_sender import CommandSender, format_seconds
 from ..mavlink.dialect import flag_names
 from ..mavlink.messages import Address
-from ..payload.confirmed_command import Desired, Done, Result, Target
-from ..payload.device_property import answer, Caller, MAX_CALLERS, Outcome, Property
-from ..payload.messages import GeoPoint, GimbalDeviceAttitudeStatus
+from ..payload.attempt import Change, Served, Target
+from ..payload.device_property import Property
+from ..payload.messages import GimbalDeviceAttitudeStatus
 from ..payload.mount_attitude import YawFrame
+from ..payload.requests import Done, Goal, Request, Requests, Result, Values, Why
 
 # s; the limit of a request, including its confirmation.
 REQUEST_LIMIT = 5.0
@@ -28,151 +28,126 @@ REQUEST_LIMIT = 5.0
 LOCK_LIMIT = 2.0
 # s by which a status may be late: one that shows the lock sooner may be older than the request.
 STATUS_DELAY = 0.2
+# The fields of the requests to a gimbal. A request for control has no source: all sources need it.
+POSE, PLACE, YAW_LOCK, CONTROL = 'pose', 'place', 'yaw lock', 'control'
+
+
+def describe(values: Values) -> str:
+    """Describe the values of a request, for people."""
+    (field, value), = values.items()
+    if field == CONTROL:
+        return 'control taken' if value else 'control released'
+    return str(point(0, value).goal if field == PLACE else value.goal)
 
 
 class GimbalRequests:
     """
-    The requests to one manager of a gimbal, by commands. Times are s.
+    Sends one manager of a gimbal what is wanted by command. No I/O; times are s.
 
-    :ivar control: confirmed by the status of the manager.
-    :ivar pose: a flag, confirmed by the status of the device: ArduPilot's manager does not report
-        them.
-    :ivar place: the region of interest, which no status shows.
-    :ivar release_due: the time before which control is not released: the gimbal is being stopped.
+    :param requests: for poses and places; those for control are in a table of their own.
+    :ivar control: the standing requests for control.
     """
 
-    def __init__(self, key: GimbalKey, manager: Address, commands: CommandSender) -> None:
-        self.release_due = -math.inf
-        self.control: Property[GimbalManagerStatus] = Property(Target(
-            manager, commands, 'gimbal manager', GimbalManagerStatus.id,
-            GimbalManagerStatus.msgname, needs_status=True))
-        self.pose: Property[GimbalDeviceAttitudeStatus] = Property(Target(
-            manager, commands, 'gimbal device', GimbalDeviceAttitudeStatus.id,
-            GimbalDeviceAttitudeStatus.msgname, key.address, needs_status=True))
-        self.place: Property[None] = Property(Target(manager, commands, 'gimbal manager'))
+    def __init__(
+        self, key: GimbalKey, manager: Address, commands: CommandSender, requests: Requests,
+    ) -> None:
+        self.control = Requests(f'gimbal {key}', None, describe)
+        self._requests = requests
+        self._us = commands.address
         self._device_id = key.device_id
-        self._commands = commands
-        self._take, self._release = (
-            Desired(configure(commands.address, key.device_id, take=take), limit=REQUEST_LIMIT)
-            for take in (True, False))
-        # Those that wait for a release of control, which waits until the gimbal stands.
-        self._releasing: list[Caller] = []
-        # The newest place of a stream, while another one is under way.
-        self._next_place: tuple[Desired[None], Caller] | None = None
+        # The newest status of each property, and the time between it and the one before, s.
+        self._newest: dict[str, tuple[Any, float, float]] = {}
+        # Control is confirmed by the status of the manager, a pose by that of the device:
+        # ArduPilot's manager does not report the flags. No status shows the place.
+        self._properties: dict[str, Property[Any]] = {
+            CONTROL: Property(Target(
+                manager, commands, 'gimbal manager', GimbalManagerStatus.id,
+                GimbalManagerStatus.msgname, needs_status=True), self._planner(
+                lambda take: configure(self._us, self._device_id, take=take))),
+            POSE: Property(Target(
+                manager, commands, 'gimbal device', GimbalDeviceAttitudeStatus.id,
+                GimbalDeviceAttitudeStatus.msgname, key.address, needs_status=True),
+                self._planner(lambda flag: flag.change(self._device_id))),
+            PLACE: Property(Target(manager, commands, 'gimbal manager'), self._planner(
+                lambda place: point(self._device_id, place)))}
+
+    @staticmethod
+    def _planner(make: Callable[[Any], Change[Any]]) -> Callable[
+            [Goal], tuple[Change[Any], Mapping[Request, Change[Any]]]]:
+        def plan(goal: Goal) -> tuple[Change[Any], Mapping[Request, Change[Any]]]:
+            change = make(goal.values)
+            return change, dict.fromkeys(goal.serves, change)
+
+        return plan
 
     # Control
 
+    def request_control(
+        self, take: bool, now: float, done: Done, *, due: float = -math.inf, is_end: bool = False,
+    ) -> None:
+        """
+        Take primary control, or release all control.
+
+        :param due: s; it is not sent before.
+        :param is_end: whether the process ends, which cannot await the end of a fence.
+        """
+        self.control.put(Request(
+            {CONTROL: take}, Why.END if is_end else Why.REQUEST, now, done=done,
+            is_call=True, due=due, until=max(now, due) + REQUEST_LIMIT,
+            detail=f'superseded by {describe({CONTROL: take})}'), now)
+
     @property
-    def is_releasing(self) -> bool:
-        """Whether a release of control is under way."""
-        desired = self.control.desired
-        return bool(self._releasing) or (
-            desired is not None and desired.value == self._release.value)
+    def releases(self) -> list[Request]:
+        """Return the requests to release control."""
+        return [one for one in self.control.live() if not one.values[CONTROL]]
 
-    def request_control(self, take: bool, now: float, done: Done) -> None:
-        """Take primary control, or release all control once ``release_due`` has passed."""
-        desired = self._take if take else self._release
-        caller = Caller(done, now, detail='take control' if take else 'release control')
-        message = f'superseded by {desired.change.goal}'
-        if take:
-            self.end_release(Result(False, message, superseded=True))
-            self.control.want(desired, now, caller)
-        elif now < self.release_due:
-            self.control.cancel(message, now, superseded=True)
-            self._releasing.append(caller)
-        else:
-            self._want_release(now, caller)
+    @property
+    def release_due(self) -> float:
+        """Return when a release that waits is due, s; -inf if none waits."""
+        return max((one.due for one in self.releases), default=-math.inf)
 
-    def _want_release(self, now: float, caller: Caller) -> None:
-        # The end of the process cannot await the end of a fence.
-        self.control.want(
-            replace(self._release, is_last=bool(self._commands.refusal)), now, caller)
-
-    def end_release(self, result: Result) -> None:
-        """End a release of control that waits."""
-        self.release_due = -math.inf
-        if self._releasing:
-            self.control.outcomes.append(
-                Outcome(self._release, result, None, tuple(self._releasing)))
-            self._releasing = []
+    def release_now(self, now: float) -> None:
+        """Send a release that waits: the gimbal stands."""
+        for one in self.releases:
+            one.due = min(one.due, now)
 
     # Poses and places
 
     @property
     def may_turn(self) -> bool:
-        """Whether a request is under way that may turn the gimbal."""
-        return bool(self.pose.desired or self.place.desired)
-
-    def set_pose(self, flag: Flag, now: float, done: Done) -> None:
-        """Turn the gimbal to a pose."""
-        self.pose.want(Desired(flag.change(self._device_id), limit=REQUEST_LIMIT), now,
-                       Caller(done, now, detail=flag.wish))
-
-    def set_place(
-        self, place: GeoPoint | None, now: float, done: Done, *, is_stream: bool,
-    ) -> None:
-        """Point at a place, or at none; of a stream the newest is sent when one has ended."""
-        desired = Desired(point(self._device_id, place), limit=REQUEST_LIMIT)
-        goal = desired.change.goal
-        caller = Caller(done, now, is_stream=is_stream, detail=goal)
-        self._drop_next_place(f'superseded by {goal}')
-        if is_stream and self.place.desired is not None:
-            self._next_place = desired, caller
-        else:
-            self.place.want(desired, now, caller)
-
-    def _drop_next_place(self, message: str) -> None:
-        if self._next_place is not None:
-            (desired, caller), self._next_place = self._next_place, None
-            self.place.outcomes.append(Outcome(
-                desired, Result(False, message, superseded=True), None, (caller,)))
-
-    # The end
-
-    def cancel_places(self, message: str, now: float, *, superseded: bool = False) -> None:
-        """End the requests that point at a place."""
-        self._drop_next_place(message)
-        self.place.cancel(message, now, superseded=superseded)
-
-    def cancel_moves(self, message: str, now: float, *, superseded: bool = False) -> None:
-        """End the requests that may turn the gimbal."""
-        self.pose.cancel(message, now, superseded=superseded)
-        self.cancel_places(message, now, superseded=superseded)
-
-    def cancel(self, message: str, now: float, *, superseded: bool = False) -> None:
-        """End all requests."""
-        self.end_release(Result(False, message, superseded=superseded))
-        self.control.cancel(message, now, superseded=superseded)
-        self.cancel_moves(message, now, superseded=superseded)
-
-    def take_outcomes(self) -> Iterator[tuple[SuspendedBy | None, Outcome[Any]]]:
-        """Return the requests that have ended, each with its kind: None is one for control."""
-        for kind, changes in self._properties().items():
-            while changes.outcomes:
-                yield kind, changes.outcomes.popleft()
-
-    def _properties(self) -> dict[SuspendedBy | None, Property[Any]]:
-        return {None: self.control, SuspendedBy.POSE: self.pose, SuspendedBy.PLACE: self.place}
+        """Whether a command is under way that may turn the gimbal."""
+        return any(self._properties[field].attempt is not None for field in (POSE, PLACE))
 
     # Time
 
-    def poll(self, now: float) -> None:
-        """Do what is due."""
-        if now >= self.release_due:
-            callers, self._releasing = self._releasing, []
-            for caller in callers:
-                self._want_release(now, caller)
-        for changes in self._properties().values():
-            changes.poll(now)
-        if self._next_place is not None and self.place.desired is None:
-            (desired, caller), self._next_place = self._next_place, None
-            self.place.want(desired, now, caller)
+    def step(self, now: float) -> list[Served[Any]]:
+        """Have what is wanted under way; return the requests that have ended by that."""
+        live, ended = self._requests.live() + self.control.live(), list[Served[Any]]()
+        for field, one in self._properties.items():
+            goal = Goal.strongest(live, field, now)
+            if goal is not None and not goal.is_awaited:
+                # Of a stream of places the newest is sent when one has ended.
+                goal = goal._replace(waits=True)
+            status, _, gap = self._newest.get(field, (None, 0.0, None))
+            standing = (self.control if field == CONTROL else self._requests).standing
+            ended += [served for served in one.steer(goal, now, status, gap)
+                      if served.request not in standing]
+        return ended
+
+    def reported(self, field: str, status: Any, now: float) -> list[Served[Any]]:
+        """Take a status that shows a property; return the requests that have ended."""
+        _, before, _ = self._newest.get(field, (None, now, 0.0))
+        self._newest[field] = status, now, now - before
+        return self._properties[field].reported(status, now - before, now)
+
+    def poll(self, now: float) -> list[Served[Any]]:
+        """Do what is due; return the requests that have ended."""
+        return [served for one in self._properties.values() for served in one.poll(now)]
 
     def next_deadline(self) -> float:
-        """Return when :meth:`poll` has something to do."""
-        return min(self.release_due if self._releasing else math.inf,
-                   self.control.next_deadline(), self.pose.next_deadline(),
-                   self.place.next_deadline())
+        """Return when :meth:`poll` or :meth:`step` has something to do."""
+        waits = [one.due for one in self.control.live() if not one.is_under_way]
+        return min([*waits, *(one.due for one in self._properties.values())])
 
 
 class YawLock:
@@ -186,73 +161,69 @@ class YawLock:
     :param send: sends the rate of zero, whose yaw frame sets the lock.
     """
 
-    def __init__(self, send: Callable[[YawFrame, float], None]) -> None:
+    def __init__(self, requests: Requests, send: Callable[[YawFrame, float], None]) -> None:
+        self._requests = requests
         self._send = send
-        self._wanted: Flag | None = None
         self._flags: int | None = None
         self._resend: list[float] = []
-        self._callers: list[Caller] = []
+        # The newest request that it was sent for.
+        self._sent_for: Request | None = None
 
-    def want(self, flag: Flag, now: float, done: Done) -> None:
-        """
-        Set or clear the lock; an equal request under way is shared, another one superseded.
+    @property
+    def _waiting(self) -> list[Request]:
+        return [one for one in self._requests.live() if YAW_LOCK in one.values]
 
-        :param done: called once with the result.
-        """
-        if flag is not self._wanted:
-            self.cancel(f'superseded by {flag.goal}', now, superseded=True)
-            self._wanted, self._flags = flag, None
-        elif len(self._callers) >= MAX_CALLERS:
-            done(Result(False, f'{MAX_CALLERS} requests are waiting already'), now)
+    @property
+    def _wanted(self) -> Flag | None:
+        return next((one.values[YAW_LOCK] for one in reversed(self._waiting)), None)
+
+    def step(self, now: float) -> None:
+        """Send the rate of zero for a new request, and again if that is due."""
+        wanted, waiting = self._wanted, self._waiting
+        if wanted is None:
+            self._resend, self._flags = [], None
             return
-        self._callers.append(Caller(done, now))
-        self._resend = [now + delay for delay in REPEATS]
-        self._send(YawFrame.EARTH if flag.is_set else YawFrame.VEHICLE, now)
+        if waiting[-1] is not self._sent_for:
+            self._sent_for = waiting[-1]
+            self._resend = [now + delay for delay in REPEATS]
+        elif not (self._resend and now >= self._resend[0]):
+            return
+        else:
+            del self._resend[0]
+        self._send(YawFrame.EARTH if wanted.is_set else YawFrame.VEHICLE, now)
 
     def stop_resending(self) -> None:
         """Send nothing more; the status may still show the lock."""
         self._resend = []
 
-    def cancel(self, message: str, now: float, *, superseded: bool = False) -> None:
-        """End the request."""
-        self._answer(self._callers, Result(False, message, superseded=superseded), now)
-
     def reported(self, status: GimbalDeviceAttitudeStatus, now: float) -> None:
         """Take a status of the device."""
         wanted = self._wanted
-        waiting = [one for one in self._callers if now >= one.asked_at + STATUS_DELAY]
+        waiting = [one for one in self._waiting if now >= one.since + STATUS_DELAY]
         if wanted is None or not waiting:
             return
         self._flags = status.flags
         if bool(status.flags & wanted.flag) is wanted.is_set:
-            took = format_seconds(now - waiting[0].asked_at)
-            self._answer(waiting, Result(
-                True, f'{wanted.goal}, confirmed by {status.msgname} ({took})'), now)
+            took = format_seconds(now - waiting[0].since)
+            for one in waiting:
+                self._requests.end(one, Result(
+                    True, f'{wanted.goal}, confirmed by {status.msgname} ({took})'), now)
 
     def poll(self, now: float) -> None:
-        """Send the rate of zero again, or fail, if that is due."""
-        wanted = self._wanted
-        if wanted is None:
-            return
-        if late := [one for one in self._callers if now >= one.asked_at + LOCK_LIMIT]:
-            name = GimbalDeviceAttitudeStatus.msgname
-            shown = (f'no {name} came' if self._flags is None else f'{name} shows ' + (
-                ', '.join(flag_names('GIMBAL_DEVICE_FLAGS', self._flags)) or 'no flags'))
-            advice = '; the device may need the heading of the vehicle' if wanted.is_set else ''
-            text = f'{wanted.goal} not confirmed: {shown} within {LOCK_LIMIT:g} s{advice}'
-            self._answer(late, Result(False, text), now)
-        elif self._resend and now >= self._resend[0]:
-            del self._resend[0]
-            self._send(YawFrame.EARTH if wanted.is_set else YawFrame.VEHICLE, now)
+        """End the requests whose time is over."""
+        name = GimbalDeviceAttitudeStatus.msgname
+        for one in self._waiting:
+            if now >= one.since + LOCK_LIMIT:
+                wanted = one.values[YAW_LOCK]
+                shown = (f'no {name} came' if self._flags is None else f'{name} shows ' + (
+                    ', '.join(flag_names('GIMBAL_DEVICE_FLAGS', self._flags)) or 'no flags'))
+                advice = ('; the device may need the heading of the vehicle' if wanted.is_set
+                          else '')
+                self._requests.end(one, Result(
+                    False, f'{wanted.goal} not confirmed: {shown} within {LOCK_LIMIT:g} s'
+                    f'{advice}'), now)
 
     def next_deadline(self) -> float:
-        """Return when :meth:`poll` is due, infinity if never."""
-        return math.inf if self._wanted is None else min(
-            [self._callers[0].asked_at + LOCK_LIMIT, *self._resend])
-
-    def _answer(self, callers: list[Caller], result: Result, now: float) -> None:
-        """Answer the first callers; the request ends with the last one."""
-        self._callers = self._callers[len(callers):]
-        if not self._callers:
-            self._wanted = None
-        answer(callers, result, now)
+        """Return when :meth:`poll` or :meth:`step` is due, infinity if never."""
+        waiting = self._waiting
+        return min([waiting[0].since + LOCK_LIMIT, *self._resend]) if waiting else math.inf

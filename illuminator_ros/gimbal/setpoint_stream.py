@@ -13,7 +13,6 @@ import math
 from .messages import GimbalManagerSetAttitude
 from .rate_stop import RateStop
 from ..mavlink.dialect import mavlink
-from ..payload.confirmed_command import Result
 from ..payload.messages import GimbalDeviceAttitudeStatus
 from ..payload.mount_attitude import (
     STILL,
@@ -23,6 +22,7 @@ from ..payload.mount_attitude import (
     Wxyz,
     YawFrame,
 )
+from ..payload.requests import Result
 from ..payload.rotation import flu_frd, Quaternion, Vector
 
 # s after which a setpoint is sent again, since the message is not acknowledged.

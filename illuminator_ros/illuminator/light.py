@@ -321,7 +321,7 @@ class Light:
         """
         self.users.release(source, now)
         self._step(now)
-        return self._requests.claims.holder or ''
+        return self._requests.shown_holder or ''
 
     # The end of the process
 

@@ -16,8 +16,8 @@ from .rules import Rules
 from .twin import Cause, Failure, IMPLIED_TIME, Twin
 from .user_requests import not_reported
 from ..payload.attempt import Change, Served, Target
+from ..payload.device_property import Property
 from ..payload.requests import Goal, Request, Requests, Result, WEAK, Why
-from ..payload.steered_property import Property
 
 ON, OFF = SWITCHES[True], SWITCHES[False]
 

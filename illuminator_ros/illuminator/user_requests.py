@@ -15,7 +15,6 @@ from .twin import Twin
 from ..mavlink.command_sender import Command
 from ..payload.arbitration import Cause, HolderChanged
 from ..payload.attempt import Target
-from ..payload.command_sources import DEFAULT
 from ..payload.liveness import Liveness
 from ..payload.requests import Done, REPEAT_TIME, Request, Requests, Result
 
@@ -49,8 +48,6 @@ class UserRequests:
         :return: whether an OFF was sent to a light that is not heard.
         """
         requests = self._requests
-        if not requests.are_ranked:
-            new.source = DEFAULT
         self.expire(now)
         self.were_made = True
         is_off, is_held = new.values.get('enabled') is False, bool(requests.refusal(new.source))

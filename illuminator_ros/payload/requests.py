@@ -155,8 +155,7 @@ class Goal(NamedTuple):
             return None
         value = min(reversed(due), key=lambda one: (one.why, -one.since)).values[field]
         serves = tuple(one for one in due if one.values[field] == value)
-        until = max((one.until for one in serves if one.is_call), default=math.inf)
-        return cls.of(value, serves, until=until)
+        return cls.of(value, serves, until=max(one.until for one in serves))
 
     @classmethod
     def of(cls, values: Any, serves: tuple[Request, ...], **how: Any) -> Goal:
@@ -242,6 +241,8 @@ class Requests:
 
     def put(self, new: Request, now: float) -> None:
         """Make a request: the only way in. It ends what it contradicts, and lower sources."""
+        if not self.are_ranked:
+            new.source = DEFAULT
         held = self.refusal(new.source) if new.why is Why.REQUEST else ''
         if held:
             self.reply(new, Result(False, held))
@@ -325,7 +326,8 @@ class Requests:
 
     def claim(self, source: str, now: float) -> None:
         """Note that a source asks for something; it then holds the device unless refused."""
-        if (change := self.claims.claim(source, now)) and self.are_ranked:
+        change = self.claims.claim(source if self.are_ranked else DEFAULT, now)
+        if change is not None and self.are_ranked:
             self._report(change, now)
 
     def repeated(self, new: Request) -> Request | None:

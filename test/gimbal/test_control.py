@@ -25,10 +25,10 @@ from illuminator_ros.gimbal.messages import (
 )
 from illuminator_ros.mavlink import messages as mav
 from illuminator_ros.mavlink.dialect import mavlink, short_names
-from illuminator_ros.payload.confirmed_command import Done, Result
 from illuminator_ros.payload.device_events import DeviceDisconnected
 from illuminator_ros.payload.messages import GeoPoint
 from illuminator_ros.payload.mount_attitude import STILL, YawFrame
+from illuminator_ros.payload.requests import Done, Result
 from illuminator_ros.payload.rotation import Quaternion
 import pytest
 from support.gimbals import (

@@ -26,8 +26,8 @@ from illuminator_ros.mavlink.command_sender import CommandSender
 from illuminator_ros.mavlink.component import Component
 from illuminator_ros.mavlink.dialect import mavlink
 from illuminator_ros.payload.command_sources import SourceSettings
-from illuminator_ros.payload.confirmed_command import Done, Result
 from illuminator_ros.payload.mount_attitude import STILL, YawFrame
+from illuminator_ros.payload.requests import Done, Result
 from illuminator_ros.payload.rotation import Quaternion
 import pytest
 from support.gimbal_manager import (

@@ -21,10 +21,10 @@ from illuminator_ros.mavlink.command_sender import CommandSender
 from illuminator_ros.mavlink.component import Component
 from illuminator_ros.mavlink.dialect import mavlink
 from illuminator_ros.mavlink.messages import CommandLong
-from illuminator_ros.payload.confirmed_command import Result
 from illuminator_ros.payload.device_events import DeviceConnected, DeviceDisconnected
 from illuminator_ros.payload.messages import GeoPoint, GimbalDeviceAttitudeStatus
 from illuminator_ros.payload.mount_attitude import YawFrame
+from illuminator_ros.payload.requests import Result
 from illuminator_ros.payload.rotation import Quaternion
 import pytest
 from support.gimbal_manager import (

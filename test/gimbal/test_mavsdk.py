@@ -21,8 +21,8 @@ from illuminator_ros.mavlink.command_sender import CommandSender
 from illuminator_ros.mavlink.component import Component, Endpoint
 from illuminator_ros.mavlink.dialect import mavlink
 from illuminator_ros.mavlink.messages import Address
-from illuminator_ros.payload.confirmed_command import Result
 from illuminator_ros.payload.mount_attitude import to_mavlink, YawFrame
+from illuminator_ros.payload.requests import Result
 from illuminator_ros.payload.rotation import Quaternion, Vector
 from illuminator_ros.simulation.simulated import SimulatedComponents
 import pytest

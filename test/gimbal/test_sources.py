@@ -9,23 +9,21 @@ from collections.abc import Callable
 import random
 from typing import Any
 
+from illuminator_ros.gimbal.commands import NEUTRAL
 from illuminator_ros.gimbal.messages import DEVICE_ID_PARAM, GimbalManagerSetAttitude
 from illuminator_ros.mavlink.dialect import mavlink
 from illuminator_ros.mavlink.messages import CommandInt, CommandLong
 from illuminator_ros.payload.arbitration import Cause, HolderChanged
 from illuminator_ros.payload.command_sources import SourceSettings
-from illuminator_ros.payload.confirmed_command import Result
 from illuminator_ros.payload.device_events import DeviceHeld
 from illuminator_ros.payload.mount_attitude import from_mavlink, YawFrame
 import pytest
 from support.gimbals import (
-    clear_roi,
     FakeManager,
     in_control,
     OURS,
     PLACE,
     Rig,
-    set_neutral,
     steps,
 )
 
@@ -84,7 +82,7 @@ def test_the_next_source_has_the_gimbal_afterwards_and_must_send_a_setpoint(
 @pytest.mark.parametrize('end', ENDS.values())
 @pytest.mark.parametrize(('start', 'sent'), [
     (lambda rig: rig.gimbal.set_rates((0.0, 0.0, 0.2), rig.now), [pytest.approx(-0.2)]),
-    (lambda rig: rig.gimbal.set_roi(PLACE, rig.now, rig.done), [])],
+    (lambda rig: rig.gimbal.set_roi(PLACE, rig.now, rig.done, source='safety'), [])],
     ids=['rate', 'place'])
 def test_a_rate_or_a_place_ends_with_the_hold_of_its_source(
         start: Callable[[Rig], object], sent: list[float], end: Callable[[Rig], object]) -> None:
@@ -120,7 +118,7 @@ def test_a_takeover_leaves_the_commands_to_another_gimbal_of_the_manager() -> No
     rig.managers[0].answers = rig.managers[1].answers = False
     for gimbal in (first, second):
         gimbal.claim('autonomy', rig.now)
-        clear_roi(gimbal, rig.now, rig.done)
+        gimbal.set_roi(None, rig.now, rig.done, source='autonomy')
     first.claim('safety', rig.now)
     rig.run(0.1)
 
@@ -133,8 +131,7 @@ def test_a_takeover_leaves_the_commands_to_another_gimbal_of_the_manager() -> No
 def test_a_stream_leaves_the_call_of_its_own_source_under_way() -> None:
     rig = shared()
     rig.managers[0].answers = False
-    rig.gimbal.claim('operator', rig.now, is_call=True)
-    clear_roi(rig.gimbal, rig.now, rig.done)
+    rig.gimbal.set_roi(None, rig.now, rig.done, source='operator')
     rig.gimbal.claim('operator', rig.now)
     rig.run(0.1)
 
@@ -142,14 +139,9 @@ def test_a_stream_leaves_the_call_of_its_own_source_under_way() -> None:
 
 
 def call(rig: Rig, source: str) -> None:
-    """Request the neutral position as a node does, which no status shows yet."""
-    def done(result: Result, now: float) -> None:
-        rig.gimbal.end_call(source, now, success=result.success)
-        rig.done(result, now)
-
+    """Request the neutral position, which no status shows yet."""
     rig.managers[0].applies = False
-    assert rig.gimbal.claim(source, rig.now, is_call=True) == ''
-    set_neutral(rig.gimbal, rig.now, done)
+    rig.gimbal.set_flag(NEUTRAL, rig.now, rig.done, source=source)
     rig.run(0.1)
 
 
@@ -191,10 +183,8 @@ def test_a_call_goes_on_when_the_hold_of_a_lower_source_ends(
 def test_a_takeover_ends_the_commands_of_the_lower_source_and_their_resends() -> None:
     rig = shared()
     rig.managers[0].answers = False
-    rig.gimbal.claim('autonomy', rig.now)
-    set_neutral(rig.gimbal, rig.now, rig.done)
-    rig.gimbal.claim('autonomy', rig.now)
-    rig.gimbal.set_roi(PLACE, rig.now, rig.done)
+    rig.gimbal.set_flag(NEUTRAL, rig.now, rig.done, source='autonomy')
+    rig.gimbal.set_roi(PLACE, rig.now, rig.done, source='autonomy')
     rig.run(0.1)
     point(rig, 'safety')
     taken_at = rig.now
@@ -213,7 +203,7 @@ def test_a_check_of_a_claim_gives_no_source_the_gimbal(source: str, refusal: str
     rig = shared()
     point(rig, 'operator')
 
-    assert rig.gimbal.sources.refusal(source) == refusal
+    assert rig.gimbal.requests.refusal(source) == refusal
     assert holder(rig) == 'operator'
 
 
@@ -221,7 +211,7 @@ def test_without_sources_all_are_alike() -> None:
     rig = in_control()
 
     assert [point(rig, source) for source in NAMES] == [''] * 4
-    assert rig.gimbal.sources.refusal('autonomy') == ''
+    assert rig.gimbal.requests.refusal('autonomy') == ''
     assert rig.gimbal.release('autonomy', rig.now) == ''
     assert holder(rig) is None
     assert rig.all_of(DeviceHeld) == []

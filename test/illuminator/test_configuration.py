@@ -13,7 +13,7 @@ from illuminator_ros.illuminator.model import Configuration, float32, Mode, Safe
 from illuminator_ros.illuminator.settings import LightSettings
 from illuminator_ros.mavlink.dialect import mavlink
 from illuminator_ros.mavlink.messages import CommandAck, result_name
-from illuminator_ros.payload.confirmed_command import Result
+from illuminator_ros.payload.requests import Result
 import pytest
 from support.back_to_back import Pair
 from support.fake_light import FakeLight

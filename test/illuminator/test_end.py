@@ -26,8 +26,8 @@ from illuminator_ros.illuminator.simulated_properties import (
 from illuminator_ros.mavlink.dialect import mavlink
 from illuminator_ros.mavlink.messages import Address, CommandAck
 from illuminator_ros.payload.command_sources import SourceSettings
-from illuminator_ros.payload.confirmed_command import Result
 from illuminator_ros.payload.device_events import DeviceHeld
+from illuminator_ros.payload.requests import Result
 import pytest
 from support.back_to_back import BRIDGE, Pair
 from support.fake_light import FakeLight

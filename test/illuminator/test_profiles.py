@@ -9,7 +9,7 @@ from typing import Any
 from illuminator_ros.illuminator.simulated_properties import IlluminatorProperties, PROFILES
 from illuminator_ros.mavlink.dialect import encode, mavlink
 from illuminator_ros.mavlink.messages import CommandInt
-from illuminator_ros.payload.confirmed_command import FENCE
+from illuminator_ros.payload.attempt import FENCE
 import pytest
 from support.back_to_back import Pair
 from support.light_bench import LightBench

@@ -17,12 +17,9 @@ from illuminator_ros.illuminator.simulated_properties import IlluminatorProperti
 from illuminator_ros.mavlink import messages as mav
 from illuminator_ros.mavlink.dialect import mavlink
 from illuminator_ros.mavlink.retries import UNCONFIRMED
-from illuminator_ros.payload.confirmed_command import (
-    FENCE,
-    PROGRESS_LIMIT,
-    Result,
-)
+from illuminator_ros.payload.attempt import FENCE, PROGRESS_LIMIT
 from illuminator_ros.payload.identity import Identity
+from illuminator_ros.payload.requests import Result
 import pytest
 from support.back_to_back import BRIDGE, Pair
 from support.fake_light import FakeLight

@@ -17,7 +17,7 @@ from illuminator_ros.illuminator.events import (
 )
 from illuminator_ros.illuminator.model import Mode
 from illuminator_ros.mavlink.dialect import mavlink
-from illuminator_ros.payload.confirmed_command import FENCE
+from illuminator_ros.payload.attempt import FENCE
 import pytest
 from support.back_to_back import Pair
 from support.fake_light import FakeLight

@@ -12,8 +12,8 @@ from typing import Any
 
 from hypothesis import given, strategies
 from illuminator_ros.payload.attempt import Change, FENCE, Served
+from illuminator_ros.payload.device_property import LATE_TIME, MAX_VALUES, Property
 from illuminator_ros.payload.requests import Goal, MAX_CALLS, Request, Requests, Result, Why
-from illuminator_ros.payload.steered_property import LATE_TIME, MAX_VALUES, Property
 import pytest
 from support.level_device import ACCEPTED, Bench, DENIED, level_change
 

@@ -23,12 +23,12 @@ from illuminator_ros.mavlink.component import Payload
 from illuminator_ros.mavlink.dialect import mavlink
 from illuminator_ros.mavlink.messages import Address, AnyCommand, Heartbeat, Message
 from illuminator_ros.payload.attempt import Change, Sending, Served, Target
+from illuminator_ros.payload.device_property import Property
 from illuminator_ros.payload.discovery import Discovery
 from illuminator_ros.payload.listeners import Listeners
 from illuminator_ros.payload.liveness import Liveness
 from illuminator_ros.payload.payload_type import PayloadType
 from illuminator_ros.payload.requests import Done, Goal, Request, Requests, Result, Why
-from illuminator_ros.payload.steered_property import Property
 from illuminator_ros.simulation import simulated
 from illuminator_ros.simulation.faults import Behaviour
 

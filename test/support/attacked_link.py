@@ -16,7 +16,7 @@ from illuminator_ros.illuminator.simulated_properties import FAULTS, Illuminator
 from illuminator_ros.mavlink.dialect import mavlink
 from illuminator_ros.mavlink.messages import Address, CommandLong
 from illuminator_ros.mavlink.signing import Signing, SigningMode
-from illuminator_ros.payload.confirmed_command import Result
+from illuminator_ros.payload.requests import Result
 from illuminator_ros.simulation.simulated import SimulatedComponent, SimulatedComponents
 from support.attacker import Attacker
 from support.client import Client

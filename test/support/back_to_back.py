@@ -15,8 +15,8 @@ from illuminator_ros.illuminator.simulated import SimulatedIlluminator
 from illuminator_ros.illuminator.simulated_properties import IlluminatorProperties
 from illuminator_ros.mavlink import messages as mav
 from illuminator_ros.mavlink.component import Endpoint
-from illuminator_ros.payload.confirmed_command import Result
 from illuminator_ros.payload.device_events import DeviceFound
+from illuminator_ros.payload.requests import Result
 from illuminator_ros.simulation.simulated import SimulatedComponent, SimulatedComponents
 from support.client import Client
 from support.records import Answer, Recorder

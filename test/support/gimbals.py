@@ -21,8 +21,8 @@ from illuminator_ros.mavlink.command_sender import CommandSender
 from illuminator_ros.mavlink.component import Component, Endpoint
 from illuminator_ros.mavlink.dialect import entry_names, mavlink
 from illuminator_ros.mavlink.link import Link
-from illuminator_ros.payload.confirmed_command import Done, Result
 from illuminator_ros.payload.messages import GeoPoint, GimbalDeviceAttitudeStatus
+from illuminator_ros.payload.requests import Done, Result
 from support.live_link import EndpointLink
 
 OURS, AUTOPILOT, DEVICE, OTHER = (mav.Address(1, component) for component in (193, 1, 154, 195))

@@ -21,8 +21,8 @@ from illuminator_ros.mavlink.link import Link
 from illuminator_ros.mavlink.link_state import LinkEvent, LinkSnapshot
 from illuminator_ros.mavlink.messages import Address, Message
 from illuminator_ros.mavlink.url import parse_url, Url
-from illuminator_ros.payload.confirmed_command import Result
 from illuminator_ros.payload.device_events import DeviceConnected, DeviceDisconnected
+from illuminator_ros.payload.requests import Result
 from illuminator_ros.simulation.simulated import SimulatedComponents
 from support.client import Client
 from support.messages import HANDLED

@@ -11,9 +11,9 @@ from typing import Any
 
 from illuminator_ros.illuminator import events as light_events
 from illuminator_ros.illuminator.model import Status
-from illuminator_ros.payload.confirmed_command import Result
 from illuminator_ros.payload.device_events import DeviceConnected, DeviceDisconnected
 from illuminator_ros.payload.identity import Identity
+from illuminator_ros.payload.requests import Result
 
 
 @dataclass

@@ -15,7 +15,7 @@ from illuminator_ros.mavlink import component, line
 from illuminator_ros.mavlink import connector as connector_module
 from illuminator_ros.mavlink.retries import CONNECTION
 from illuminator_ros.mavlink.transport.udp import MAX_PEERS, PEER_EXPIRY
-from illuminator_ros.payload import confirmed_command
+from illuminator_ros.payload import attempt
 import pytest
 from support import live_link
 from support.frames import heartbeat_frame
@@ -240,7 +240,7 @@ def test_light_that_comes_goes_and_returns_is_found_commanded_and_reported_once_
     if kind == 'serial':
         pytest.importorskip('serial', reason='pyserial is not installed')
     # A pause of the machine after an acknowledgement must not fail a change.
-    monkeypatch.setattr(confirmed_command, 'CONFIRMATION_TIMEOUT', PATIENCE)
+    monkeypatch.setattr(attempt, 'CONFIRMATION_TIMEOUT', PATIENCE)
     monkeypatch.setattr(component, 'HEARTBEAT_INTERVAL', 0.05)
     clock, port = live_link.Jump(), free_port(socket.SOCK_STREAM)
     ours, theirs = (url.format(port=port, path=tmp_path / 'ttyLIGHT') for url in URLS[kind])

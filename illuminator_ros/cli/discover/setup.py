@@ -29,8 +29,8 @@ from ...mavlink.component_kinds import AUTOPILOT
 from ...mavlink.link import Link
 from ...mavlink.messages import Address
 from ...mavlink.url import parse_url
-from ...payload.confirmed_command import Result
 from ...payload.device_events import DeviceConnected
+from ...payload.requests import Result
 from ...simulation.settings import number
 
 T = TypeVar('T')

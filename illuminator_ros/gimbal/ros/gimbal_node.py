@@ -23,9 +23,9 @@ from ..commands import Control, NEUTRAL, RETRACT, YAW_LOCKS
 from ..gimbal import Gimbal
 from ...mavlink.dialect import flag_names, mavlink
 from ...payload.command_sources import DEFAULT
-from ...payload.confirmed_command import Done, Result
 from ...payload.messages import GeoPoint
 from ...payload.mount_attitude import YawFrame
+from ...payload.requests import Done, Result
 from ...ros import node as ros_node
 from ...ros.command_sources import prefixes, release_services, SOURCE
 from ...ros.conversions import GEOID_SEPARATION, quaternion_message
@@ -243,19 +243,12 @@ class GimbalNode:
             answer(False, self.absence(now))
             return
         # All sources need control, so no source must claim the gimbal for it.
-        is_call = service.name not in ('take_control', 'release_control')
-        refusal = gimbal.claim(DEFAULT, now, is_call=True) if is_call else (
-            gimbal.sources.refusal(DEFAULT) if service.name == 'release_control' else '')
-
-        def done(result: Result, now: float) -> None:
-            if is_call:
-                gimbal.end_call(DEFAULT, now, success=result.success)
-            answer(result.success, result.message)
-
+        refusal = gimbal.requests.refusal(DEFAULT) if service.name == 'release_control' else ''
         if refusal:
             answer(False, refusal)
         else:
-            REQUESTS[service](gimbal, message, now, done)
+            REQUESTS[service](gimbal, message, now, lambda result, now: answer(
+                result.success, result.message))
 
     # Setpoints
 
@@ -275,7 +268,7 @@ class GimbalNode:
             return ros_node.CommandTopic(endpoint, take, read)
 
         def point(gimbal: Gimbal, place: GeoPoint, now: float) -> str:
-            gimbal.set_roi(place, now, pointed, is_stream=True)
+            gimbal.set_roi(place, now, pointed, is_stream=True, source=source)
             return ''
 
         def pointed(result: Result, now: float) -> None:

@@ -17,8 +17,8 @@ from ..events import GimbalEvent, GimbalKey
 from ..gimbal import GimbalSettings
 from ..setpoint_mixer import STEP_LIMIT
 from ...mavlink import component_kinds as kinds
-from ...payload.confirmed_command import Result
 from ...payload.device_events import DeviceConnected
+from ...payload.requests import Result
 from ...ros.command_sources import SOURCE_PARAMETERS, source_settings
 from ...ros.conversions import GEOID_SEPARATION
 from ...ros.device_nodes import DeviceNodes

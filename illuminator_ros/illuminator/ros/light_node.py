@@ -22,7 +22,7 @@ from ..events import LightEvent
 from ..light import Light
 from ..model import checked, InvalidValue, SafetyLimits
 from ...mavlink.messages import Address
-from ...payload.confirmed_command import Result
+from ...payload.requests import Result
 from ...payload.rotation import Quaternion
 from ...ros import node as ros_node
 from ...ros.command_sources import prefixes, release_services, SOURCE

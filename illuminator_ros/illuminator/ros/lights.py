@@ -20,8 +20,8 @@ from ..light import Light
 from ...mavlink.command_sender import CommandSender
 from ...mavlink.component_kinds import LIGHT
 from ...mavlink.messages import Address
-from ...payload.confirmed_command import Done, Result
 from ...payload.device_events import DeviceConnected
+from ...payload.requests import Done, Result
 from ...ros.device_nodes import DeviceNodes
 from ...ros.node import Answer, CommandTopic, Interface, RequestService, SWITCH_QOS
 from ...ros.parameters import ChangeableParameters, Values
