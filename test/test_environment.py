@@ -91,12 +91,12 @@ def test_demonstration_gets_its_packages_and_the_tests_add_theirs(project: Proje
         f'12: -m venv --without-pip {venv}',
         '12: -m ensurepip --default-pip',
         '12: -m pip install --only-binary uv --retries 2 uv>=0.7',
-        f'uv: pip install --python {venv}/bin/python -r pyproject.toml --extra monitor '
-        '--extra serial --group jazzy']
+        f'uv: pip install --python {venv}/bin/python -r pyproject.toml --editable . '
+        '--extra monitor --extra serial --group jazzy']
 
     assert project.run('test')[0] == 0
     assert project.calls() == (
-        f'uv: pip install --python {venv}/bin/python -r pyproject.toml --all-extras '
+        f'uv: pip install --python {venv}/bin/python -r pyproject.toml --editable . --all-extras '
         '--group test --group jazzy --group lint --group peers')
 
 

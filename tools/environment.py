@@ -127,8 +127,9 @@ def main(use: str, ros: str = '') -> None:
         found = uv
         run(python, '-m', 'ensurepip', '--default-pip')
         run(python, '-m', 'pip', 'install', '--only-binary', 'uv', '--retries', '2', 'uv>=0.7')
-    run(found, 'pip', 'install', '--python', python, '-r', 'pyproject.toml', *own.split(),
-        *more.format(ros).split())
+    # Editable, so that the package and its commands work from each folder.
+    run(found, 'pip', 'install', '--python', python, '-r', 'pyproject.toml', '--editable', '.',
+        *own.split(), *more.format(ros).split())
     stamp.write_text(declared + use)
     print(f'{venv.name}: installed what make {use} needs in {time.time() - start:.0f} s')
 
