@@ -232,6 +232,19 @@ def test_a_program_that_sets_each_second_is_not_locked_out_by_a_set_that_failed(
     assert results == [False, True, True, True, True]
 
 
+@pytest.mark.parametrize(('later', 'tries'), [(0.1, 'same'), (0.5, 'own')])
+def test_an_equal_set_without_time_for_another_command_gets_the_result_of_the_one_before(
+    fake: FakeLight, faked: Pair, later: float, tries: str,
+) -> None:
+    fake.applies = False
+    first = faked.ask_configure(brightness=50)
+    faked.run(later)
+    second = faked.ask_configure(brightness=50)
+    faked.wait_for(second)
+
+    assert (second.ended_at == first.ended_at) is (tries == 'same')
+
+
 def test_a_stream_of_brightness_is_followed_again_after_a_lost_acknowledgement(
     fake: FakeLight, faked: Pair,
 ) -> None:
