@@ -18,7 +18,6 @@ from typing import Any
 
 from .arguments import option, Parser
 from .entry_point import escape_output, explained, OLDEST, package, print_output
-from ..simulation.settings import number
 
 # A check: what was found, for people, with the next step where it has failed; whether it passed.
 Finding = tuple[bool, str]
@@ -47,10 +46,17 @@ def main(args: list[str] | None = None) -> int:
     return explained('doctor', lambda: _run(args))
 
 
+def _seconds(text: str) -> float:
+    # The reader of numbers of other programs imports pymavlink, which may be what is missing.
+    if not 1 <= float(text) <= 3600:
+        raise ValueError(f'{text} is outside 1 to 3600')
+    return float(text)
+
+
 def _run(args: list[str] | None) -> int:
     parser = Parser('doctor', DESCRIPTION, EPILOG)
     parser.add_argument('file', nargs='*', type=Path, help='parameter file to check, too')
-    parser.add_argument('--seconds', type=option(number(1, 3600)), default=14.0, metavar='S',
+    parser.add_argument('--seconds', type=option(_seconds), default=14.0, metavar='S',
                         help='how long to listen to the ports (default: %(default)g)')
     options = parser.parse_args(args)
     passed = []

@@ -261,14 +261,21 @@ def log_directory_refusal() -> str:
 
 def parameter_file_refusal(arguments: Sequence[str]) -> str:
     """
-    Return which parameter file is not a regular file, '' if each is.
+    Return which parameter file is not a regular file or has a tab as indentation, '' if none.
 
     rcl and this program read each file again: a pipe would be empty, and its parameters lost. rcl
-    waits for the writer of a FIFO, and no signal ends that.
+    waits for the writer of a FIFO, and no signal ends that. Its own error names no tab.
     """
     for option, path in zip(arguments, arguments[1:], strict=False):
-        if option == '--params-file' and os.path.exists(path) and not os.path.isfile(path):
+        if option != '--params-file' or not os.path.exists(path):
+            continue
+        if not os.path.isfile(path):
             return f'parameter file {path}: it is not a regular file'
+        with contextlib.suppress(OSError), open(path, encoding='utf-8', errors='replace') as file:
+            for number, line in enumerate(file, 1):
+                if line.strip() and '\t' in line[:len(line) - len(line.lstrip())]:
+                    return (f'parameter file {path}, line {number}: it begins with a tab; YAML '
+                            'takes spaces only')
     return ''
 
 

@@ -76,6 +76,8 @@ def test_help_names_every_parameter_option_and_form_of_url() -> None:
          'can be read by others (mode 0644); make it private: chmod 600 KEYS/open'),
         ('--params-file /nonexistent.yaml', "params file: '--params-file /nonexistent.yaml'"),
         ('--params-file KEYS/broken.yaml', 'KEYS/broken.yaml'),
+        ('--params-file KEYS/tab.yaml',
+         'parameter file KEYS/tab.yaml, line 2: it begins with a tab; YAML takes spaces only'),
         # A pipe, as in --params-file <(...), is empty when it is read again.
         ('--params-file KEYS/pipe', 'parameter file KEYS/pipe: it is not a regular file'),
         ('--params-file KEYS', 'parameter file KEYS: it is not a regular file'),
@@ -130,6 +132,7 @@ def test_wrong_argument_is_one_line_with_status_2(
     (tmp_path / 'open').write_text('a long passphrase')
     (tmp_path / 'open').chmod(0o644)
     (tmp_path / 'broken.yaml').write_text('illuminator: [')
+    (tmp_path / 'tab.yaml').write_text('illuminator:\n\tros__parameters: {brightness: 5.0}\n')
     os.mkfifo(tmp_path / 'pipe')
     outcome = run(f'illuminator_ros.{name}', *shlex.split(
         arguments.replace('KEYS', str(tmp_path))), env={'ROS_DOMAIN_ID': str(domain)})
