@@ -10,7 +10,7 @@ import math
 from typing import Any, NamedTuple
 
 from .model import Configuration, FIELDS, Mode, SafetyLimits, StrobeRange
-from ..payload.requests import Goal, Request, Requests, Values
+from ..payload.requests import Goal, Request, Values
 
 # s; rqt_reconfigure gives up after 1.0 s, and the answer must arrive before. The middleware waits
 # up to 0.1 s before it sends an answer to a client that it has not discovered yet.
@@ -58,14 +58,16 @@ def describe(values: Values) -> str:
         [name for name in FIELDS if name in values])
 
 
-def decide(requests: Requests, shown: Shown, limits: SafetyLimits, now: float) -> Goals:
+def decide(live: list[Request], shown: Shown, limits: SafetyLimits, now: float) -> Goals:
     """
     Return what the switch and the configuration of a light should be now.
 
+    :param live: the open requests that may be sent.
     :param limits: clip each configuration.
     """
-    live = requests.live()
     switch = Goal.strongest(live, 'enabled', now)
+    if all('enabled' in one.values for one in live):
+        return Goals(switch)
     hidden: tuple[str, ...] = ()
     if switch is not None and not switch.values and shown.brightness_is_switch is not False:
         # Only a call may send a configuration that might undo an OFF.

@@ -351,6 +351,8 @@ class Light:
     # Time
 
     def _silence_due(self, now: float) -> float:
+        if not self._rules.may_put:
+            return math.inf
         return self._rules.silence_due(may_be_on=self._control.may_go_off(now))
 
     def _step(self, now: float) -> None:

@@ -70,15 +70,16 @@ class LightControl:
         """Decide what the light should be, send it, and go on with what is under way."""
         if self._rules.may_put:
             self._rules.put_due(now, may_be_on=self.may_go_off(now))
-        if self.is_calm:
+        live = self._requests.live()
+        if not live and not self.is_busy:
             return
-        self._rules.check_range()
-        goals = self._decide(now)
+        self._rules.check_range(live)
+        goals = self._decide(live, now)
         switch = goals.switch
         if (switch is not None and not switch.values and not self.switch.is_under_way(OFF)
                 and self._twin.brightness_is_switch is not False):
             self._end_configuration(now)
-            goals = self._decide(now)
+            goals = self._decide(self._requests.live(), now)
         # First the configuration, so that an ON finds it.
         if self._steer(self._configuration, goals.configuration, now):
             self._rules.sent(now)
@@ -91,9 +92,8 @@ class LightControl:
             else:
                 self._report(Result(False, failure), now)
 
-    def _decide(self, now: float) -> Goals:
-        limits = self._rules.settings.limits
-        goals = decide(self._requests, self._twin.shown, limits, now)
+    def _decide(self, live: list[Request], now: float) -> Goals:
+        goals = decide(live, self._twin.shown, self._rules.settings.limits, now)
         if not goals.missing or goals.configuration is None:
             return goals
         text = not_reported(goals.missing)
@@ -166,15 +166,15 @@ class LightControl:
     # Known facts
 
     @property
-    def is_calm(self) -> bool:
-        """Whether nothing is under way, and nothing is wanted."""
-        return (self.switch.attempt is None and self._configuration.attempt is None
-                and not any(one.is_open for one in self._requests.standing))
+    def is_busy(self) -> bool:
+        """Whether a command is under way."""
+        return self.switch.attempt is not None or self._configuration.attempt is not None
 
     def is_settled(self, now: float) -> bool:
         """Return whether a status that shows nothing new has no effect."""
         twin = self._twin
-        return (self.is_calm and twin.is_told and not twin.changing.are_changing
+        return (not self.is_busy and not self._requests.live() and twin.is_told
+                and not twin.changing.are_changing
                 and self.switch.unconfirmed(now) is None
                 and self._configuration.unconfirmed(now) is None
                 and not (twin.failure.text or self._rules.limits.exceeded.excess))
@@ -252,11 +252,12 @@ class LightControl:
     def _compare(self, status: Status, cause: Cause, now: float) -> None:
         """Compare a status with what was agreed, with the rules, and with the limits."""
         twin, rules, was_agreed = self._twin, self._rules, self._twin.agreed is not None
-        if was_agreed and not cause.is_busy:
+        weak = rules.weak
+        if weak and was_agreed and not cause.is_busy:
             rules.drop_shown(status)
-        twin.compare(rules.waiting, cause)
-        if not was_agreed and twin.agreed is not None:
-            for one in rules.weak:
+        twin.compare(rules.waiting if weak else (), cause)
+        if weak and not was_agreed and twin.agreed is not None:
+            for one in weak:
                 one.due = min(one.due, now)
             rules.drop_shown(status)
         rules.keep_limits(now, is_busy=self.is_configuring)
@@ -336,4 +337,5 @@ class LightControl:
     @property
     def command_due(self) -> float:
         """Return when a command is due, s."""
-        return min(self.switch.due, self._configuration.due)
+        return min((one.attempt.due for one in (self.switch, self._configuration)
+                    if one.attempt is not None), default=math.inf)

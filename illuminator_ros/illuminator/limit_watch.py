@@ -31,8 +31,6 @@ class LimitWatch:
         self, limits: SafetyLimits, reported: Configuration, strobe_range: StrobeRange, now: float,
     ) -> bool:
         """Compare a reported configuration; return whether :attr:`exceeded` has changed."""
-        if limits == SafetyLimits() and not self.exceeded.excess:
-            return False
         excess = limits.excess(reported)
         is_again = bool(excess) and (
             self.exceeded.is_again if self.exceeded.excess else now < self.due)

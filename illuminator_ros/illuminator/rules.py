@@ -13,7 +13,7 @@ from . import events
 from .commands import CONFIRMED
 from .decide import describe
 from .limit_watch import LimitWatch
-from .model import Changes, checked, InvalidValue, Status
+from .model import Changes, checked, InvalidValue, SafetyLimits, Status
 from .settings import LightSettings
 from .silence import Silence
 from .twin import Failure, Twin
@@ -170,9 +170,11 @@ class Rules:
         return [name for one in self.weak if one.why is Why.RESTORED and not one.tried
                 for name in one.values]
 
-    def check_range(self) -> None:
-        """Drop values that are outside the range that the light reports."""
-        for one in self.weak:
+    def check_range(self, live: list[Request]) -> None:
+        """Drop values of rules that are outside the range that the light reports."""
+        for one in live:
+            if one.why not in WEAK:
+                continue
             for name, value in [*one.values.items()]:
                 try:
                     checked(name, value, self._twin.strobe_range)
@@ -242,8 +244,10 @@ class Rules:
 
         :param is_busy: whether a configuration is under way.
         """
-        reported, limits = self._twin.reported, self.settings.limits
-        if reported is None:
+        limits = self.settings.limits
+        if limits == SafetyLimits() and not self.limits.exceeded.excess:
+            return
+        if (reported := self._twin.reported) is None:
             return
         if self.limits.compare(limits, reported, self._twin.strobe_range, now):
             self._emit(self.limits.exceeded)

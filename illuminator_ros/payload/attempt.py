@@ -175,19 +175,21 @@ NO_FENCE = Fence()
 
 
 @dataclass
-class Answers:
+class Received:
     """
-    The acknowledgements of a command. None says which try it answers.
+    What has come for a command. No acknowledgement says which try it answers.
 
-    :param before: those that its kind had got before.
-    :ivar counted: those that are known to be its own.
+    :param before: acknowledgements that its kind had got before.
+    :ivar counted: acknowledgements that are known to be its own.
     :ivar in_step: whether each try, and each frame under way before, was answered before the next
         try, and none twice: then none of them is under way, though none is known to be its own.
+    :ivar has_restarted: whether the device has restarted meanwhile.
     """
 
     before: int
     counted: int = 0
     in_step: bool = True
+    has_restarted: bool = False
 
 
 class Attempt(Generic[S]):
@@ -212,6 +214,8 @@ class Attempt(Generic[S]):
         self.goal = goal
         self.began = now
         self._parts: dict[Request, Change[S]] = {}
+        self._sending = (Sending.AT_THE_END if goal.is_last else
+                         Sending.UNTIL_SHOWN if goal.insists else change.sending)
         self._target = target
         self._fence = fence
         self._gap = gap
@@ -221,8 +225,7 @@ class Attempt(Generic[S]):
         self._instead: S | None = None
         self._ends_at = self._repeat_due = math.inf
         self._requests = Retries(STATUS, math.inf)
-        self._answers = Answers(self._received_answers())
-        self._has_restarted = False
+        self._received = Received(self._acknowledgements())
         self.serve(parts)
         self._send(now)
 
@@ -241,12 +244,6 @@ class Attempt(Generic[S]):
 
     # The command
 
-    @property
-    def _sending(self) -> Sending:
-        if self.goal.is_last:
-            return Sending.AT_THE_END
-        return Sending.UNTIL_SHOWN if self.goal.insists else self.change.sending
-
     def _send(self, now: float, tried: int = 0) -> None:
         """
         Send the command by the command protocol, which tries again until it is acknowledged.
@@ -254,7 +251,7 @@ class Attempt(Generic[S]):
         Where more tries are due whatever the device answers, each is sent once.
         """
         change, target, sending = self.change, self._target, self._sending
-        self._answers.in_step &= not tried or self._are_all_answered(tried)
+        self._received.in_step &= not tried or self._are_all_answered(tried)
         is_fenced, is_single = now < self._fence.ends_at, sending is Sending.ONCE
         is_repeated = not is_single and (sending.insists or is_fenced or self._is_accepted)
         self._repeat_due = math.inf
@@ -290,23 +287,23 @@ class Attempt(Generic[S]):
 
         :param is_shown: whether a status has shown the change, so that one try has arrived.
         """
-        tries, answers = self._transmission.tries, self._answers
+        tries = self._transmission.tries
         if self._are_all_answered(tries):
             return 0
-        return max(tries - max(answers.counted, int(is_shown)), 0)
+        return max(tries - max(self._received.counted, int(is_shown)), 0)
 
     def _are_all_answered(self, tries: int) -> bool:
         """Return whether each frame so far was answered before the next one, none twice."""
-        got = self._received_answers() - self._answers.before
-        return self._answers.in_step and got == self._fence.frames + tries
+        got = self._acknowledgements() - self._received.before
+        return self._received.in_step and got == self._fence.frames + tries
 
-    def _received_answers(self) -> int:
+    def _acknowledgements(self) -> int:
         target = self._target
         return target.commands.answers.get((target.address, self.change.command), 0)
 
     def restarted(self, now: float) -> None:
         """Send it again: the device has restarted, and nothing from before counts."""
-        self._has_restarted = True
+        self._received.has_restarted = True
         if self._sending is not Sending.ONCE:
             self._fence = Fence(now + FENCE)
             self._answer = self._instead = None
@@ -332,7 +329,7 @@ class Attempt(Generic[S]):
             # waits for the result: one lost answer would otherwise slow down a stream for ever.
             is_fenced = now < self._fence.ends_at
             if not (is_fenced and self.goal.is_awaited):
-                self._answers.counted += 1
+                self._received.counted += 1
             if is_fenced or self._answer is not None and not self._sending.insists:
                 return
             if self._answer is None:
@@ -493,7 +490,7 @@ class Attempt(Generic[S]):
     ) -> Result:
         if self._answer is not None and self._answer.status is CommandStatus.CLOSED:
             return Result(False, text, superseded=True)
-        if self._has_restarted:
+        if self._received.has_restarted:
             text += f'; the {self._target.kind} restarted meanwhile'
         took = timing(self._transmission.tries, now - one.since)
         return Result(success, f'{text} ({took})', note=note, **flags)

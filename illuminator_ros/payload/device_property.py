@@ -192,4 +192,6 @@ class Property(Generic[S]):
 
     def unconfirmed(self, now: float) -> Change[S] | None:
         """Return the change of the last command if it ended unconfirmed and may have an effect."""
-        return self._unconfirmed if now <= self.sent_at + LATE_TIME else None
+        if self._unconfirmed is None or now > self.sent_at + LATE_TIME:
+            return None
+        return self._unconfirmed

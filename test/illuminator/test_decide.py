@@ -136,7 +136,7 @@ class Play:
                 wish.is_open, wish.since = True, self.now
 
     def decide(self, light: Shown) -> Goals:
-        return decide(self.requests, light, LIMITS, self.now)
+        return decide(self.requests.live(), light, LIMITS, self.now)
 
 
 # The script, the light -> ON or OFF (None for anything), the fields of the configuration that
