@@ -57,7 +57,7 @@ class GimbalRequests:
         self._device_id = key.device_id
         # The newest status of each property, and the time between it and the one before, s.
         self._newest: dict[str, tuple[Any, float, float]] = {}
-        # Control is confirmed by the status of the manager, a pose by that of the device:
+        # The status of the manager confirms control, the status of the device a pose:
         # ArduPilot's manager does not report the flags. No status shows the place.
         self._properties: dict[str, Property[Any]] = {
             CONTROL: Property(Target(

@@ -1,7 +1,7 @@
 # Copyright 2026 The illuminator_ros developers
 # SPDX-License-Identifier: Apache-2.0
 
-"""What a light should be now: one function that ranks the standing requests."""
+"""The decision: one function ranks the standing requests to a light."""
 
 from __future__ import annotations
 
@@ -23,9 +23,9 @@ DUTY_CYCLE_NOTE = ('strobe_duty_cycle was 0 %, at which the light does not strob
 
 class Shown(NamedTuple):
     """
-    What a light shows, as far as it matters to a decision.
+    The state that a light shows, as far as it matters to a decision.
 
-    :param agreed: the values of the fields that nobody asks for; None before they are known.
+    :param agreed: the values of the fields without a request; None before they are known.
     :param is_dark: whether it is off with a brightness of 0, so that a brightness may switch it
         on.
     :param brightness_is_switch: whether a brightness above 0 switches it on; None if unknown.

@@ -142,7 +142,7 @@ class Light:
         self._queries.announce(now, is_heard=self.connected)
 
     def receive_status(self, status: Status, now: float) -> None:
-        """Receive an ILLUMINATOR_STATUS; one that is older than the one before is ignored."""
+        """Receive an ILLUMINATOR_STATUS; a late status is ignored."""
         self.heard(now)
         twin, control, before = self.twin, self._control, self.twin.order.newest_at
         has_news = not (self._is_calm and status.repeats(twin.status))

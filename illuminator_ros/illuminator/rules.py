@@ -1,7 +1,7 @@
 # Copyright 2026 The illuminator_ros developers
 # SPDX-License-Identifier: Apache-2.0
 
-"""What is wanted of a light though no user asks for it now, and when."""
+"""The rules: requests to a light that no user makes, and when they are due."""
 
 from __future__ import annotations
 
@@ -90,7 +90,7 @@ class Rules:
         self._put(Why.RELEASE, {'enabled': False}, reason, now)
 
     def finish(self) -> None:
-        """Want nothing but the OFF at the end of the process."""
+        """Want only the OFF at the end of the process."""
         self.silence, self._off_due = Silence(0.0), -math.inf
 
     def switched(self, one: Request, on: bool, now: float) -> None:

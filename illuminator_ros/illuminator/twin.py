@@ -1,7 +1,7 @@
 # Copyright 2026 The illuminator_ros developers
 # SPDX-License-Identifier: Apache-2.0
 
-"""What one light shows: its state, the configuration agreed with it, and what others changed."""
+"""The state that one light shows, the configuration agreed with it, and changes of others."""
 
 from __future__ import annotations
 

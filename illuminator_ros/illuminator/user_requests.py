@@ -1,7 +1,7 @@
 # Copyright 2026 The illuminator_ros developers
 # SPDX-License-Identifier: Apache-2.0
 
-"""What the users of a light ask for: refused, remembered, or made."""
+"""The requests of the users of a light: refused, remembered, or made."""
 
 from __future__ import annotations
 
@@ -92,7 +92,7 @@ class UserRequests:
 
     def _is_repetition(self, new: Request, now: float) -> bool:
         """
-        Return whether a message of a topic repeats the one before, and nothing is to be sent.
+        Return whether a message of a topic repeats the one before, so that nothing must be sent.
 
         One that the light does not show, and an OFF, is sent again once in a while.
         """

@@ -177,7 +177,7 @@ NO_FENCE = Fence()
 @dataclass
 class Received:
     """
-    What has come for a command. No acknowledgement says which try it answers.
+    The answers to a command. No acknowledgement says which try it answers.
 
     :param before: acknowledgements that its kind had got before.
     :ivar counted: acknowledgements that are known to be its own.
@@ -199,7 +199,7 @@ class Attempt(Generic[S]):
     It serves requests, each of which ends by its own values: :meth:`reported` and :meth:`poll`
     return those that have ended. It is over when :attr:`serves` is empty.
 
-    :param change: all that the command sets.
+    :param change: everything that the command sets.
     :param goal: the values, and how it is sent.
     :param parts: the requests that it serves, and the part of the change that each asked for.
     :param gap: the time between the last two statuses, None if none has ever come.

@@ -1,7 +1,7 @@
 # Copyright 2026 The illuminator_ros developers
 # SPDX-License-Identifier: Apache-2.0
 
-"""What is wanted of one device: the standing requests, and the claims of their sources."""
+"""The standing requests to one device, and the claims of their sources."""
 
 from __future__ import annotations
 
@@ -68,7 +68,7 @@ ENDS: Mapping[Why, Collection[Why]] = {
     Why.REQUEST: {Why.SILENCE, Why.REQUEST, Why.RELEASE}, Why.RELEASE: {Why.REQUEST}}
 # Sent until a status shows them, whatever the device answers.
 INSISTENT = frozenset((Why.END, Why.SILENCE, Why.RELEASE))
-# What a user has set is not undone by what was given or agreed before.
+# A value that a user has set is not undone by one that was given or agreed before.
 WEAK = frozenset((Why.OVERRIDE, Why.RESTORED, Why.LIMIT))
 
 
@@ -231,7 +231,7 @@ class Requests:
 
     def of_commander(self, some: list[Request]) -> list[Request]:
         """Return those of some requests that may be sent."""
-        # What the last holder has asked for is still sent when it has released the device.
+        # The requests of the last holder are still sent after its release.
         if not (some and self.are_ranked) or (commander := self.commander) is None:
             return some
         return [one for one in some
@@ -291,7 +291,7 @@ class Requests:
         Forget the wishes for some values, of one source or of all.
 
         :param values: None for any value of a field.
-        :param text: the answer to those that are open.
+        :param text: the answer to open wishes.
         """
         for old in [*self.standing]:
             if old.is_wish and source in (None, old.source):

@@ -19,7 +19,7 @@ from illuminator_ros.illuminator.model import (
 )
 from illuminator_ros.payload.arbitration import Cause, HolderChanged
 from illuminator_ros.payload.command_sources import SourceSettings
-from illuminator_ros.payload.requests import Request, Requests, Result, Why
+from illuminator_ros.payload.requests import MAX_CALLS, Request, Requests, Result, Why
 import pytest
 
 INTERNAL = Mode.INTERNAL_CONTROL
@@ -355,6 +355,12 @@ def test_the_holder_is_reported_when_it_changes() -> None:
     assert [(one.before, one.after, one.cause) for one in play.held] == [
         (None, 'default', Cause.CLAIM), ('default', 'safety', Cause.CLAIM),
         ('safety', 'default', Cause.RELEASE), ('default', None, Cause.SILENCE)]
+
+
+def test_a_call_beyond_the_bound_is_answered_with_it() -> None:
+    play = Play([Call(ON)] * (MAX_CALLS + 1))
+
+    assert play.answers == {MAX_CALLS: '32 requests are waiting for light 1/243 already'}
 
 
 def test_without_sources_no_request_is_refused_and_no_holder_is_reported() -> None:

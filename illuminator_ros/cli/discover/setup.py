@@ -109,7 +109,7 @@ def set_up(reports: Sequence[Mapping[str, Any]], given: Sequence[str]) -> int:
         for key, question, default, reader in PARAMETERS:
             values[key] = ask(key, question, default, reader)
         if not device['signed'] and ask('try', (
-                f'switch it on at {BRIGHTNESS:g} % for {ON_TIME:g} s; nobody may look into it'),
+                f'switch it on at {BRIGHTNESS:g} % for {ON_TIME:g} s; do not look into it'),
                 'no', yes):
             print(try_light(url, address))
     folder = ask('folder', 'folder of the files', '.', Path).absolute()
