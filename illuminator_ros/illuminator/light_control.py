@@ -259,7 +259,6 @@ class LightControl:
         if weak and not was_agreed and twin.agreed is not None:
             for one in weak:
                 one.due = min(one.due, now)
-            rules.drop_shown(status)
         rules.keep_limits(now, is_busy=self.is_configuring)
 
     def restarted(self, status: Status, now: float) -> None:

@@ -131,12 +131,8 @@ class Rules:
 
     def require(self, values: Changes, now: float) -> None:
         """Send values that were given at the start, once the light has reported its own."""
-        wanted = self.settings.limits.clip(values)
-        for one in self.weak:
-            if one.why is Why.OVERRIDE:
-                wanted = {**one.values, **wanted}
-                self._requests.end(one, ENDED, now)
-        self._put(Why.OVERRIDE, wanted, 'override', now, due=self._first_due(now))
+        self._put(Why.OVERRIDE, self.settings.limits.clip(values), 'override', now,
+                  due=self._first_due(now))
 
     def _first_due(self, now: float) -> float:
         return now if self._twin.agreed else now + FIRST_STATUS_TIMEOUT

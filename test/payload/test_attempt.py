@@ -181,6 +181,14 @@ def test_a_status_before_an_acknowledgement_the_last_try_or_the_fence_does_not_c
     assert not bench.ended.success
 
 
+def test_a_device_that_sends_its_first_status_during_a_command_is_judged_by_it() -> None:
+    bench = CommandBench(executes=[], sends_status=False).begin(gap=None)
+    bench.gap = 0.0
+    bench.later(0.5, lambda: bench.reported(0))
+    bench.run()
+    assert (bench.ended.success, bench.ended.contradicted) == (False, True)
+
+
 def test_each_try_carries_a_request_for_the_status_which_is_repeated_until_it_shows_the_change(
 ) -> None:
     bench = CommandBench(0, None, ACCEPTED, executes=[]).begin(

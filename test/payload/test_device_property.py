@@ -256,6 +256,19 @@ def test_a_command_that_is_shown_after_its_fence_leaves_one_only_if_a_frame_may_
     assert took == pytest.approx(FENCE if is_fenced else ROUND_TRIP)
 
 
+def test_a_set_that_is_proved_within_the_fence_does_not_lengthen_it() -> None:
+    bench = PropertyBench().report()
+    bench.want(3)
+    bench.withdraw()
+    bench.run(0.5)
+    assert bench.ended(4, limit=0.9) == (True, ROUND_TRIP)
+    bench.withdraw()
+
+    success, took = bench.ended(5)
+    assert success
+    assert took == pytest.approx(FENCE - 0.5)
+
+
 def test_values_from_before_the_fence_are_forgotten_after_it() -> None:
     bench = PropertyBench().report()
     bench.want(3)
