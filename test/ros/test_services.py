@@ -57,7 +57,7 @@ def test_refresh_requests_both_messages_which_are_published_or_logged(
     brightness = ros.subscribe(Float32, '/illuminator/brightness')
     off.fake.stream = 0.0
     off.do(lambda now: off.fake.fields.update(brightness=12.0))
-    off.fake.identity = type(off.fake.identity)('other', 'maker', '', '', 'T-2')
+    off.fake.identity = type(off.fake.identity)('other', 'maker', '', '', 'T-1')
 
     answer = ros.refresh()
 
@@ -67,7 +67,7 @@ def test_refresh_requests_both_messages_which_are_published_or_logged(
     assert {command.param1 for command in off.commands(mavlink.MAV_CMD_REQUEST_MESSAGE)} == {
         STATUS, INFORMATION}
     brightness.wait_value(12.0)
-    bridge.wait_for('light 1/243 is other maker, serial number T-2')
+    bridge.wait_for('light 1/243 is other maker, serial number T-1')
 
 
 def test_other_services_and_topics_go_on_while_an_enable_waits(

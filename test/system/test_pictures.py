@@ -14,7 +14,7 @@ from support.processes import Program, ROOT
 # Texts of each picture, as the devices must answer the keys; matplotlib draws texts as outlines.
 TEXTS = {
     'monitor-light': ['/illuminator ON OK brightness 80 %: done', '2 lights: 1 ON, 1 off'],
-    'monitor-gimbal': ['/gimbal ours OK', 'yaw to 20.0 left: sent', 'pitch 30.0 down'],
+    'monitor-gimbal': ['/gimbal ours OK', 'yaw to 20.0 left in', 'pitch 30.0 down'],
     'monitor-camera': ['capture: done : image 1 taken', '/rededge ok WARN'],
     'monitor-phone': ['/illuminator ON', 'space on/off', 'a ALL OFF'],
     'beam': [], 'flight': [], 'wiring-companion': [], 'wiring-autopilot': []}
