@@ -42,7 +42,8 @@ setup(
     entry_points={
         'console_scripts': [
             *(f'{prefix}{name} = illuminator_ros.cli.{name}:main'
-              for name in ('bridge', 'conformance', 'discover', 'doctor', 'monitor', 'simulator')),
+              for name in ('bridge', 'conformance', 'discover', 'doctor', 'monitor', 'set',
+                           'simulator')),
             *(f'{prefix}{name} = illuminator_ros.cli.bridge:{name}'
               for name in ('gimbal', 'gimbal_manager', 'rededge')),
         ],

@@ -181,7 +181,7 @@ def test_pip_installs_executables_with_names_that_hide_no_other_program(clean: P
             if not re.match('python|pip|[aA]ctivate', path.name)} == {
         f'illuminator-{name}' for name in (
             'bridge', 'conformance', 'discover', 'doctor', 'gimbal', 'gimbal_manager',
-            'monitor', 'rededge', 'simulator')}
+            'monitor', 'rededge', 'set', 'simulator')}
 
 
 def test_tools_of_the_wheel_that_need_no_ros_work_in_a_clean_venv(clean: Path) -> None:

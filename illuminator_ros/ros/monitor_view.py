@@ -45,6 +45,10 @@ Cell = str | tuple[str, str]
 DetailLine = tuple[str, Sequence[Cell]]
 
 
+class WrongText(str):
+    """Why a typed text has no request for any device, for people."""
+
+
 class Topic(NamedTuple):
     """
     A topic ``~/name`` that the monitor shows.
@@ -188,20 +192,22 @@ class Device:
         return age(self.now - self.changed_at[topic]) if topic in self.changed_at else ''
 
 
+# Makes the request for a device and a typed text, or says why there is none, for people.
+Maker = Callable[[Device, str], Request | str]
+
+
 class Key(NamedTuple):
     """
     Keys with one meaning.
 
     :param text: the meaning, in a few words, which is on its button.
-    :param request: returns the request for a device and the text that was typed, or why there is
-        none, for people.
     :param prompt: what the operator types first, '' for nothing.
     :param has_button: whether fingers have a button for it, too.
     """
 
     keys: tuple[str, ...]
     text: str
-    request: Callable[[Device, str], Request | str]
+    request: Maker
     prompt: str = ''
     has_button: bool = True
 
@@ -222,6 +228,8 @@ class View:
     :param is_dangerous: whether a device can hurt people and does not do as it should.
     :param notice: returns what is going to happen by itself, for people, '' for nothing.
     :param off: the request for "all off".
+    :param settings: the names that the program "set" takes, in the order in which it acts.
+    :param shows: whether a device shows a value that was requested by a message.
     """
 
     kind: str
@@ -237,6 +245,9 @@ class View:
     is_dangerous: Callable[[Device], bool] = lambda device: False
     notice: Callable[[Device], str] = lambda device: ''
     off: Callable[[Device], Request] | None = None
+    settings: Mapping[str, Maker] = field(default_factory=dict)
+    shows: Callable[[Device, str, Any], bool] = lambda device, name, value: (
+        device.values.get(name) == value)
 
 
 def trigger(name: str, question: str = '') -> Request:
@@ -255,6 +266,18 @@ def release_source(device: Device, typed: str) -> Request | str:
             trigger(f'{device.source or "default"}/release'))
 
 
+def if_true(make: Maker) -> Maker:
+    """Return a maker for a setting whose only value is true."""
+    return lambda device, typed: make(device, '') if typed == 'true' else WrongText(
+        f'{typed!r} is not true')
+
+
+def trigger_settings(*names: str) -> dict[str, Maker]:
+    """Return settings that call services of std_srvs/Trigger."""
+    return {name: if_true(lambda device, typed, name=name: trigger(name))  # type: ignore[misc]
+            for name in names}
+
+
 RELEASE_SOURCE = Key(('u',), 'give back', release_source)
 
 
@@ -270,6 +293,14 @@ def numbers(typed: str, count: int) -> list[float]:
     except ValueError:
         return []
     return found if len(found) == count and all(map(math.isfinite, found)) else []
+
+
+def number(typed: str, unit: str, lowest: float, highest: float) -> float | WrongText:
+    """Return a number that was typed with or without its unit, or why it is none."""
+    [value] = numbers(typed.strip().removesuffix(unit), 1) or [math.nan]
+    return value if lowest <= value <= highest else WrongText(
+        f'{typed!r} is not a number of {unit} from {lowest:g}'
+        + (f' to {highest:g}' if math.isfinite(highest) else ''))
 
 
 def measured(value: float | None, unit: str, form: str = '.3g') -> str:

@@ -69,7 +69,7 @@ def test_the_readme_has_each_executable_which_is_also_a_module() -> None:
     modules = {*(path.stem for path in package.glob('[!_]*.py')),
                *(path.parent.name for path in package.glob('*/__main__.py'))}
     scripts = (ROOT / 'setup.py').read_text().partition("'console_scripts'")[2]
-    executables = {name for names in re.findall(r'for name in \((.*?)\)', scripts)
+    executables = {name for names in re.findall(r'for name in \(([^)]*)\)', scripts)
                    for name in re.findall(r'\w+', names)}
 
     assert {row[0].strip('`') for row in table(README, 'executable')} == modules == executables

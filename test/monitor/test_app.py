@@ -319,7 +319,7 @@ def test_selected_row_stays_visible_when_the_list_gets_shorter() -> None:
         await screen.wait()
         assert any(line.startswith(' /l11') for line in screen.lines)
 
-    show(test, *(light(f'/l{number:02}') for number in range(12)), size=(80, 24))
+    show(test, *(light(f'/l{number:02}') for number in range(12)), size=(80, 25))
 
 
 def test_selected_row_may_be_scrolled_out_of_the_list() -> None:

@@ -137,7 +137,7 @@ def test_arrows_add_up_turn_on_beyond_half_a_turn_and_stop_straight_down(
 
 
 @pytest.mark.parametrize(('one', 'reason'), [
-    (gimbal(in_control=False), 'not in control (primary 1/193): t takes control'),
+    (gimbal(in_control=False), 'not in control (primary 1/193): take control first'),
     (gimbal(angles=('map', 0.0, None, 0.0)), 'its angles are unknown')])
 def test_arrow_is_refused_where_the_node_would_ignore_it(one: shared.Device, reason: str) -> None:
     assert ask(one, 'up') == reason

@@ -269,6 +269,7 @@ class Graph:
 
     :param source: of commands, see :class:`Device`.
     :param may_request: whether requests are sent, or refused here.
+    :param only: the one device to use, '' for all.
     :ivar clock: returns the time, s.
     :ivar views: of all payloads.
     :ivar devices: in the order of the views, then by name.
@@ -276,13 +277,14 @@ class Graph:
 
     def __init__(
         self, node: Node, views: Sequence[View], source: str = '',
-        clock: Callable[[], float] = time.monotonic, *, may_request: bool = True,
+        clock: Callable[[], float] = time.monotonic, *, may_request: bool = True, only: str = '',
     ) -> None:
         self._node = node
         self.views = views
         self._source = source
         self.clock = clock
         self.may_request = may_request
+        self._only = only
         self.devices: list[GraphDevice] = []
         self._diagnostics = node.create_subscription(
             DiagnosticArray, '/diagnostics', _taken_by_poll, DIAGNOSTICS_QOS)
@@ -353,7 +355,8 @@ class Graph:
         for device in self.devices:
             device.is_gone = found.pop(device.name, None) is not device.view
             device.nodes = nodes[device.name]
-        for name in sorted(found)[:MAX_DEVICES - len(self.devices)]:
+        names = {self._only} & {*found} if self._only else found
+        for name in sorted(names)[:MAX_DEVICES - len(self.devices)]:
             self.devices.append(GraphDevice(
                 self._node, name, found[name], now, self._source, may_request=self.may_request))
         self.devices.sort(key=lambda device: (self.views.index(device.view), device.name))

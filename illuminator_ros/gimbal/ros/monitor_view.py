@@ -18,6 +18,8 @@ from ...ros.monitor_view import Device, Key, Request, Topic, UNKNOWN
 
 # Degrees for one press of an arrow key.
 STEP = 5.0
+# Degrees by which a confirmed angle may differ from the requested one.
+TOLERANCE = 2.0
 # The limit of ~/cmd/angles, and the directions of positive and negative angles in ROS.
 AXES = {'roll': (math.pi, 'right', 'left'), 'pitch': (math.pi / 2, 'down', 'up'),
         'yaw': (math.pi, 'left', 'right')}
@@ -50,7 +52,7 @@ def direction(axis: str, radians: float) -> str:
 def _refusal(device: Device) -> str:
     """Return why the node would ignore a setpoint, '' if it would not."""
     return '' if device.values.get('in_control') else (
-        f'not in control ({device.values.get("controller", "unknown")}): t takes control')
+        f'not in control ({device.values.get("controller", "unknown")}): take control first')
 
 
 def nudge(device: Device, typed: str, axis: str, step: float) -> Request | str:
@@ -60,7 +62,22 @@ def nudge(device: Device, typed: str, axis: str, step: float) -> Request | str:
         return refusal
     aim, limit = start + math.radians(step), AXES[axis][0]
     # Yaw has no end: it goes on beyond half a turn.
-    aim = math.remainder(aim, math.tau) if axis == 'yaw' else min(max(aim, -limit), limit)
+    return _aim(device, axis, math.remainder(aim, math.tau) if axis == 'yaw' else (
+        min(max(aim, -limit), limit)))
+
+
+def turn(device: Device, typed: str, axis: str) -> Request | str:
+    """Turn one axis to an angle, degrees."""
+    limit = round(math.degrees(AXES[axis][0]))
+    degrees = shared.number(typed, 'deg', -limit, limit)
+    if isinstance(degrees, str):
+        return degrees
+    return _refusal(device) or (
+        'its angles are unknown' if angle(device, axis) is None else
+        _aim(device, axis, math.radians(degrees)))
+
+
+def _aim(device: Device, axis: str, aim: float) -> Request:
     # NaN leaves an axis as it is. The newest setpoint replaces others, so it has their targets.
     targets = {one: aim if one == axis else device.wants(one, math.nan) for one in AXES}
     return Request(
@@ -80,6 +97,13 @@ def point(device: Device, typed: str) -> Request | str:
     return _refusal(device) or Request(
         f'point at {typed}', f'{device.prefix}cmd/roi', NavSatFix,
         NavSatFix(latitude=latitude, longitude=longitude, altitude=altitude))
+
+
+def _shows(device: Device, name: str, value: float) -> bool:
+    """Return whether an axis shows an angle within :data:`TOLERANCE`."""
+    known = angle(device, name)
+    return known is not None and (
+        abs(math.remainder(known - value, math.tau)) <= math.radians(TOLERANCE))
 
 
 def take_control(device: Device, typed: str) -> Request:
@@ -126,10 +150,19 @@ VIEW = shared.View(
      Key(('n',), 'neutral position', neutral),
      Key(('p',), 'point at a place', point,
          'latitude, longitude (degrees) and altitude (m above the ellipsoid)'),
+     *(Key((key,), axis, functools.partial(turn, axis=axis),
+           f'{axis}, degrees {AXES[axis][1]}, below 0 {AXES[axis][2]}')
+       for key, axis in (('d', 'pitch'), ('y', 'yaw'))),
      shared.RELEASE_SOURCE),
     steering=[Key((key,), f'by {STEP:g} deg', functools.partial(nudge, axis=axis, step=step))
               for key, axis, step in (('left', 'yaw', STEP), ('right', 'yaw', -STEP),
                                       ('up', 'pitch', -STEP), ('down', 'pitch', STEP))],
     states={'ours': 'bold green', 'ok': 'green'},
     state=lambda device: 'ours' if device.values.get('in_control') else (
-        'ok' if device.values else shared.NOT_KNOWN))
+        'ok' if device.values else shared.NOT_KNOWN),
+    settings={
+        **shared.trigger_settings('take_control'),
+        **{axis: functools.partial(turn, axis=axis) for axis in AXES},
+        **shared.trigger_settings('neutral', 'release_control'),
+        'release': shared.if_true(shared.release_source)},
+    shows=_shows)

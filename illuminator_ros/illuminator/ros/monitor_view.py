@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 import functools
+import math
 import re
 
 from rcl_interfaces.srv import SetParametersAtomically
@@ -51,7 +52,17 @@ def dim(device: Device, typed: str, step: float) -> Request | str:
     if start is None:
         return 'its brightness is not known yet'
     target = min(max(round(start + step, 1), 0.0), 100.0) if step else start
-    text = f'brightness {target:g} %' if step else 'keep on'
+    return _shine(device, target, '' if step else 'keep on')
+
+
+def shine(device: Device, typed: str) -> Request | str:
+    """Set a brightness, %."""
+    target = shared.number(typed, '%', 0.0, 100.0)
+    return target if isinstance(target, str) else _shine(device, target)
+
+
+def _shine(device: Device, target: float, text: str = '') -> Request:
+    text = text or f'brightness {target:g} %'
     if device.prefix:
         return Request(text, f'{device.prefix}cmd/brightness', Float32, Float32(data=target),
                        {'brightness': target})
@@ -93,6 +104,25 @@ def strobe(device: Device, typed: str) -> Request | str:
     return _set(f'strobe {STROBE_PERIOD:g} s, {duty:g} %',
                 f'let {device.name} strobe? Flashing light can cause seizures.',
                 strobe_period=STROBE_PERIOD, strobe_duty_cycle=duty)
+
+
+def _set_typed(device: Device, typed: str, name: str, unit: str, highest: float) -> Request | str:
+    """Set a parameter that is a number."""
+    value = shared.number(typed, unit, 0.0, highest)
+    if isinstance(value, str):
+        return value
+    return f'the source {device.source} cannot: {name} is a parameter' if device.prefix else (
+        _set(f'{name} {value:g} {unit}', '', **{name: value}))
+
+
+def _enable(device: Device, typed: str) -> Request | str:
+    return (switch(device, on=typed == 'true') if typed in ('true', 'false') else
+            shared.WrongText(f'{typed!r} is neither true nor false'))
+
+
+def _shows(device: Device, name: str, value: float) -> bool:
+    known = agreed(device)
+    return known is not None and abs(known - value) < 0.5
 
 
 def _set(text: str, question: str = '', **values: float) -> Request:
@@ -140,9 +170,19 @@ VIEW = shared.View(
      Key(('-', '_', 'left'), 'darker 10 %', functools.partial(dim, step=-STEP)),
      Key(('.', '>'), 'brighter 1 %', functools.partial(dim, step=FINE_STEP), has_button=False),
      Key(('comma', '<'), 'darker 1 %', functools.partial(dim, step=-FINE_STEP), has_button=False),
+     Key(('i',), 'brightness', shine, 'brightness, %'),
      Key(('o',), 'keep on', keep_on), Key(('s',), 'strobe', strobe),
      shared.trigger_key('r', 'refresh', 'refresh'), shared.RELEASE_SOURCE),
     states={'ON': 'bold green', 'off': ''},
     state=lambda device: {True: 'ON', False: 'off', None: shared.NOT_KNOWN}[
         device.values.get('enabled')],
-    trend=temperature, is_dangerous=is_dangerous, notice=_notice, off=switch_off)
+    trend=temperature, is_dangerous=is_dangerous, notice=_notice, off=switch_off,
+    settings={
+        'brightness': shine,
+        'strobe_duty_cycle': functools.partial(
+            _set_typed, name='strobe_duty_cycle', unit='%', highest=100.0),
+        'strobe_period': functools.partial(
+            _set_typed, name='strobe_period', unit='s', highest=math.inf),
+        'enable': _enable, **shared.trigger_settings('refresh'),
+        'release': shared.if_true(shared.release_source)},
+    shows=_shows)

@@ -65,4 +65,5 @@ VIEW = shared.View(
         _inputs(device), place(device)),
     _details,
     (trigger_key('space', 'capture', 'capture'),
-     trigger_key('b', 'capture panel', 'capture_panel'), trigger_key('p', 'ping', 'ping')))
+     trigger_key('b', 'capture panel', 'capture_panel'), trigger_key('p', 'ping', 'ping')),
+    settings=shared.trigger_settings('capture', 'capture_panel', 'ping'))
