@@ -201,3 +201,27 @@ def test_page_names_each_installed_file() -> None:
     assert named == {str(path.relative_to(ROOT / 'config'))
                      for path in (ROOT / 'config').rglob('*') if path.is_file()}
     assert set(re.findall(r'ros2 launch illuminator_ros (\S+)', PAGE)) == set(FILES)
+
+
+def test_each_link_of_a_vehicle_has_its_section_in_the_parameter_file() -> None:
+    sections = yaml.safe_load((ROOT / 'config' / 'vehicle.yaml').read_text())
+    included = [FILES[Path(include.attrib['file']).name]
+                for include in FILES['vehicle.launch.xml'].iterfind('group/include')]
+    names = [one.attrib['default'] for launch in included for one in launch.findall('arg')
+             if one.attrib['name'] == 'name']
+
+    assert [*sections] == [f'/**/{name}' for name in names]
+    for section in sections.values():
+        assert 'connection_url' in section['ros__parameters']
+
+
+def test_each_include_of_a_vehicle_is_in_a_group_of_its_own_with_the_common_arguments() -> None:
+    vehicle = FILES['vehicle.launch.xml']
+    common = {'namespace', 'params_file', 'log_level', 'respawn'}
+
+    assert not vehicle.findall('include')
+    for group in vehicle.findall('group'):
+        [include] = group.findall('include')
+        given = {one.attrib['name']: one.attrib['value'] for one in include.findall('arg')}
+        assert {*given} <= {*declared(FILES[Path(include.attrib['file']).name])}
+        assert {name: f'$(var {name})' for name in common}.items() <= given.items()
