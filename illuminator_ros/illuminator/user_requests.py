@@ -56,10 +56,10 @@ class UserRequests:
             return False
         if new.is_wish:
             self._rules.note_request(now)
-            requests.claim(new.source, now)
         if not self._liveness.connected:
             return self._refuse_lost(new, now, is_off=is_off, is_held=is_held)
         if not is_held and self._is_repetition(new, now):
+            requests.claim(new.source, now)
             requests.reply(new, Result(False, 'repeated', superseded=True))
         elif is_held or self._is_right(new, off_is_under_way=off_is_under_way):
             if new.is_call and not is_held and not requests.are_calling:

@@ -66,7 +66,8 @@ class Property(Generic[S]):
             attempt.serve({one: part for one, part in parts.items() if one.since <= attempt.began})
             return ended
         if attempt is not None:
-            ended = self.withdraw(f'superseded by {self._plan(goal)[0].goal}' if goal else '', now)
+            text = f'superseded by {self._plan(goal)[0].goal}' if goal else 'no longer wanted'
+            ended = self.withdraw(text, now)
         if goal is not None:
             self._start(goal, now, newest, gap)
         return ended

@@ -271,7 +271,9 @@ class Requests:
             if is_request and old.why is Why.REQUEST and old.source != new.source:
                 self._take_from(old, f'held by {new.source}', now)
             elif (old.is_open and old.why in ENDS.get(new.why, ()) and new.contradicts(old)
+                  # A call that fails leaves nothing behind, and a rule that it outranks stays.
                   and not (old.is_call and new.why is Why.RELEASE)
+                  and not (new.is_call and old.why is Why.RELEASE)
                   and not (old.is_wish and new.is_wish)):
                 self.end(old, Result(False, text, superseded=True), now)
         if new.values.get('enabled') is False:
@@ -346,6 +348,8 @@ class Requests:
             for old in [*self.standing]:
                 if old.why in WEAK:
                     self.drop(old, [*one.values.keys() & old.values.keys()])
+                elif old.why is Why.RELEASE and one.contradicts(old):
+                    self.end(old, Result(False, result.message, superseded=True), now)
             if one.is_call:
                 self._remember(Request(one.values, one.why, one.since, one.source,
                                        is_open=False, may_be_repeated=False), now)
@@ -391,30 +395,45 @@ class Requests:
         """
         if not self.are_ranked:
             return None
+        was_commander, before = source == self.commander, self._claimed()
         calls = [one for one in self.standing if one.is_call and one.source == source]
         for one in calls:
             self.end(one, Result(False, f'released by {source}', superseded=True), now)
         change = self.claims.release(source, now)
-        if calls and change is None and self.claims.holder is None:
-            change = HolderChanged(source, None, Cause.RELEASE)
-        return self._expired(change, now)
+        if calls and was_commander and change is None:
+            change = HolderChanged(source, self.claims.holder, Cause.RELEASE)
+        return self._expired(change, before, now)
 
     def expire(self, now: float) -> HolderChanged[str] | None:
         """End the claims of silent sources; return the change of the holder."""
         if not self.are_ranked or now < self.claims.next_deadline():
             return None
-        return self._expired(self.claims.poll(now), now)
+        before = self._claimed()
+        return self._expired(self.claims.poll(now), before, now)
+
+    def _claimed(self) -> set[str]:
+        """Return the sources with wishes that have claimed the device."""
+        return {one.source for one in self.standing
+                if one.is_wish and self.claims.is_claimed_by(one.source)}
 
     def _expired(
-        self, change: HolderChanged[str] | None, now: float,
+        self, change: HolderChanged[str] | None, before: set[str], now: float,
     ) -> HolderChanged[str] | None:
+        """
+        End the wishes of sources whose claim has ended.
+
+        An open wish of the last holder is still sent if no source follows.
+
+        :param before: the sources that had claimed the device before.
+        """
         for one in [*self.standing]:
             if not one.is_wish or self.claims.is_claimed_by(one.source):
                 continue
+            was_holder = change is not None and change.before == one.source
             if change is not None and change.after is not None:
                 self.end(one, Result(False, f'held by {change.after}', superseded=True), now)
-            elif change is None or one.source != change.before or not one.is_open:
-                self.standing.remove(one)
+            elif not one.is_open or one.source in before and not was_holder:
+                self.end(one, Result(False, f'released by {one.source}', superseded=True), now)
         if change is not None and self.are_ranked:
             self._report(change, now)
         return change

@@ -353,6 +353,7 @@ def test_an_on_of_a_call_goes_on_when_the_hold_of_a_lower_source_ends() -> None:
     shared.light.results.clear()
 
     assert shared.pair.wait_for(answer).success
+    shared.pair.run(2.0)
     assert (shared.light.fields['enable'], shared.holder) == (1, 'operator')
 
 
@@ -412,6 +413,34 @@ def test_a_call_that_fails_repeats_no_off_that_another_sender_has_undone() -> No
     shared.pair.run(1.0)
 
     assert (shared.light.fields['enable'], shared.holder) == (1, 'autonomy')
+
+
+def test_a_message_that_is_not_sent_claims_no_light() -> None:
+    shared = Shared(timeout=60.0)
+    shared.pair.settle()
+    shared.pair.close()
+    shared.enable('safety', True)
+    shared.pair.open()
+    shared.pair.run(1.0)
+
+    assert shared.holder == ''
+    assert shared.pair.wait_for(shared.call('operator', False)).success
+
+
+def test_the_off_of_a_release_outlives_a_call_that_fails_with_the_link() -> None:
+    shared = Shared(off_on_release=True, timeout=60.0)
+    shared.pair.settle()
+    shared.pair.wait_for(shared.enable('operator', True))
+    shared.light.results[ON_OFF] = mavlink.MAV_RESULT_FAILED
+    shared.release('operator')
+    shared.pair.run(0.5)
+    shared.call('autonomy', True)
+    shared.pair.close()
+    shared.light.results.clear()
+    shared.pair.open()
+    shared.pair.run(3.0)
+
+    assert (shared.holder, shared.light.fields['enable']) == ('', 0)
 
 
 def test_an_off_of_the_next_source_is_sent_when_the_light_is_heard_again() -> None:
@@ -649,6 +678,7 @@ def test_the_highest_source_wins_within_one_turn_and_only_its_requests_are_sent(
     shared = Shared(seed=seed, drop=draw.choice((0.0, 0.3)), duplicate=draw.choice((0.0, 0.2)),
                     delay=draw.choice((0.0, 0.3)), reorder=0.1)
     pair, model = shared.pair, Model()
+    pair.run_until(lambda: pair.snapshot.configuration)
     # Each source has brightnesses of its own, which identify its frames.
     of_source = {name: 10.0 * (index + 1) for index, name in enumerate(NAMES)}
     desired: dict[str, list[bool]] = {name: [] for name in NAMES}

@@ -188,6 +188,13 @@ ROWS: dict[str, tuple[list[Any], Shown, bool | None, dict[str, Any] | None, dict
         [Topic(ON), Release('default'), Rule(Why.RELEASE, OFF)], LIGHT, False, None,
         {0: 'RELEASE'}),
     'a release does not end a call': ([Call(ON), Rule(Why.RELEASE, OFF)], LIGHT, True, None, {}),
+    'a call that succeeds ends a release': (
+        [Rule(Why.RELEASE, OFF), Call(ON), shown(1)], LIGHT, None, None, {1: 'shown'}),
+    'also one that comes during the call': (
+        [Call(ON), Rule(Why.RELEASE, OFF), shown(0)], LIGHT, None, None, {0: 'shown'}),
+    'a call that fails leaves a release': (
+        [Rule(Why.RELEASE, OFF), Call(ON), failed(1)], LIGHT, False, None, {1: 'failed'}),
+    'a message ends a release': ([Rule(Why.RELEASE, OFF), Topic(ON)], LIGHT, True, None, {}),
     'it is sent when the call has failed': ([Call(ON), Rule(Why.RELEASE, OFF), failed(0)], LIGHT,
                                             False, None, {0: 'failed'}),
     'a setpoint leaves a release': ([Rule(Why.RELEASE, OFF), Topic(b(10.0))], LIGHT, False,
@@ -253,6 +260,12 @@ ROWS: dict[str, tuple[list[Any], Shown, bool | None, dict[str, Any] | None, dict
         {0: 'shown', 2: 'shown'}),
     'a release ends the calls of its source': ([Call(ON, 'safety'), Release('safety')], LIGHT,
                                                None, None, {0: 'released by safety'}),
+    'the wish of the holder follows a released call': (
+        [Topic(OFF), shown(0), Call(ON, 'safety'), Release('safety')], LIGHT, False, None,
+        {0: 'shown', 2: 'released by safety'}),
+    'a release of another source leaves what goes on': (
+        [Topic(OFF, 'operator'), Release('operator'), Release('default'), Release('safety')],
+        LIGHT, False, None, {}),
     'a message under way goes on after it': ([Topic(OFF, 'safety'), Release('safety')], LIGHT,
                                              False, None, {}),
     'but not past the next source': (
