@@ -19,7 +19,7 @@ from std_srvs.srv import SetBool, Trigger
 
 # Change these: the nodes, the brightness, %, the directions (degrees down, degrees left), and s
 # at each of them.
-LIGHT, GIMBAL = '/illuminator', '/gimbal'
+LIGHT, GIMBAL = 'illuminator', 'gimbal'
 BRIGHTNESS = 40.0
 PATTERN = [(20, 40), (20, 0), (20, -40), (40, -40), (40, 0), (40, 40)]
 DWELL = 2.0

@@ -18,7 +18,7 @@ from std_srvs.srv import SetBool
 
 # Change these: the node of the light, its brightness usually and with a problem, %, and how long
 # to wait for the light to show it first, s.
-LIGHT = '/illuminator'
+LIGHT = 'illuminator'
 BRIGHTNESS, DIMMED = 40.0, 10.0
 TIMEOUT = 10.0
 
@@ -44,7 +44,7 @@ class Searchlight(Node):
     def take_diagnostics(self, message: DiagnosticArray) -> None:
         for status in message.status:
             node = {one.key: one.value for one in status.values}.get('node')
-            if node == LIGHT:
+            if node == self.resolve_topic_name(LIGHT):
                 is_fine = status.level == DiagnosticStatus.OK
                 self.findings[status.name] = '' if is_fine else status.message
                 if status.name.endswith(': lamp'):

@@ -19,7 +19,7 @@ from std_srvs.srv import Trigger
 
 # Change these: the camera's node, the vehicle's position, m between images, s to wait for an
 # answer, which the node gives within 5 s, and the list.
-CAMERA, FIX = '/rededge', '/gps/fix'
+CAMERA, FIX = 'rededge', 'gps/fix'
 DISTANCE = 10.0
 TIMEOUT = 8.0
 LIST = 'images.csv'

@@ -56,7 +56,9 @@ def node(ros: Ros, name: str, port: int, *arguments: str, **parameters: Any) -> 
         env={'ROS_DOMAIN_ID': str(ros.domain)}))
 
 
-def example(ros: Ros, name: str, folder: Path, **changes: str) -> Any:
+def example(
+    ros: Ros, name: str, folder: Path, *arguments: str, **changes: str,
+) -> Any:
     """Run an example with other values in the lines that a reader changes."""
     text = (ROOT / 'examples' / f'{name}.py').read_text()
     head, marked, rest = re.split(r'(?s)(\n# Change these: .*?\n\n)', text)
@@ -64,7 +66,7 @@ def example(ros: Ros, name: str, folder: Path, **changes: str) -> Any:
         marked, count = re.subn(rf'(?m)^{variable} = .*', f'{variable} = {value}', marked)
         assert count == 1
     (folder / f'{name}.py').write_text(head + marked + rest)
-    return Program(sys.executable, f'{name}.py', cwd=folder,
+    return Program(sys.executable, f'{name}.py', *arguments, cwd=folder,
                    env={'ROS_DOMAIN_ID': str(ros.domain)})
 
 
@@ -87,6 +89,18 @@ def test_the_searchlight_dims_while_it_is_hot_and_goes_off_however_the_program_e
             eventually(lambda: not light.enabled)
         else:
             assert (status, light.enabled) == (0, False), program.log
+
+
+def test_the_searchlight_uses_the_light_of_its_namespace_and_its_diagnostics(
+        own_ros: Ros, tmp_path: Path) -> None:
+    port, light = free_port(), SimulatedIlluminator(IlluminatorProperties())
+    namespace = ['--ros-args', '-r', '__ns:=/uav1']
+    with (node(own_ros, 'bridge', port, '-r', '__ns:=/uav1'), served(port, light) as link,
+          ended(example(own_ros, 'searchlight', tmp_path, *namespace))):
+        eventually(lambda: light.enabled)
+        link.ask(lambda now: light.heat_to(85.0, now))
+
+        eventually(lambda: light.configuration.brightness == 10.0)
 
 
 @pytest.mark.parametrize(('fault', 'lines'), [
