@@ -5,13 +5,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from importlib.metadata import entry_points
+import logging
 
 from ..payload.payload_type import PayloadType
 
 # The payload of the executables without ``--payload``, and of ``bridge``.
 DEFAULT_PAYLOAD = 'illuminator'
-PAYLOADS: Mapping[str, PayloadType] = {one.name: one for one in (
+# The entry points by which other packages add payloads.
+GROUP = 'illuminator_ros.payloads'
+OWN_PAYLOADS: Mapping[str, PayloadType] = {one.name: one for one in (
     PayloadType(
         'illuminator', ros='illuminator_ros.illuminator.ros.lights:ILLUMINATOR',
         simulated='illuminator_ros.illuminator.simulated:SIMULATED',
@@ -31,3 +35,24 @@ PAYLOADS: Mapping[str, PayloadType] = {one.name: one for one in (
         simulated='illuminator_ros.gimbal.simulated_manager:SIMULATED',
         checks='illuminator_ros.gimbal.checks.manager:CHECKS'),
 )}
+
+
+def _of_other_packages() -> Iterator[PayloadType]:
+    """Import the payloads of other packages; one that cannot be imported is a warning."""
+    for entry in entry_points(group=GROUP):
+        try:
+            payload = entry.load()
+        except Exception as error:  # noqa: B902
+            # The import of another package may fail in any way.
+            reason = f'{type(error).__name__}: {error}'
+        else:
+            if isinstance(payload, PayloadType) and payload.name not in OWN_PAYLOADS:
+                yield payload
+                continue
+            reason = 'it is not a PayloadType with a name of its own'
+        logging.getLogger(__name__).warning(
+            'payload %s (%s) is ignored: %s', entry.name, entry.value, reason)
+
+
+PAYLOADS: Mapping[str, PayloadType] = {
+    **OWN_PAYLOADS, **{one.name: one for one in _of_other_packages()}}

@@ -21,6 +21,8 @@ class PayloadType(NamedTuple):
     :param simulated: its simulated device.
     :param checks: the requirements that ``conformance`` checks.
     :param view: how the monitor shows its devices.
+    :param kind: the kind of a component that shows one, as ``discover`` names it; for a payload
+        of another package.
     """
 
     name: str
@@ -28,6 +30,7 @@ class PayloadType(NamedTuple):
     simulated: str = ''
     checks: str = ''
     view: str = ''
+    kind: str = ''
 
     def load(self, part: str) -> Any:
         """

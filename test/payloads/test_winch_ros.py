@@ -3,8 +3,10 @@
 
 """The bridge serves a winch beside a light: one process, one link, one address."""
 
+from collections.abc import Mapping
 import contextlib
 from contextlib import AbstractContextManager
+from pathlib import Path
 import sys
 
 from illuminator_ros.cli.bridge import Executable, usage
@@ -18,34 +20,40 @@ from support.ports import free_port  # noqa: E402
 from support.processes import ended, Program  # noqa: E402
 from support.ros import own_domain, Ros  # noqa: E402
 from support.waiting import eventually  # noqa: E402
+from support.winch_package import install_winch  # noqa: E402
 
 PROGRAM = """
 import sys
 from illuminator_ros.cli import {name}
-from illuminator_ros.cli.payloads import PAYLOADS
-from payloads.winch import WINCH
-sys.exit({name}.main(payloads={{**PAYLOADS, 'winch': WINCH}}{options}))
+sys.exit({name}.main({options}))
 """
 
 
+@pytest.fixture
+def env(tmp_path: Path) -> Mapping[str, str]:
+    """Return the environment in which the winch is an installed package."""
+    return install_winch(tmp_path)
+
+
 def program(
-    name: str, *arguments: str, domain: int, options: str = '',
+    name: str, *arguments: str, env: Mapping[str, str], domain: int, options: str = '',
 ) -> AbstractContextManager[Program]:
     code = PROGRAM.format(name=name, options=options)
     return ended(Program(
-        sys.executable, '-c', code, *arguments, env={'ROS_DOMAIN_ID': str(domain)}))
+        sys.executable, '-c', code, *arguments, env={**env, 'ROS_DOMAIN_ID': str(domain)}))
 
 
-def test_light_and_winch_are_served_by_one_bridge_and_one_simulator() -> None:
+def test_light_and_winch_are_served_by_one_bridge_and_one_simulator(
+        env: Mapping[str, str]) -> None:
     port = free_port()
     with contextlib.ExitStack() as stack:
         domain = stack.enter_context(own_domain())
         stack.enter_context(program(
             'simulator', f'udpout://127.0.0.1:{port}', '--payload', 'illuminator,winch',
-            domain=domain))
+            env=env, domain=domain))
         bridge = stack.enter_context(program(
             'bridge', f'udpin://127.0.0.1:{port}', '--ros-args', '-p',
-            'payloads:=[illuminator, winch]', domain=domain))
+            'payloads:=[illuminator, winch]', env=env, domain=domain))
         ros = Ros(domain)
         stack.callback(ros.close)
         enabled = ros.subscribe(Bool, '/illuminator/enabled')
@@ -66,12 +74,14 @@ def test_light_and_winch_are_served_by_one_bridge_and_one_simulator() -> None:
         eventually(lambda: bridge.count('confirmed by WINCH_STATUS: MAV_RESULT_ACCEPTED'))
 
 
-def test_executable_of_one_payload_has_its_node_name_link_defaults_and_help() -> None:
+def test_executable_of_one_payload_has_its_node_name_link_defaults_and_help(
+        env: Mapping[str, str]) -> None:
     with own_domain() as domain:
-        with program('bridge', '--help', domain=domain, options=", payload='winch'") as shown:
+        with program('bridge', '--help', env=env, domain=domain,
+                     options="payload='winch'") as shown:
             assert shown.wait() == 0
         with (program('bridge', f'udpout://127.0.0.1:{free_port()}', '--ros-args', '--log-level',
-                      'debug', domain=domain, options=", payload='winch'") as winch,
+                      'debug', env=env, domain=domain, options="payload='winch'") as winch,
               contextlib.closing(Ros(domain)) as ros):
             winch.wait_for('sent from 1/195: HEARTBEAT ')
             eventually(lambda: ('winch', '/') in ros.node.get_node_names_and_namespaces())

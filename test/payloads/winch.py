@@ -33,7 +33,7 @@ from illuminator_ros.simulation import simulated
 from illuminator_ros.simulation.faults import Behaviour
 
 WINCH = PayloadType('winch', ros='payloads.winch_ros:WINCH', simulated='payloads.winch:SIMULATED',
-                    checks='payloads.winch:CHECKS', view='payloads.winch_ros:VIEW')
+                    checks='payloads.winch:CHECKS', view='payloads.winch_ros:VIEW', kind='winch')
 WinchStatus = mavlink.MAVLink_winch_status_message
 
 

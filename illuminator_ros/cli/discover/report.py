@@ -10,12 +10,16 @@ import shlex
 from typing import Any
 
 from ..arguments import invocation
+from ..payloads import OWN_PAYLOADS, PAYLOADS
 from ...mavlink.component_kinds import AUTOPILOT, GIMBAL, LIGHT, MANAGER, MICASENSE
 from ...mavlink.listener import Listener, NOT_ASKED
 from ...mavlink.url import SerialUrl
 
 CAMERA = ['rededge']
-SERVED = {LIGHT, MANAGER, GIMBAL, MICASENSE}
+# The payloads of other packages, by the kind of component.
+OTHERS = {one.kind: name for name, one in PAYLOADS.items()
+          if one.kind and name not in OWN_PAYLOADS}
+SERVED = {LIGHT, MANAGER, GIMBAL, MICASENSE, *OTHERS}
 NOT_SERVED = ('none of these is a light, a gimbal or a MicaSense camera; an autopilot or router '
               'may forward their frames only to a program that sends, unlike this one')
 ONLY_VERSION_1 = ('only MAVLink 1 is heard, which cannot carry the messages of a light or a '
@@ -62,12 +66,17 @@ def url_of(port: Listener) -> str:
 
 def executable(payloads: list[str]) -> str:
     """Return the command that serves payloads, in the form in which this program was run."""
-    name = 'bridge' if payloads[0] == 'illuminator' else payloads[0]
-    return invocation('discover').removesuffix('discover') + name
+    return invocation('discover').removesuffix('discover') + program(payloads[0])
+
+
+def program(payload: str) -> str:
+    """Return the executable whose first payload is the given one, or may be."""
+    return 'bridge' if payload == 'illuminator' or payload not in OWN_PAYLOADS else payload
 
 
 def _command(port: Listener, payloads: list[str], signed: bool) -> str:
-    parameters = [f'payloads:="[{", ".join(payloads)}]"'] if payloads[1:] else []
+    selects = len(payloads) > 1 or payloads[0] not in OWN_PAYLOADS
+    parameters = [f'payloads:="[{", ".join(payloads)}]"'] if selects else []
     if signed:
         parameters += ['signing_mode:=sign', 'signing_key_file:=KEY_FILE']
     return ' '.join([
@@ -79,7 +88,8 @@ def payloads_for(found: set[str]) -> list[list[str]]:
     """Return the payloads that serve kinds, by process: only a camera needs MAVLink 1."""
     managed = MANAGER in found or {GIMBAL, AUTOPILOT} <= found
     shared = [*(['illuminator'] if LIGHT in found else []),
-              *(['gimbal'] if managed else ['gimbal_manager'] if GIMBAL in found else [])]
+              *(['gimbal'] if managed else ['gimbal_manager'] if GIMBAL in found else []),
+              *(name for kind, name in OTHERS.items() if kind in found)]
     return [*([shared] if shared else []), *([CAMERA] if MICASENSE in found else [])]
 
 

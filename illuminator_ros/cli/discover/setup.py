@@ -18,7 +18,7 @@ import sys
 import threading
 from typing import Any, TypeVar
 
-from .report import executable, payloads_for
+from .report import executable, OTHERS, payloads_for, program
 from ..entry_point import Refusal
 from ...illuminator.client import IlluminatorClient
 from ...illuminator.model import SafetyLimits
@@ -104,6 +104,8 @@ def set_up(reports: Sequence[Mapping[str, Any]], given: Sequence[str]) -> int:
     payload, url = payloads_for({*device['kinds'], *others})[0][0], report['url']
     name = ask('name', 'name of its node', payload, matching('[A-Za-z][A-Za-z0-9_]*', 'a name'))
     values: dict[str, object] = {'connection_url': url}
+    if payload in OTHERS.values():
+        values['payloads'] = [payload]
     if payload == 'illuminator':
         values |= {'target_system': address.system, 'target_component': address.component}
         for key, question, default, reader in PARAMETERS:
@@ -121,7 +123,7 @@ def set_up(reports: Sequence[Mapping[str, Any]], given: Sequence[str]) -> int:
         for key, value in values.items())}
     if ask('boot', f'start it at boot: write {unit}, too', 'no', yes):
         files[unit] = Path(__file__).with_name('unit.service').read_text().format(
-            name=name, executable='bridge' if payload == 'illuminator' else payload,
+            name=name, executable=program(payload),
             user=getpass.getuser(), folder=Path(__file__).parents[3], python=sys.executable,
             arguments=arguments, environment='\n'.join(
                 f'Environment="{key}={os.environ[key]}"'.replace('%', '%%')
