@@ -6,8 +6,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from importlib.metadata import entry_points
-import logging
+from functools import cached_property
 
 from ..payload.payload_type import PayloadType
 
@@ -39,6 +38,9 @@ OWN_PAYLOADS: Mapping[str, PayloadType] = {one.name: one for one in (
 
 def _of_other_packages() -> Iterator[PayloadType]:
     """Import the payloads of other packages; one that cannot be imported is a warning."""
+    # Slow to import: signals are handled before.
+    from importlib.metadata import entry_points
+    import logging
     for entry in entry_points(group=GROUP):
         try:
             payload = entry.load()
@@ -54,5 +56,21 @@ def _of_other_packages() -> Iterator[PayloadType]:
             'payload %s (%s) is ignored: %s', entry.name, entry.value, reason)
 
 
-PAYLOADS: Mapping[str, PayloadType] = {
-    **OWN_PAYLOADS, **{one.name: one for one in _of_other_packages()}}
+class _Payloads(Mapping[str, PayloadType]):
+    """All payloads, those of other packages too; these are looked for when they are needed."""
+
+    @cached_property
+    def _all(self) -> Mapping[str, PayloadType]:
+        return {**OWN_PAYLOADS, **{one.name: one for one in _of_other_packages()}}
+
+    def __getitem__(self, name: str) -> PayloadType:
+        return self._all[name]
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._all)
+
+    def __len__(self) -> int:
+        return len(self._all)
+
+
+PAYLOADS: Mapping[str, PayloadType] = _Payloads()

@@ -28,10 +28,16 @@ def plan_switch(goal: Goal) -> tuple[Change[Status], Mapping[Request, Change[Sta
     return change, dict.fromkeys(goal.serves, change)
 
 
+def _waits(one: Request, goal: Goal, name: str) -> bool:
+    """Return whether a field of a rule waits until the light is on."""
+    return (name == 'brightness' and not goal.values.brightness
+            and bool(one.values[name]) and one.why in WEAK)
+
+
 def plan_configuration(goal: Goal) -> tuple[Change[Status], Mapping[Request, Change[Status]]]:
     """Return the command of a goal of the configuration, and what each request asks of it."""
     asked: dict[Request, list[str]] = {one: [
-        name for name in FIELDS if name in one.values
+        name for name in FIELDS if name in one.values and not _waits(one, goal, name)
         or goal.note and name == 'strobe_duty_cycle' and 'strobe_period' in one.values]
         for one in goal.serves}
     whole = [name for name in FIELDS if any(name in names for names in asked.values())]
@@ -316,7 +322,7 @@ class LightControl:
             self._twin.failure = Failure(
                 result.message, change.configuration, self._twin.status)
         if one.why in WEAK:
-            self._rules.ended(one, result, now)
+            self._rules.ended(one, change.names, result, now)
         else:
             self._end(one, result, now)
 

@@ -5,7 +5,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Collection
 import math
 from typing import Any
 
@@ -196,10 +196,20 @@ class Rules:
         if shown and any(one.tried for one in rules) and not self.weak:
             self._report(True, f'{describe(shown)}, {CONFIRMED}')
 
-    def ended(self, one: Request, result: Result, now: float) -> None:
-        """Take the result of the command of a rule; one that failed is tried again later."""
+    def ended(
+        self, one: Request, names: Collection[str], result: Result, now: float,
+    ) -> None:
+        """
+        Take the result of the command of a rule; one that failed is tried again later.
+
+        :param names: the fields that the command has set; others wait until the light is on.
+        """
         if result.success:
-            self._requests.end(one, result, now)
+            if one.values.keys() <= set(names):
+                self._requests.end(one, result, now)
+            else:
+                one.is_under_way = False
+                self._requests.drop(one, names)
             self._report(True, result.message)
         elif result.permanent:
             for rule in self.weak:

@@ -161,7 +161,7 @@ class Fence(NamedTuple):
     The time in which frames of other commands may be under way, so that a status proves nothing.
 
     :param ends_at: s.
-    :param frames: of the same command that were not acknowledged.
+    :param frames: of the command before that were not acknowledged.
     :param is_proved: whether a status that shows the change counts all the same, since none of
         these frames can have caused it.
     """
@@ -354,6 +354,9 @@ class Attempt(Generic[S]):
         transmission, sending = self._transmission, self._sending
         if now < self._fence.ends_at:
             return sending is Sending.AT_THE_END and transmission.tries >= ENOUGH_TRIES
+        if sending is not Sending.ONCE and transmission.first_sent < self._fence.ends_at:
+            # This turn is late: the try at the end of the fence is still due.
+            return False
         is_answered = transmission.result is not None or self._answer is not None
         return is_answered or (
             transmission.tries >= ENOUGH_TRIES if sending.insists else transmission.is_last_try)

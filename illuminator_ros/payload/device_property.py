@@ -50,7 +50,7 @@ class Property(Generic[S]):
         self, goal: Goal | None, now: float, newest: S | None, gap: float | None,
     ) -> list[Served[S]]:
         """
-        Have what is wanted under way, and go on with what is.
+        Send the command of a goal, unless an equal command is under way.
 
         :param newest: the newest status, None before the first.
         :param gap: between the last two statuses, None if none has come.
@@ -105,7 +105,7 @@ class Property(Generic[S]):
         return newest is not None and change.shown_by(newest) is False
 
     def withdraw(self, text: str, now: float) -> list[Served[S]]:
-        """Send the command no more; return those of its requests that have no other place."""
+        """Send the command no more; return its open requests."""
         attempt = self.attempt
         if attempt is None:
             return []

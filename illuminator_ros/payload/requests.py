@@ -159,7 +159,7 @@ class Goal(NamedTuple):
 
     @classmethod
     def of(cls, values: Any, serves: tuple[Request, ...], **how: Any) -> Goal:
-        """Return the goal that serves some requests; ``how`` has the first of the other fields."""
+        """Return the goal that serves some requests; ``how``: until, note, waits."""
         reasons = {one.why for one in serves}
         return cls(values, serves, **how, is_awaited=any(one.is_call for one in serves),
                    insists=not reasons.isdisjoint(INSISTENT), is_last=Why.END in reasons)
@@ -240,7 +240,7 @@ class Requests:
     # Requests come
 
     def put(self, new: Request, now: float) -> None:
-        """Make a request: the only way in. It ends what it contradicts, and lower sources."""
+        """Make a request. It ends those that it contradicts, and those of lower sources."""
         if not self.are_ranked:
             new.source = DEFAULT
         held = self.refusal(new.source) if new.why is Why.REQUEST else ''
@@ -248,7 +248,6 @@ class Requests:
             self.reply(new, Result(False, held))
             if new.is_call:
                 return
-            new.done = no_reply
         elif new.is_call and self._are_too_many(new):
             self.reply(new, Result(
                 False, f'{MAX_CALLS} requests are waiting for {self._device} already'))

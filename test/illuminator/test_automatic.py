@@ -448,6 +448,19 @@ def test_what_is_restored_does_not_switch_a_light_on_where_brightness_is_the_swi
     assert (light.fields['enable'], light.fields['strobe_period']) == (0, 1.0)
 
 
+def test_a_brightness_that_is_restored_waits_for_the_on_where_it_is_the_switch() -> None:
+    light = FakeLight(enable=1, brightness=80.0, strobe_period=1.0, strobe_duty_cycle=50.0)
+    light.brightness_is_switch = True
+    pair = Pair(light).settle()
+    light.restart(pair.now, enable=0, brightness=0.0)
+    pair.run(5.0)
+    assert (light.fields['enable'], light.fields['strobe_period']) == (0, 1.0)
+    light.fields |= {'enable': 1, 'brightness': 50.0}
+    pair.run(5.0)
+
+    assert light.fields['brightness'] == 80.0
+
+
 def test_a_set_of_another_field_does_not_undo_an_off_where_brightness_is_the_switch() -> None:
     light, pair = dark()
     off, configured = pair.ask_enable(False), pair.ask_configure(strobe_period=1.0)

@@ -181,6 +181,15 @@ def test_a_status_before_an_acknowledgement_the_last_try_or_the_fence_does_not_c
     assert not bench.ended.success
 
 
+def test_a_status_that_is_read_before_the_try_at_the_end_of_the_fence_does_not_confirm() -> None:
+    bench = CommandBench(sends_status=False).begin(fence=FENCE)
+    bench.run(FENCE - 0.05)
+    bench.now = FENCE + 0.001
+    bench.reported(5)
+
+    assert bench.result is None
+
+
 def test_a_device_that_sends_its_first_status_during_a_command_is_judged_by_it() -> None:
     bench = CommandBench(executes=[], sends_status=False).begin(gap=None)
     bench.gap = 0.0
