@@ -106,7 +106,7 @@ class AttitudeRequest:
     Requests GIMBAL_DEVICE_ATTITUDE_STATUS of a device that does not send it as configured.
 
     :param address: of the sender of the attitudes.
-    :param interval: between attitudes, 0 for that of the device.
+    :param interval: between attitudes, 0 for its own interval.
     :ivar refusal: the MAV_RESULT by which it has refused an interval, '' for none.
     """
 

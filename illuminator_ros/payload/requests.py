@@ -68,7 +68,7 @@ ENDS: Mapping[Why, Collection[Why]] = {
     Why.REQUEST: {Why.SILENCE, Why.REQUEST, Why.RELEASE}, Why.RELEASE: {Why.REQUEST}}
 # Sent until a status shows them, whatever the device answers.
 INSISTENT = frozenset((Why.END, Why.SILENCE, Why.RELEASE))
-# A value that a user has set is not undone by one that was given or agreed before.
+# Values that were given or agreed before do not undo a value that a user has set.
 WEAK = frozenset((Why.OVERRIDE, Why.RESTORED, Why.LIMIT))
 
 

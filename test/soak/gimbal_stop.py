@@ -74,7 +74,7 @@ class TurningManager(FakeManager):
         return [*filter(self._arrives, super().take(source, message))]
 
 
-# What ends the rate.
+# The end of the rate.
 ENDS: dict[str, Callable[[Rig], object]] = {
     'dies': lambda rig: None,
     'zero': lambda rig: rig.gimbal.set_rates((0.0, 0.0, 0.0), rig.now),

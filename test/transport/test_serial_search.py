@@ -68,7 +68,7 @@ class Machine:
         self._folder = folder
         self.now = 100.0
         self._sent_at = 0.0
-        # What each port sends, and its openings.
+        # The data that each port sends, and its openings.
         self.ports: dict[str, bytes] = {}
         self.lines: dict[str, Line] = {}
         self.consoles: set[str] = set()

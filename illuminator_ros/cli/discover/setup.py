@@ -58,7 +58,7 @@ def yes(text: str) -> bool:
     return matching('y|yes|n|no', 'yes or no')(text.lower()).startswith('y')
 
 
-# Of a light: the parameter, the question, the default, and the reader.
+# The parameter of a light, the question, the default, and the reader.
 PARAMETERS: tuple[tuple[str, str, str, Callable[[str], object]], ...] = (
     ('max_brightness', 'limit of the brightness, %', '100', number(0, 100)),
     ('off_on_shutdown', 'off when the node ends', 'yes', yes),
