@@ -10,14 +10,14 @@ import math
 
 from illuminator_ros.gimbal import messages as gimbal
 from illuminator_ros.gimbal.axes import Range
-from illuminator_ros.gimbal.simulated_device import MANAGER_TIMEOUT, SIMULATED, SimulatedGimbal
+from illuminator_ros.gimbal.simulated_device import MANAGER_TIMEOUT, SIMULATED
 from illuminator_ros.mavlink.dialect import mavlink
-from illuminator_ros.mavlink.messages import Address, CommandAck, CommandLong, Message
+from illuminator_ros.mavlink.messages import Address, CommandAck, CommandLong
 from illuminator_ros.payload.messages import GimbalDeviceAttitudeStatus
 from illuminator_ros.payload.mount_attitude import YawFrame
 from illuminator_ros.payload.rotation import Quaternion
-from illuminator_ros.simulation.simulated import SimulatedComponents
 import pytest
+from support.bench import DeviceBench
 
 NAN = math.nan
 DEVICE, MANAGER, OTHER = Address(1, 154), Address(1, 191), Address(1, 190)
@@ -26,26 +26,20 @@ LOCK = FOLLOW | mavlink.GIMBAL_DEVICE_FLAGS_YAW_LOCK
 UNSET = (NAN, NAN, NAN)
 
 
-class Bench:
-    """A simulated device with a manager; angles in degrees, time as given."""
+class Bench(DeviceBench):
+    """A simulated device with a manager; angles in degrees."""
 
     def __init__(self, *, announced: bool = True, **settings: object) -> None:
-        device: SimulatedGimbal = SIMULATED.make(settings, DEVICE)
-        self.now = 1000.0
-        self.endpoint = SimulatedComponents([device], self.now)
-        self.device = device
+        super().__init__(SIMULATED.make(settings, DEVICE), 1000.0)
         self._announced = announced
 
-    def give(self, message: Message, source: Address = MANAGER) -> None:
-        self.endpoint.receive(source, message, self.now)
-
     def announce(self, source: Address = MANAGER, device_id: int = 154) -> None:
-        self.give(gimbal.GimbalManagerStatus(0, 0, device_id, 0, 0, 0, 0), source)
+        self.give(source, gimbal.GimbalManagerStatus(0, 0, device_id, 0, 0, 0, 0))
 
     def heading(self, degrees: float, source: Address = MANAGER) -> None:
         q = Quaternion.from_euler(0.0, 0.0, math.radians(degrees))
-        self.give(gimbal.AutopilotStateForGimbalDevice(
-            1, 154, 0, q, 0, NAN, NAN, NAN, 0, NAN, 0, 0, 1e-5), source)
+        self.give(source, gimbal.AutopilotStateForGimbalDevice(
+            1, 154, 0, q, 0, NAN, NAN, NAN, 0, NAN, 0, 0, 1e-5))
 
     def point(
         self, *degrees: float, flags: int = FOLLOW | YawFrame.VEHICLE.flag,
@@ -55,7 +49,7 @@ class Bench:
         if self._announced:
             self.announce()
         q = Quaternion.from_euler(*map(math.radians, degrees or UNSET))
-        self.give(gimbal.GimbalDeviceSetAttitude(*target, flags, q, *rates), source)
+        self.give(source, gimbal.GimbalDeviceSetAttitude(*target, flags, q, *rates))
 
     def after(self, seconds: float) -> GimbalDeviceAttitudeStatus:
         """Let time pass, and return the status."""
@@ -84,7 +78,7 @@ def to(*degrees: float, flags: int = FOLLOW | VEHICLE, rate: float = NAN,
 
 def pitch_vehicle(bench: Bench) -> None:
     q = Quaternion.from_euler(0.0, math.radians(20.0), 0.0)
-    bench.give(gimbal.AutopilotStateForGimbalDevice(
+    bench.give(MANAGER, gimbal.AutopilotStateForGimbalDevice(
         1, 154, 0, q, 0, NAN, NAN, NAN, 0, NAN, 0, 0))
 
 
@@ -192,10 +186,10 @@ def test_a_manager_that_is_set_needs_no_announcement_and_cannot_be_replaced() ->
 def test_gm_19_the_messages_and_commands_to_managers_move_no_device() -> None:
     bench = Bench()
     down = Quaternion.from_euler(0.0, -0.5, 0.0)
-    bench.give(gimbal.GimbalManagerSetAttitude(*DEVICE, FOLLOW, 154, down, NAN, NAN, NAN))
-    bench.give(CommandLong(*DEVICE, 1000, 0, -20.0, 0.0, NAN, NAN, 0, 0, 154))
+    bench.give(MANAGER, gimbal.GimbalManagerSetAttitude(*DEVICE, FOLLOW, 154, down, NAN, NAN, NAN))
+    bench.give(MANAGER, CommandLong(*DEVICE, 1000, 0, -20.0, 0.0, NAN, NAN, 0, 0, 154))
     assert bench.angles(1.0) == (0.0, 0.0, 0.0)
-    (ack,) = [one for _, one in bench.endpoint.outgoing if isinstance(one, CommandAck)]
+    (ack,) = bench.messages(CommandAck)
     assert ack.result == mavlink.MAV_RESULT_UNSUPPORTED
 
 
@@ -203,7 +197,7 @@ def test_a_setpoint_for_another_component_or_with_both_frames_is_ignored() -> No
     bench = Bench()
     bench.point(0.0, -10.0, 0.0, target=Address(1, 171))
     bench.point(0.0, -10.0, 0.0, flags=96)
-    bench.give(gimbal.GimbalDeviceSetAttitude(*DEVICE, 32, (0, 0, 0, 0), NAN, NAN, NAN))
+    bench.give(MANAGER, gimbal.GimbalDeviceSetAttitude(*DEVICE, 32, (0, 0, 0, 0), NAN, NAN, NAN))
     assert bench.angles(1.0) == (0.0, 0.0, 0.0)
 
 

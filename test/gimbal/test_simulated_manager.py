@@ -9,7 +9,7 @@ import math
 from typing import Any
 
 from illuminator_ros.gimbal import messages as gimbal
-from illuminator_ros.gimbal.simulated_manager import PROFILES, SIMULATED, SimulatedManager
+from illuminator_ros.gimbal.simulated_manager import PROFILES, SIMULATED
 from illuminator_ros.mavlink import messages as mav
 from illuminator_ros.mavlink.dialect import MAV_RESULT_COMMAND_UNSUPPORTED_MAV_FRAME, mavlink
 from illuminator_ros.payload.messages import (
@@ -19,8 +19,8 @@ from illuminator_ros.payload.messages import (
 )
 from illuminator_ros.payload.mount_attitude import YawFrame
 from illuminator_ros.payload.rotation import Quaternion
-from illuminator_ros.simulation.simulated import SimulatedComponents
 import pytest
+from support.bench import DeviceBench
 
 NAN = math.nan
 UNSET = (NAN, NAN, NAN)
@@ -35,44 +35,29 @@ LOCK = FOLLOW | mavlink.GIMBAL_DEVICE_FLAGS_YAW_LOCK
 every_profile = pytest.mark.parametrize('profile', PROFILES)
 
 
-class Bench:
+class Bench(DeviceBench):
     """A simulated gimbal with a manager; angles in degrees."""
+
+    peer = PLAYER
 
     def __init__(self, profile: str = 'reference', **settings: object) -> None:
         settings = {'profile': profile, **settings}
         self.address = SIMULATED.address(settings)
-        device: SimulatedManager = SIMULATED.make(settings, self.address)
-        self.now = 1000.0
-        self.endpoint = SimulatedComponents([device], self.now)
-        self.device = device
+        super().__init__(SIMULATED.make(settings, self.address), 1000.0)
         self.take()
-
-    def command(
-        self, command: int, *params: float, source: mav.Address = PLAYER, as_int: bool = False,
-        frame: int = 0,
-    ) -> int:
-        """Send a command, and return its result."""
-        self.endpoint.outgoing.clear()
-        one, two, three, four, five, six, seven = [*params, *[0.0] * (7 - len(params))]
-        self.endpoint.receive(source, mav.CommandInt(
-            *self.address, frame, command, 0, 0, one, two, three, four, int(five), int(six),
-            seven) if as_int else mav.CommandLong(
-            *self.address, command, 0, one, two, three, four, five, six, seven), self.now)
-        return next(int(message.result) for _, message in self.endpoint.outgoing
-                    if isinstance(message, mav.CommandAck))
 
     def take(
         self, source: mav.Address = PLAYER, secondary: mav.Address = gimbal.NO_COMPONENT,
     ) -> int:
-        return self.command(CONFIGURE, *source, *secondary, source=source)
+        return self.result(CONFIGURE, *source, *secondary, source=source)
 
     def point(
         self, *degrees: float, flags: int = FOLLOW, rates: tuple[float, float, float] = UNSET,
         source: mav.Address = PLAYER, device_id: int = 1,
     ) -> None:
         q = Quaternion.from_euler(*map(math.radians, degrees or UNSET))
-        self.endpoint.receive(source, gimbal.GimbalManagerSetAttitude(
-            *self.address, flags, device_id, q, *rates), self.now)
+        self.give(source, gimbal.GimbalManagerSetAttitude(
+            *self.address, flags, device_id, q, *rates))
 
     def message(self, cls: Any) -> Any:
         return self.device.message(cls.id, self.now)
@@ -101,7 +86,7 @@ def test_gm_27_it_announces_its_gimbal_and_streams_status_and_attitude(profile: 
                 & mavlink.GIMBAL_DEVICE_CAP_FLAGS_HAS_RETRACT) is (profile != 'px4')
     assert bench.message(GimbalDeviceAttitudeStatus).gimbal_device_id == 1
     assert bench.message(gimbal.GimbalDeviceInformation).gimbal_device_id == 1
-    assert bench.command(mavlink.MAV_CMD_REQUEST_MESSAGE, 280) == ACCEPTED
+    assert bench.result(mavlink.MAV_CMD_REQUEST_MESSAGE, 280) == ACCEPTED
 
 
 # Control
@@ -124,7 +109,7 @@ def test_configure_gives_control_as_the_status_shows(
         profile: str, values: tuple[float, ...], result: int, control: tuple[int, ...],
 ) -> None:
     bench = Bench(profile)
-    assert bench.command(CONFIGURE, *values, source=OTHER) == result
+    assert bench.result(CONFIGURE, *values, source=OTHER) == result
     assert bench.control == control
 
 
@@ -163,8 +148,7 @@ def test_gm_2_the_flags_tell_the_frame_of_a_yaw(profile: str, flags: int, yaw: f
 def test_an_attitude_of_the_vehicle_that_is_not_a_rotation_is_ignored(value: float) -> None:
     bench = Bench()
     bench.point(0.0, -20.0, 30.0, flags=LOCK)
-    bench.endpoint.receive(mav.Address(1, 1), Attitude(
-        0, 0.0, 0.0, value, 0.0, 0.0, 0.0), bench.now)
+    bench.give(mav.Address(1, 1), Attitude(0, 0.0, 0.0, value, 0.0, 0.0, 0.0))
     assert bench.angles() == (0.0, -20.0, 30.0)
 
 
@@ -174,8 +158,8 @@ def test_gm_28_a_message_for_another_device_is_ignored_except_by_px4(profile: st
     bench.point(0.0, -20.0, 0.0, device_id=2)
     ignored = profile != 'px4'
     assert bench.angles() == (0.0, 0.0 if ignored else -20.0, 0.0)
-    assert (bench.command(PITCHYAW, -10, 0, NAN, NAN, 0, 0, 2) != ACCEPTED) is ignored
-    assert (bench.command(CONFIGURE, 0, 0, 0, 0, 0, 0, 2) != ACCEPTED) is ignored
+    assert (bench.result(PITCHYAW, -10, 0, NAN, NAN, 0, 0, 2) != ACCEPTED) is ignored
+    assert (bench.result(CONFIGURE, 0, 0, 0, 0, 0, 0, 2) != ACCEPTED) is ignored
     bench.take()
     bench.point(0.0, -15.0, 0.0, device_id=0)
     assert bench.angles() == (0.0, -15.0, 0.0)
@@ -191,25 +175,25 @@ def test_gm_8_the_manager_computes_the_direction_of_a_place(
         place: tuple[float, float, float], frame: int, degrees: tuple[float, ...]) -> None:
     bench = Bench(heading=90.0)
     latitude, longitude, altitude = place
-    assert bench.command(
-        ROI, 1, 0, 0, 0, round(latitude * 1e7), round(longitude * 1e7), altitude, as_int=True,
-        frame=frame) == ACCEPTED
+    assert bench.result(
+        ROI, 1, 0, 0, 0, round(latitude * 1e7), round(longitude * 1e7), altitude,
+        form=mav.CommandInt, frame=frame) == ACCEPTED
     assert bench.angles() == pytest.approx(degrees, abs=0.01)
-    assert bench.command(ROI_NONE, 1) == ACCEPTED
+    assert bench.result(ROI_NONE, 1) == ACCEPTED
     assert bench.angles() == (0.0, 0.0, 0.0)
 
 
 def test_gm_8_it_keeps_pointing_at_the_place_while_the_vehicle_moves_until_the_next_setpoint(
         ) -> None:
     bench = Bench()
-    bench.command(ROI, 0, 0, 0, 0, 47.398742, 8.545594, 488.0)
+    bench.result(ROI, 0, 0, 0, 0, 47.398742, 8.545594, 488.0)
     moved = GlobalPositionInt(0, 473987420, 85455940 - 10000, 488000, 0, 0, 0, 0, 0)
-    bench.endpoint.receive(mav.Address(2, 1), moved, bench.now)
+    bench.give(mav.Address(2, 1), moved)
     assert bench.angles() == pytest.approx((0.0, 0.0, 0.0), abs=0.01)
-    bench.endpoint.receive(mav.Address(1, 1), moved, bench.now)
+    bench.give(mav.Address(1, 1), moved)
     assert bench.angles() == pytest.approx((0.0, 0.0, 90.0), abs=0.01)
     bench.point(0.0, -10.0, 0.0)
-    bench.endpoint.receive(mav.Address(1, 1), moved, bench.now)
+    bench.give(mav.Address(1, 1), moved)
     assert bench.angles() == (0.0, -10.0, 0.0)
 
 
@@ -219,14 +203,14 @@ def test_gm_8_it_keeps_pointing_at_the_place_while_the_vehicle_moves_until_the_n
     ((3, 0, 0, 0, 0, 0, 0), 0, DENIED)])
 def test_a_place_that_does_not_exist_is_refused(
         params: tuple[float, ...], frame: int, result: int) -> None:
-    assert Bench().command(ROI, *params, as_int=True, frame=frame) == result
+    assert Bench().result(ROI, *params, form=mav.CommandInt, frame=frame) == result
 
 
 # People
 
 @pytest.mark.parametrize('flags', [NAN, math.inf, 96.0])
 def test_impossible_flags_are_denied(flags: float) -> None:
-    assert Bench().command(PITCHYAW, -10, 0, NAN, NAN, flags) == DENIED
+    assert Bench().result(PITCHYAW, -10, 0, NAN, NAN, flags) == DENIED
 
 
 def test_a_person_sees_who_has_control() -> None:
@@ -234,5 +218,5 @@ def test_a_person_sees_who_has_control() -> None:
     bench.take(PLAYER, OTHER)
     assert bench.device.snapshot(bench.now).text == (
         'roll    0.0  pitch    0.0  yaw    0.0 deg  primary 1/195, secondary 255/190')
-    bench.command(ROI, 0, 0, 0, 0, 47.4, 8.545594, 488.0)
+    bench.result(ROI, 0, 0, 0, 0, 47.4, 8.545594, 488.0)
     assert bench.device.snapshot(bench.now).text.endswith('region of interest')

@@ -18,7 +18,7 @@ NORMAL = IlluminatorBehaviour()
 
 
 def acks(bench: LightBench) -> Any:
-    return [(at, ack.result) for at, ack in bench.of(CommandAck)]
+    return [(at, ack.result) for at, ack in bench.timed(CommandAck)]
 
 
 def active(bench: LightBench) -> Any:
@@ -31,7 +31,7 @@ def test_a_silent_light_neither_sends_nor_obeys_until_its_silence_is_over() -> N
     bench.command(*ON)
     assert (bench.sent, bench.lamp.enabled, active(bench)) == ([], False, ['silence=3'])
     bench.run(3.5)
-    assert [at for at, _ in bench.of(Heartbeat)] == [3.0, 4.0, 5.0]
+    assert [at for at, _ in bench.timed(Heartbeat)] == [3.0, 4.0, 5.0]
     assert active(bench) == []
 
 
@@ -70,7 +70,7 @@ def test_progress_is_reported_until_the_change_and_rejects_a_second_command() ->
     assert bench.result(*ON) == mavlink.MAV_RESULT_TEMPORARILY_REJECTED
     assert not bench.lamp.enabled
     bench.run(0.2)
-    reported = [(at, ack.result, ack.progress) for at, ack in bench.of(CommandAck)]
+    reported = [(at, ack.result, ack.progress) for at, ack in bench.timed(CommandAck)]
     assert reported == [(0.0, 5, 0), (0.5, 5, 25), (1.0, 5, 50), (1.5, 5, 75), (1.9, 1, 0),
                         (2.0, 0, 0)]
     assert bench.lamp.enabled
@@ -86,7 +86,7 @@ def test_a_busy_light_rejects_some_changes_temporarily_and_is_then_normal() -> N
 @pytest.mark.parametrize(('fault', 'low', 'high'), [
     ('drop=0.2', 140, 180), ('drop=1', 0, 0), ('duplicate=0.25', 230, 270)])
 def test_a_share_of_the_messages_is_lost_or_doubled(fault: str, low: float, high: float) -> None:
-    assert low <= len(LightBench(fault, status_interval=0.0).run(199.5)) <= high
+    assert low <= len(LightBench(fault, status_interval=0.0).run(199.5).sent) <= high
 
 
 @pytest.mark.parametrize('fault', ['drop', 'duplicate', 'delay', 'corrupt'])

@@ -14,7 +14,8 @@ from illuminator_ros.mavlink import messages as mav
 from illuminator_ros.mavlink.dialect import encode, mavlink
 from illuminator_ros.simulation.simulated import SimulatedComponents
 import pytest
-from support.light_bench import GROUND, LightBench
+from support.bench import GROUND
+from support.light_bench import LightBench
 
 NAN, INF = float('nan'), float('inf')
 ON_OFF, CONFIGURE = mavlink.MAV_CMD_ILLUMINATOR_ON_OFF, mavlink.MAV_CMD_DO_ILLUMINATOR_CONFIGURE
@@ -105,7 +106,8 @@ def test_a_restart_resets_the_settings_and_keeps_the_temperature() -> None:
     bench.lamp.heat_to(60.0, 0.0)
     bench.now = 100.0
     bench.component.restart(bench.now)
-    assert isinstance(bench.run(0.0)[0], mav.Heartbeat)
+    bench.sent.clear()
+    assert isinstance(bench.run(0.0).sent[0][1], mav.Heartbeat)
     status = bench.status()
     assert (status.uptime_ms, status.enable, status.temp_c) == (0, 0, 60.0)
     assert bench.shown() == (1, 100.0, 0, 0)
@@ -150,4 +152,4 @@ def test_a_command_that_the_light_cannot_do_is_refused_and_changes_nothing(
     (ack,) = bench.command(command, *params)
     assert ack.result == result
     assert bench.status().enable == 0
-    assert len(statuses(bench.run(3.0))) == 3
+    assert len(bench.run(3.0).messages(IlluminatorStatus)) == 3

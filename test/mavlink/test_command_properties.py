@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from hypothesis.stateful import initialize, invariant, rule, RuleBasedStateMachine
 from illuminator_ros.mavlink.command_sender import CommandStatus
 from illuminator_ros.mavlink.messages import Address
-from support.command_rig import LIGHT, OURS, Rig, Run
+from support.command_rig import LIGHT, LONG, OURS, Rig, Run
 
 COMPONENTS = st.sampled_from([LIGHT, Address(1, 244)])
 COMMANDS = st.sampled_from([405, 406])
@@ -67,7 +67,7 @@ class CommandSenderMachine(RuleBasedStateMachine):
             assert all(time < deadline for time, _ in run.frames)
 
     def teardown(self) -> None:
-        self.rig.run()
+        self.rig.run(LONG)
         self.frames_are_sent_before_the_deadline_only()
         assert all(run.outcome for run in self.rig.runs)
         assert len(self.rig.sender) == 0

@@ -24,7 +24,7 @@ from illuminator_ros.mavlink.dialect import mavlink
 from illuminator_ros.mavlink.messages import Address, CommandInt, CommandLong, heartbeat, Message
 from illuminator_ros.mavlink.retries import CLOSING
 import pytest
-from support.command_rig import DELAY, LIGHT, OURS, Rig
+from support.command_rig import DELAY, LIGHT, LONG, OURS, Rig
 
 OTHER = Address(1, 244)
 REQUEST = mavlink.MAV_CMD_REQUEST_MESSAGE
@@ -85,7 +85,7 @@ def test_command_ends_as_its_answers_say(
         times: list[float]) -> None:
     rig = Rig(*answers, **{name: options[name] for name in options if name != 'limit'})
     run = rig.start(limit=options.get('limit', math.inf))
-    rig.run()
+    rig.run(LONG)
     assert (str(run.outcome), [round(at - 1000.0, 6) for at, _ in run.frames]) == (said, times)
     assert rig.sender.next_deadline() == math.inf
 
@@ -94,7 +94,7 @@ def test_a_command_without_an_answer_names_a_clock_that_is_not_set() -> None:
     rig = Rig(clock_fault=lambda: 'the clock is wrong')
     unanswered, refused = rig.start(), rig.start(command=406)
     rig.ack(DENIED, 406)
-    rig.run()
+    rig.run(LONG)
 
     assert str(unanswered.outcome) == 'no acknowledgement (the clock is wrong) (4 tries, 2.75 s)'
     assert 'clock' not in str(refused.outcome)
@@ -117,8 +117,8 @@ def test_command_int_carries_the_params_and_each_resend_its_number_and_its_follo
     params, request = (1.0, 50.0, 0.5, 25.0, 5.0, 6.0, 7.0), request_message(LIGHT, 440)
     rig.sender.start(Command(LIGHT, 406, params), rig.now, follow_up=request)
     rig.flush()
-    rig.run()
-    assert [message for _, message in rig.frames] == [
+    rig.run(LONG)
+    assert [message for _, message in rig.sent] == [
         *(message for one in (
             CommandLong(*LIGHT, 406, 0, *params), CommandLong(*LIGHT, 406, 1, *params),
             CommandInt(*LIGHT, 0, 406, 0, 0, *params[:4], 5, 6, 7.0))
@@ -129,7 +129,7 @@ def test_confirmation_counts_the_resends_and_earlier_tries_up_to_255() -> None:
     rig = Rig(retries=300)
     run = rig.start(tried=3)
     rig.run(400.0)
-    assert [message.confirmation for _, message in rig.frames] == [*range(3, 256), *[255] * 48]
+    assert [message.confirmation for _, message in rig.sent] == [*range(3, 256), *[255] * 48]
     assert (run.outcome.tries, rig.times[:4]) == (304, SILENT)
 
 
@@ -160,7 +160,7 @@ def test_acknowledgements_before_a_command_and_after_its_end_change_nothing() ->
     for result in (DENIED, ACCEPTED, DENIED):
         rig.ack(result)
     rig.ack(ACCEPTED, 407)
-    rig.run()
+    rig.run(LONG)
     rig.ack(ACCEPTED, 406)
     assert run.outcome.result == DENIED
     assert [one.outcome.status for one in (silent, to_all)] == [CommandStatus.NO_ANSWER] * 2
@@ -215,7 +215,7 @@ def test_all_commands_or_those_of_one_target_can_be_ended_for_good(
     rig.ack(ACCEPTED, source=OTHER)
     assert [run.outcome.status for run in runs] == [
         status, status, status if target is None else CommandStatus.ANSWERED]
-    assert (len(rig.frames), len(rig.sender)) == (3, 0)
+    assert (len(rig.sent), len(rig.sender)) == (3, 0)
 
 
 def test_cancelled_command_ends_and_cancelling_it_again_leaves_the_next_one() -> None:
@@ -241,7 +241,7 @@ def test_closed_sender_ends_all_commands_and_sends_no_others_than_those_of_the_e
     rig.sender.send(heartbeat(mavlink.MAV_TYPE_GCS))
     refused = rig.start(407, param1=1.0)
     assert [run.outcome.status for run in (on, refused)] == [CommandStatus.CLOSED] * 2
-    assert (rig.sender.refusal, len(rig.frames)) == ('the bridge is ending', 3)
+    assert (rig.sender.refusal, len(rig.sent)) == ('the bridge is ending', 3)
     last = rig.start()
     rig.run(2.05)
     # It is repeated for as long as the process lasts.
@@ -314,7 +314,7 @@ def test_sender_counts_tries_and_keeps_the_last_round_trip_and_silence_of_some_t
     targets = [Address(system, 1) for system in range(1, MAX_TARGETS + 3)]
     for target in targets:
         rig.start(target=target)
-    rig.run()
+    rig.run(LONG)
     counters = rig.sender.counters
     count = len(targets)
     assert (counters.sent, counters.resent, counters.unanswered) == (3 * count, 2 * count, count)

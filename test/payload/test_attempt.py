@@ -14,18 +14,19 @@ from illuminator_ros.payload.requests import Goal, Request, Result, Why
 import pytest
 from support.level_device import (
     ACCEPTED,
-    Bench,
     DENIED,
     FAILED,
     IN_PROGRESS,
     level_change,
+    LevelBench,
     REJECTED,
+    SET_LEVEL,
 )
 
 LEVEL_5 = level_change(5)
 
 
-class CommandBench(Bench):
+class CommandBench(LevelBench):
     """One command for level 5 at the time 0."""
 
     def begin(self, change: Change[int | None] = LEVEL_5, *, gap: float | None = 0.5,
@@ -52,11 +53,11 @@ class CommandBench(Bench):
         if self.result is None:
             self._take(self.command.reported(level, self.gap or 0.0, self.now))
 
-    def poll(self) -> None:
-        if self.now >= self.next_deadline():
+    def act(self) -> None:
+        if self.now >= self.due():
             self._take(self.command.poll(self.now))
 
-    def next_deadline(self) -> float:
+    def due(self) -> float:
         return math.inf if self.result else self.command.due
 
     @property
@@ -163,7 +164,7 @@ def test_the_result_says_what_the_statuses_show_and_the_acknowledgement_explains
     tries: list[float], ended_at: float, flags: tuple[str, ...],
 ) -> None:
     bench = CommandBench(**device).begin(**command)
-    bench.run()
+    bench.run_until()
     assert (bench.ended.success, bench.tries, bench.ended_at) == (success, tries, ended_at)
     assert bench.ended.message == f'{text} ({timing(len(tries), ended_at)})'
     assert tuple(flag for flag in ('refused', 'permanent', 'contradicted')
@@ -177,13 +178,13 @@ def test_a_status_before_an_acknowledgement_the_last_try_or_the_fence_does_not_c
     bench = CommandBench(0, None, sends_status=False).begin(fence=fence)
     for at in (0.005, 0.3, 1.2):
         bench.later(at, lambda: bench.reported(5))
-    bench.run()
+    bench.run_until()
     assert not bench.ended.success
 
 
 def test_a_status_that_is_read_before_the_try_at_the_end_of_the_fence_does_not_confirm() -> None:
     bench = CommandBench(sends_status=False).begin(fence=FENCE)
-    bench.run(FENCE - 0.05)
+    bench.run_until(FENCE - 0.05)
     bench.now = FENCE + 0.001
     bench.reported(5)
 
@@ -194,7 +195,7 @@ def test_a_device_that_sends_its_first_status_during_a_command_is_judged_by_it()
     bench = CommandBench(executes=[], sends_status=False).begin(gap=None)
     bench.gap = 0.0
     bench.later(0.5, lambda: bench.reported(0))
-    bench.run()
+    bench.run_until()
     assert (bench.ended.success, bench.ended.contradicted) == (False, True)
 
 
@@ -203,9 +204,10 @@ def test_each_try_carries_a_request_for_the_status_which_is_repeated_until_it_sh
     bench = CommandBench(0, None, ACCEPTED, executes=[]).begin(
         level_change(5, note='the fan runs too'))
     bench.later(1.0, lambda: setattr(bench, 'level', 5))
-    bench.run()
+    bench.run_until()
     assert bench.requests == [0.0, 0.25, 0.32, 0.42, 0.62, 0.87, 1.12]
-    assert [message.confirmation for message in bench.sent] == [0, 1]
+    assert [message.confirmation for _, message in bench.sent
+            if message.command == SET_LEVEL] == [0, 1]
     assert (bench.ended.success, bench.ended_at) == (True, 1.14)
     assert bench.ended.note == 'the fan runs too'
 
@@ -218,13 +220,13 @@ def test_a_command_that_insists_is_sent_until_a_status_shows_the_change(
     result: int | None, failure: str, ended_at: float,
 ) -> None:
     bench = CommandBench(0, result, executes=[]).begin(insists=True)
-    bench.run(20.0)
+    bench.run_until(20.0)
     assert bench.result is None
     assert bench.tries == [*(0.25 * number for number in range(11)),
                            *(2.5 + 2.0 * number for number in range(1, 9))]
     assert bench.command.failure() == failure
     bench.level = 5
-    bench.run()
+    bench.run_until()
     # Each acknowledgement is followed by requests for the status.
     assert (bench.ended.success, bench.ended_at) == (True, ended_at)
 
@@ -237,9 +239,9 @@ def test_a_lost_link_and_the_end_of_the_process_end_every_command(
     insists: bool, status: CommandStatus, text: str,
 ) -> None:
     bench = CommandBench(0, None).begin(insists=insists)
-    bench.run(0.1)
+    bench.run_until(0.1)
     bench.commands.end_all(bench.now, status)
-    bench.run()
+    bench.run_until()
     assert (bench.ended.success, bench.ended.message) == (False, text)
     assert bench.ended.superseded is (status is CommandStatus.CLOSED)
 
@@ -255,12 +257,12 @@ def test_a_restart_confirms_nothing_and_a_command_that_may_be_repeated_is_sent_a
     device: dict[str, Any], change: Change[int | None], text: str, tries: int, ended_at: float,
 ) -> None:
     bench = CommandBench(**device, sends_status=False).begin(change, is_sole_cause=True)
-    bench.run(0.1)
+    bench.run_until(0.1)
     bench.level, bench.sends_status = 0, True
     bench.command.restarted(bench.now)
     if change.sending is not Sending.ONCE:
         bench.later(0.0, lambda: bench.reported(5))
-    bench.run()
+    bench.run_until()
     assert bench.ended.message == (
         f'{text}; the device restarted meanwhile ({timing(tries, ended_at)})')
     assert bench.tries[1:3] == [0.1, 0.35][:tries - 1]

@@ -15,7 +15,7 @@ from illuminator_ros.payload.attempt import Change, FENCE, Served
 from illuminator_ros.payload.device_property import LATE_TIME, MAX_VALUES, Property
 from illuminator_ros.payload.requests import Goal, MAX_CALLS, Request, Requests, Result, Why
 import pytest
-from support.level_device import ACCEPTED, Bench, DENIED, level_change
+from support.level_device import ACCEPTED, DENIED, level_change, LevelBench
 
 ROUND_TRIP = 0.02
 
@@ -25,7 +25,7 @@ def plan(goal: Goal) -> tuple[Change[int | None], Mapping[Request, Change[int | 
     return change, dict.fromkeys(goal.serves, change)
 
 
-class PropertyBench(Bench):
+class PropertyBench(LevelBench):
     """The level of the device as a property, and the requests for it."""
 
     def __init__(self, level: int | None = 0, *results: Any, **device: Any) -> None:
@@ -85,10 +85,10 @@ class PropertyBench(Bench):
         self.newest, self.newest_at = level, self.now
         self.steer(*self.property.reported(level, self._gap, self.now))
 
-    def poll(self) -> None:
+    def act(self) -> None:
         self.steer(*self.property.poll(self.now))
 
-    def next_deadline(self) -> float:
+    def due(self) -> float:
         return self.property.due
 
 
@@ -105,7 +105,7 @@ def test_a_value_replaces_another_and_an_equal_one_joins_the_next_command() -> N
     other = bench.want(4)
     assert messages(first, second, other) == ['superseded by level 4', 'superseded by level 4', '']
     assert first[0].superseded
-    bench.run(10.0)
+    bench.run_until(10.0)
     assert messages(other) == [
         'level 4 not confirmed: MAV_RESULT_ACCEPTED, but STATUS shows level 0']
     assert len(bench.commands) == 0
@@ -117,9 +117,9 @@ def test_requests_for_an_equal_value_wait_for_a_command_sent_after_they_were_mad
 ) -> None:
     bench = PropertyBench(0, result).report()
     first = bench.want(3)
-    bench.run(0.015)
+    bench.run_until(0.015)
     later = [bench.want(3) for _ in range(2)]
-    bench.run(2 * FENCE)
+    bench.run_until(2 * FENCE)
     assert [one.status for one in bench.ends] == [3 if result == ACCEPTED else None] * 3
     assert [one[0].success for one in (first, *later)] == [result == ACCEPTED] * 3
     assert bench.tries[:2] == [0.0, ROUND_TRIP]
@@ -130,14 +130,14 @@ def test_calls_are_bounded() -> None:
     answers = [bench.want(3) for _ in range(MAX_CALLS + 2)]
     assert [bool(answer) for answer in answers] == [*[False] * MAX_CALLS, True, True]
     assert answers[-1][0].message == '32 requests are waiting for device 1/7 already'
-    bench.run(1.0)
+    bench.run_until(1.0)
     assert {len(answer) for answer in answers} == {1}
 
 
 def test_of_a_topic_the_newest_message_counts() -> None:
     bench = PropertyBench().report()
     stream = [bench.want(level, is_stream=True) for level in (3, 4, 5)]
-    bench.run(2 * FENCE)
+    bench.run_until(2 * FENCE)
     assert messages(*stream[:2]) == ['superseded by level 4', 'superseded by level 5']
     assert stream[-1][0].success
 
@@ -149,7 +149,7 @@ def test_requests_of_one_time_share_a_command_and_are_answered_in_their_order() 
         bench.table.put(Request({'level': 3}, Why.REQUEST, bench.now, done=done, is_call=True,
                                 until=0.9), bench.now)
     bench.steer()
-    bench.run(1.0)
+    bench.run_until(1.0)
 
     assert order == [0, 1, 2]
     assert bench.tries[0] == 0.0
@@ -158,9 +158,9 @@ def test_requests_of_one_time_share_a_command_and_are_answered_in_their_order() 
 def test_the_time_of_the_last_try_is_kept_when_the_command_ends() -> None:
     bench = PropertyBench(0, *[None] * 9).report()
     bench.want(3)
-    bench.run(1.8)
+    bench.run_until(1.8)
     assert bench.property.sent_at == 1.75
-    bench.run(4.0)
+    bench.run_until(4.0)
 
     assert not bench.property.attempt
     assert bench.property.sent_at == 1.75
@@ -217,7 +217,7 @@ def test_the_fence_ends_1_5_s_after_the_last_frame_of_a_command_without_an_ackno
 ) -> None:
     bench = PropertyBench(0, *results).report()
     assert bench.ended(3)[0] is (results[0] == ACCEPTED)
-    bench.run(bench.now + between)
+    bench.run_until(bench.now + between)
     # The device shows this value already.
     bench.level = 0
     bench.report(0)
@@ -260,7 +260,7 @@ def test_a_set_that_is_proved_within_the_fence_does_not_lengthen_it() -> None:
     bench = PropertyBench().report()
     bench.want(3)
     bench.withdraw()
-    bench.run(0.5)
+    bench.run_until(0.5)
     assert bench.ended(4, limit=0.9) == (True, ROUND_TRIP)
     bench.withdraw()
 
@@ -274,7 +274,7 @@ def test_values_from_before_the_fence_are_forgotten_after_it() -> None:
     bench.want(3)
     bench.want(4)
     bench.withdraw()
-    bench.run(FENCE)
+    bench.run_until(FENCE)
     bench.results = [None, None, None, None, ACCEPTED]
     bench.report(0)
     assert not bench.ended(5)[0]
@@ -295,7 +295,7 @@ def test_a_change_that_ended_unconfirmed_may_take_effect_until_a_status_shows_it
     bench.want(3)
     bench.withdraw()
     assert bench.property.unconfirmed(bench.now) == level_change(3)
-    bench.run(after)
+    bench.run_until(after)
     if event.startswith('another'):
         bench.results = [ACCEPTED if event.endswith('confirmed') else DENIED]
         bench.ended(4)
@@ -314,23 +314,23 @@ def test_the_interval_of_the_statuses_tells_when_the_next_one_is_due(
 ) -> None:
     bench = PropertyBench(sends_status=False)
     for at in reports:
-        bench.run(at)
+        bench.run_until(at)
         bench.report(0)
     begun = bench.now
     answer = bench.want(3)
-    bench.run(begun + 1.1)
+    bench.run_until(begun + 1.1)
     assert text in answer[0].message
 
 
 def test_the_first_status_after_a_restart_confirms_nothing() -> None:
     bench = PropertyBench(sends_status=False).report()
     answer = bench.want(3)
-    bench.run(0.1)
+    bench.run_until(0.1)
     bench.newest, bench.newest_at = 3, bench.now
     bench.property.restarted(bench.now)
     assert not answer
     bench.sends_status = True
-    bench.run(3.0)
+    bench.run_until(3.0)
     assert answer[0].success
     assert 'the device restarted meanwhile (8 tries, 1.62 s)' in answer[0].message
 
@@ -359,7 +359,7 @@ def test_each_request_is_answered_once_and_each_success_is_shown_after_it_was_ma
         elif action == 'cancel':
             bench.withdraw()
         else:
-            bench.run(bench.now + 0.3 * number)
+            bench.run_until(bench.now + 0.3 * number)
         for place, (level, since, results) in enumerate(answers):
             if results and place not in checked:
                 checked.add(place)

@@ -16,6 +16,7 @@ from illuminator_ros.rededge import messages as rededge
 from illuminator_ros.rededge.client import ImageTaken, RedEdgeClient
 from illuminator_ros.rededge.input_states import CameraSettings, Input, Stamp
 import pytest
+from support.bench import Bench
 
 OWN, NEW, ADOPTED = Address(1, 191), Address(255, 100), Address(1, 100)
 # The heartbeat of real cameras; its type and autopilot do not identify a camera.
@@ -32,16 +33,15 @@ def status(index: int, event: int = 1) -> rededge.CameraStatus:
     return rededge.CameraStatus(0, 1, 0, index, event, 0, 0, 0, 0)
 
 
-class Rig:
+class Rig(Bench):
     """A client on an open link, and the results of its requests."""
 
     def __init__(self, *, connected: bool = True) -> None:
-        self.now = 100.0
         commands = CommandSender(OWN)
         self.client = RedEdgeClient(commands, CameraSettings(), sequence=0xFFFFFFFE)
         self.component = Component(commands, [self.client])
+        super().__init__(self.component, 100.0)
         self.events: list[Any] = []
-        self.sent: list[Message] = []
         self.results: list[tuple[bool, str]] = []
         self.client.events.subscribe(self.events.append)
         self.component.link_opened(self.now)
@@ -54,23 +54,16 @@ class Rig:
         for message in messages:
             self.component.receive(source, message, self.now)
 
-    def run(self, seconds: float, beats: bool = False) -> None:
+    def run(self, seconds: float, beats: bool = False) -> Rig:
+        """Let time pass in steps of 50 ms; the camera may send a heartbeat each second."""
         end = round(self.now + seconds, 6)
-        while True:
-            if self.now >= self.component.next_deadline():
-                self.component.poll(self.now)
-            while self.component.outgoing:
-                source, message = self.component.outgoing.popleft()
-                assert source == OWN
-                self.sent.append(message)
-            if self.now >= end:
-                return
+        self.poll()
+        while self.now < end:
             self.now = round(min(self.now + 0.05, end), 6)
             if beats and not round(self.now * 20) % 20:
                 self.hear(BEAT)
-
-    def all(self, cls: type[Any]) -> list[Any]:  # noqa: A003
-        return [message for message in self.sent if isinstance(message, cls)]
+            self.poll()
+        return self
 
     def take_result(self, success: bool, text: str) -> None:
         self.results.append((success, text))
@@ -79,7 +72,7 @@ class Rig:
         """Request a PING and return it."""
         self.client.ping(self.now, self.take_result)
         self.run(0.0)
-        found: rededge.Ping = self.all(rededge.Ping)[-1]
+        found: rededge.Ping = self.messages(rededge.Ping)[-1]
         return found
 
     def capture(self, shot: rededge.Shot = rededge.Shot.SURVEY) -> None:
@@ -113,7 +106,7 @@ def test_a_camera_that_adopts_our_system_id_is_the_same_camera_re_8() -> None:
     assert rig.events == [DeviceConnected(NEW)]
     assert (rig.state.address, rig.state.conflict) == (ADOPTED, False)
     rig.capture()
-    control = rig.all(rededge.DigicamControl)[-1]
+    control = rig.messages(rededge.DigicamControl)[-1]
     assert (control.target_system, control.target_component) == ADOPTED
 
 
@@ -172,7 +165,7 @@ def test_two_components_with_the_camera_s_id_are_noticed() -> None:
 def test_each_ping_is_a_request_with_a_new_sequence_number_that_wraps_re_10() -> None:
     rig = Rig()
     rig.run(5.0, beats=True)
-    pings = rig.all(rededge.Ping)
+    pings = rig.messages(rededge.Ping)
     assert [(one.target_system, one.target_component) for one in pings] == [(0, 0)] * 3
     assert [one.seq for one in pings] == [0xFFFFFFFF, 0, 1]
 
@@ -206,7 +199,7 @@ def test_a_lost_ping_is_sent_again_with_another_number_re_12() -> None:
     rig = Rig()
     first = rig.ping()
     rig.run(1.2)
-    second = rig.all(rededge.Ping)[-1]
+    second = rig.messages(rededge.Ping)[-1]
     rig.hear(reply(second))
     assert second.seq != first.seq
     assert [success for success, _ in rig.results] == [True]
@@ -241,7 +234,7 @@ def test_no_request_waits_without_a_link() -> None:
 def test_a_capture_is_a_success_after_its_feedback_re_5(shot: rededge.Shot) -> None:
     rig = Rig()
     rig.capture(shot)
-    assert rig.all(rededge.DigicamControl) == [
+    assert rig.messages(rededge.DigicamControl) == [
         rededge.DigicamControl(255, 100, 1, 1, 0, 0, shot, 0, 0, 0.0)]
     rig.hear(status(1))
     rig.run(0.5)
@@ -383,4 +376,4 @@ def test_a_capture_is_refused_without_a_camera_or_while_another_runs() -> None:
     assert rig.results == [(False, 'no camera connected: none heard yet'), (
         False, 'another capture is under way since 1.20 s: the camera has not answered; it ends '
         'within 3.80 s')]
-    assert len(rig.all(rededge.DigicamControl)) == 1
+    assert len(rig.messages(rededge.DigicamControl)) == 1

@@ -31,8 +31,8 @@ from illuminator_ros.rededge.simulated import (
     SimulatedRedEdge,
     Source,
 )
-from illuminator_ros.simulation.simulated import SimulatedComponents
 import pytest
+from support.bench import DeviceBench
 
 HOST = Address(7, 191)
 START = 1000.0
@@ -57,53 +57,43 @@ def control(shot: int, component: int = 100, system: int = 1) -> DigicamControl:
     return DigicamControl(system, component, 1, 1, 0, 0, shot, 0, 0, 0.0)
 
 
-class Camera:
-    """A simulated camera whose clock a test moves."""
+class Camera(DeviceBench):
+    """A simulated camera."""
 
     def __init__(self, fault: str = '', **settings: Any) -> None:
-        self.device = SimulatedRedEdge(RedEdgeProperties(**{'own_gps': OWN_PLACE, **settings}))
+        device = SimulatedRedEdge(RedEdgeProperties(**{'own_gps': OWN_PLACE, **settings}))
         if fault:
-            self.device.behave(FAULTS.add(self.device.behaviour, fault), START)
-        self.endpoint = SimulatedComponents([self.device], START)
-        self.device.set_clock(OWN_UTC, START)
-        self.now = START
+            device.behave(FAULTS.add(device.behaviour, fault), START)
+        super().__init__(device, START)
+        device.set_clock(OWN_UTC, START)
 
-    def tell(self, *messages: Message, source: Address = HOST) -> list[tuple[Address, Any]]:
+    def tell(self, *messages: Message, source: Address = HOST) -> list[Any]:
         """Give messages to the camera, and return the messages that it sends at once."""
-        for message in messages:
-            self.endpoint.receive(source, message, self.now)
-        return self.sent()
+        return self.give(source, *messages)
 
-    def sent(self) -> list[tuple[Address, Any]]:
-        sent = list(self.endpoint.outgoing)
-        self.endpoint.outgoing.clear()
-        return sent
-
-    def wait(self, seconds: float) -> list[tuple[Address, Any]]:
+    def wait(self, seconds: float) -> list[Any]:
         """Let time pass, and return the camera's messages except heartbeats."""
-        until = self.now + seconds
-        while (due := self.endpoint.next_deadline()) <= until:
-            self.now = due
-            self.endpoint.poll(self.now)
-        self.now = until
-        return [(source, one) for source, one in self.sent() if not isinstance(one, Heartbeat)]
+        before = len(self.sent)
+        self.run(seconds)
+        return [one for _, one in self.sent[before:] if not isinstance(one, Heartbeat)]
 
     def image(self, *messages: Message, wait: float = 0.0) -> Image:
         """Return an image that is taken ``wait`` s after messages."""
         self.tell(*messages)
         self.wait(wait)
         self.tell(control(1))
-        return self.device.images[-1]
+        image: Image = self.device.images[-1]
+        return image
 
 
 def test_camera_has_the_system_id_of_the_host_that_it_heard_last_re_8() -> None:
     camera = Camera()
     camera.tell(heartbeat(18))
-    assert camera.endpoint.components[0].address == Address(7, 100)
+    assert camera.component.address == Address(7, 100)
     camera.tell(LEVEL_NORTH, source=Address(9, 1))
-    assert camera.endpoint.components[0].address == Address(9, 100)
-    camera.endpoint.components[0].restart(camera.now)
-    assert camera.endpoint.components[0].address == Address(255, 100)
+    assert camera.component.address == Address(9, 100)
+    camera.component.restart(camera.now)
+    assert camera.component.address == Address(255, 100)
 
 
 @pytest.mark.parametrize('message', [
@@ -118,12 +108,11 @@ def test_capture_is_followed_by_camera_status_and_later_by_camera_feedback() -> 
     camera.wait(1.0)
     utc = int((HOST_UTC + 1.0) * 1e6)
 
-    assert camera.tell(control(1)) == [(Address(7, 100), CameraStatus(
-        utc, 7, 0, 1, mavlink.CAMERA_STATUS_TYPE_TRIGGER, 0.0, 0.0, 0.0, 0.0))]
+    assert camera.tell(control(1)) == [CameraStatus(
+        utc, 7, 0, 1, mavlink.CAMERA_STATUS_TYPE_TRIGGER, 0.0, 0.0, 0.0, 0.0)]
     assert camera.wait(0.1) == []
-    [(source, feedback)] = camera.wait(0.2)
+    [feedback] = camera.wait(0.2)
     assert isinstance(feedback, CameraFeedback)
-    assert source == Address(7, 100)
     assert (feedback.time_usec, feedback.target_system, feedback.img_idx, feedback.flags) == (
         utc, 7, 1, mavlink.CAMERA_FEEDBACK_CLOSEDLOOP)
     assert (feedback.lat, feedback.lng, feedback.alt_msl) == (481234567, -91234567, 500.25)
@@ -132,7 +121,7 @@ def test_capture_is_followed_by_camera_status_and_later_by_camera_feedback() -> 
 def test_img_idx_counts_images_by_mavlink_only() -> None:
     camera = Camera(interval=1.0)
     camera.wait(2.5)
-    indexes = [camera.tell(control(shot))[0][1].img_idx for shot in (1, 2)]
+    indexes = [camera.tell(control(shot))[0].img_idx for shot in (1, 2)]
 
     assert indexes == [1, 2]
     assert [(one.image, one.img_idx, one.trigger, one.shot) for one in camera.device.images] == [
@@ -247,7 +236,7 @@ def test_feedback_that_waits_is_bounded() -> None:
     camera = Camera('late')
     for _ in range(MAX_IMAGES + 2):
         camera.tell(control(1))
-    assert [one.img_idx for _, one in camera.wait(15.0)] == list(range(3, MAX_IMAGES + 3))
+    assert [one.img_idx for one in camera.wait(15.0)] == list(range(3, MAX_IMAGES + 3))
 
 
 def console(device: SimulatedRedEdge, line: str) -> Callable[[], None]:

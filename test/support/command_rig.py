@@ -7,12 +7,13 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
-import heapq
+import functools
 import math
 from typing import Any
 
 from illuminator_ros.mavlink import command_sender
 from illuminator_ros.mavlink.messages import Address, CommandAck, CommandInt
+from support.bench import Bench
 
 OURS = Address(1, 193)
 LIGHT = Address(1, 243)
@@ -41,23 +42,19 @@ class Run:
         return outcome
 
 
-class Rig:
+class Rig(Bench):
     """
-    A sender, and what it sends.
+    A sender, and a target.
 
     :param answers: the results that acknowledge each frame, one after the other.
-    :ivar now: s.
-    :ivar frames: everything sent, with the time.
     """
 
     def __init__(self, *answers: Sequence[int], timeout: float = 0.25, retries: int = 3,
                  clock_fault: Callable[[], str] = str) -> None:
-        self.now = 1000.0
-        self.frames: list[tuple[float, Any]] = []
         self.sender = command_sender.CommandSender(OURS, timeout, retries, clock_fault)
+        super().__init__(self.sender, 1000.0)
         self.runs: list[Run] = []
         self._answers = iter(answers)
-        self._acks: list[tuple[float, int, int]] = []
 
     def start(self, command: int = 405, target: Address = LIGHT, *, param1: float = 0.0,
               limit: float = math.inf, **options: Any) -> Run:
@@ -78,39 +75,15 @@ class Rig:
             source, CommandAck(command, result, progress, 0, *target), self.now)
         self.flush()
 
-    def run(self, seconds: float = LONG) -> None:
-        """Let time pass; answer and poll when that is due."""
-        end = self.now + seconds
-        while (due := min(self.sender.next_deadline(), self._next_ack())) <= end:
-            self.now = max(self.now, due)
-            if self._next_ack() <= self.now:
-                _, result, command = heapq.heappop(self._acks)
-                self.ack(result, command)
-            else:
-                self.poll()
-        self.now = end
-
-    def poll(self) -> None:
-        """Poll once, now."""
-        self.sender.poll(self.now)
-        self.flush()
-
-    def flush(self) -> None:
-        """Take the sent messages."""
-        while self.sender.outgoing:
-            message: Any = self.sender.outgoing.popleft()[1]
-            for place, result in enumerate(next(self._answers, ())):
-                heapq.heappush(self._acks, (
-                    self.now + DELAY * (place + 1), result, message.command))
-            self.frames.append((self.now, message))
-            number = int(message.z if isinstance(message, CommandInt) else message.param7)
-            if 0 < number <= len(self.runs):
-                self.runs[number - 1].frames.append((self.now, message))
-
-    def _next_ack(self) -> float:
-        return self._acks[0][0] if self._acks else math.inf
+    def answer(self, source: Address, message: Any) -> None:
+        """See :class:`Bench`."""
+        for place, result in enumerate(next(self._answers, ())):
+            self.later(DELAY * (place + 1), functools.partial(self.ack, result, message.command))
+        number = int(message.z if isinstance(message, CommandInt) else message.param7)
+        if 0 < number <= len(self.runs):
+            self.runs[number - 1].frames.append((self.now, message))
 
     @property
     def times(self) -> list[float]:
         """When frames were sent, s since the first."""
-        return [round(time - self.frames[0][0], 6) for time, _ in self.frames]
+        return [round(time - self.sent[0][0], 6) for time, _ in self.sent]

@@ -28,6 +28,7 @@ from illuminator_ros.payload.messages import (
 )
 from illuminator_ros.payload.mount_attitude import AXES
 from illuminator_ros.payload.rotation import Quaternion
+from support.bench import Bench
 
 OURS, DEVICE, AUTOPILOT = mav.Address(1, 193), mav.Address(1, 154), mav.Address(1, 1)
 PILOT, GUEST = mav.Address(255, 190), mav.Address(255, 191)
@@ -61,13 +62,11 @@ def attitude_status(
         0, 0, 0, int(flags), q, 0.0, 0.0, turning, 0, heading, NAN, 0)
 
 
-class ManagerRig:
+class ManagerRig(Bench):
     """
     A manager, and what it sends.
 
     :param draws: the random numbers that the manager draws; the last one is repeated.
-    :ivar now: s.
-    :ivar sent: everything that it has sent, with the time.
     :ivar device_information: the answer of the device; None for no device.
     :ivar lost: how many of its next answers are lost, and how many GIMBAL_DEVICE_INFORMATION.
     :ivar heading: of the vehicle, as the device reports it.
@@ -81,8 +80,6 @@ class ManagerRig:
         active: bool = True, draws: Sequence[float] = (0.25,),
         lost: tuple[float, float] = (0, 0), **settings: Any,
     ) -> None:
-        self.now = 1000.0
-        self.sent: list[tuple[float, Any]] = []
         self.events: list[ManagerEvent] = []
         self.device_information = device or information()
         self.device_is_there = not 0 < device_id < 7
@@ -92,9 +89,11 @@ class ManagerRig:
         self.draw = itertools.chain(draws, itertools.repeat(draws[-1])).__next__
         self.manager, self.component = self.make(CommandSender(address), ManagerSettings(
             control or ControlSettings(), device_id=device_id, **settings))
+        super().__init__(self.component, 1000.0)
         self.manager.events.subscribe(self.events.append)
         self.component.link_opened(self.now)
-        self._device_due = self.now
+        self._each: Callable[[], None] = lambda: None
+        self.later(0.0, self._beat)
         if active:
             self.run(5.0)
             assert self.manager.tracker.state is ManagerState.ACTIVE
@@ -106,21 +105,17 @@ class ManagerRig:
         manager = GimbalManager(commands, settings, self.draw)
         return manager, Component(commands, [manager])
 
-    def run(self, seconds: float, *, each: Callable[[], None] = lambda: None) -> None:
+    def run(self, seconds: float, *, each: Callable[[], None] = lambda: None) -> ManagerRig:
         """Let time pass; ``each`` is called with each heartbeat of the device, twice a second."""
-        until = self.now + seconds
-        while (due := min(self.component.next_deadline(), self._device_due)) <= until:
-            self.now = max(self.now, due)
-            if self.now >= self._device_due:
-                self._device_due = self.now + 0.5
-                if self.device_is_there:
-                    self.component.receive(DEVICE, mav.heartbeat(mavlink.MAV_TYPE_GIMBAL),
-                                           self.now)
-                    self.report()
-                each()
-            self.component.poll(self.now)
-            self._flush()
-        self.now = until
+        self._each = each
+        return super().run(seconds)
+
+    def _beat(self) -> None:
+        self.later(0.5, self._beat)
+        if self.device_is_there:
+            self.component.receive(DEVICE, mav.heartbeat(mavlink.MAV_TYPE_GIMBAL), self.now)
+            self.report()
+        self._each()
 
     def report(self, q: tuple[float, float, float, float] = (1.0, 0.0, 0.0, 0.0)) -> None:
         """Let the device report its attitude, and whether it accepts a yaw from north."""
@@ -132,24 +127,18 @@ class ManagerRig:
             q, flags=flags, heading=self.heading, turning=self.turning), self.now)
 
     def give(self, source: mav.Address, *messages: mav.Message) -> list[Any]:
-        """Return what the manager sends when it receives messages."""
+        """Return what the manager sends when it receives messages, and is polled then."""
         before = len(self.sent)
-        for message in messages:
-            self.component.receive(source, message, self.now)
-        if self.now >= self.component.next_deadline():
-            self.component.poll(self.now)
-        self._flush()
+        super().give(source, *messages)
+        self.poll()
         return [message for _, message in self.sent[before:]]
 
-    def _flush(self) -> None:
-        outgoing = self.component.outgoing
-        while outgoing:
-            source, message = outgoing.popleft()
-            assert source == self.component.address
-            self.sent.append((self.now, message))
-            if (isinstance(message, mav.CommandLong) and self.device_is_there
-                    and (message.target_system, message.target_component) == DEVICE):
-                self._answer(message, source)
+    def answer(self, source: mav.Address, message: Any) -> None:
+        """See :class:`Bench`."""
+        assert source == self.component.address
+        if (isinstance(message, mav.CommandLong) and self.device_is_there
+                and (message.target_system, message.target_component) == DEVICE):
+            self._answer(message, source)
 
     def _answer(self, message: mav.CommandLong, source: mav.Address) -> None:
         answers, messages = self.lost
@@ -188,10 +177,6 @@ class ManagerRig:
     def points(self, player: mav.Address, pitch: float = 0.1, yaw: float = 0.0) -> list[Any]:
         """Return the messages to the device when a player sets angles, rad."""
         return of(GimbalDeviceSetAttitude, self.give(player, pitch_yaw(pitch, yaw)))
-
-    def messages(self, cls: type[T], since: float = 0.0) -> list[T]:
-        """Return the messages of a class that it has sent."""
-        return of(cls, (message for at, message in self.sent if at >= since))
 
 
 def of(cls: type[T], messages: Iterable[Any]) -> list[T]:

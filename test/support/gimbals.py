@@ -23,6 +23,7 @@ from illuminator_ros.mavlink.dialect import entry_names, mavlink
 from illuminator_ros.mavlink.link import Link
 from illuminator_ros.payload.messages import GeoPoint, GimbalDeviceAttitudeStatus
 from illuminator_ros.payload.requests import Done, Result
+from support.bench import Bench
 from support.live_link import EndpointLink
 
 OURS, AUTOPILOT, DEVICE, OTHER = (mav.Address(1, component) for component in (193, 1, 154, 195))
@@ -32,7 +33,6 @@ LEVEL = (1.0, 0.0, 0.0, 0.0)
 PLACE = GeoPoint(47.0, 8.5, 500.0)
 
 E = TypeVar('E', bound=GimbalEvent)
-M = TypeVar('M', bound=mav.Message)
 
 
 @dataclass
@@ -180,11 +180,10 @@ def device_information(**fields: Any) -> gm.GimbalDeviceInformation:
         'pitch_max': 0.5, 'yaw_min': -3.0, 'yaw_max': 3.0, **fields})
 
 
-class Rig:
+class Rig(Bench):
     """
     A client and managers on one link.
 
-    :ivar sent: what the client has sent, with the time.
     :ivar results: of the requests that were made with :attr:`done`.
     """
 
@@ -193,10 +192,9 @@ class Rig:
         self.commands = CommandSender(OURS)
         self.client = GimbalClient(self.commands, GimbalSettings(**settings))
         self.component = Component(self.commands, [self.client])
+        super().__init__(self.component, 100.0)
         self.events: list[GimbalEvent] = []
         self.results: list[Result] = []
-        self.sent: list[tuple[float, mav.Message]] = []
-        self.now = 100.0
         self._tenth = 0
         self.client.events.subscribe(self.events.append)
         self.component.link_opened(self.now)
@@ -214,36 +212,25 @@ class Rig:
         """Return the events of a kind."""
         return [event for event in self.events if isinstance(event, kind)]
 
-    def messages(self, kind: type[M]) -> list[M]:
-        """Return the messages of a kind that the client has sent."""
-        return [message for _, message in self.sent if isinstance(message, kind)]
-
     def receive(self, source: mav.Address, message: mav.Message) -> None:
         self.component.receive(source, message, self.now)
 
-    def run(self, seconds: float) -> Rig:
+    def run_until(self, until: float = math.inf) -> None:
         """Let time pass in steps of 20 ms."""
-        for step in range(round(seconds / 0.02)):
+        for step in range(round((until - self.now) / 0.02)):
             if step % 5 == 0:
                 for manager in self.managers:
                     for one in manager.sent_each(self._tenth):
                         self.receive(*one)
                 self._tenth += 1
-            self._exchange()
+            self.poll()
             self.now += 0.02
-        return self
 
-    def _exchange(self) -> None:
-        # Poll at deadlines only, as the link does, so that a missing deadline shows.
-        if self.now >= self.component.next_deadline():
-            self.component.poll(self.now)
-        outgoing = self.component.outgoing
-        while outgoing:
-            source, message = outgoing.popleft()
-            self.sent.append((self.now, message))
-            for manager in self.managers:
-                for one in manager.take(source, message):
-                    self.receive(*one)
+    def answer(self, source: mav.Address, message: mav.Message) -> None:
+        """See :class:`Bench`."""
+        for manager in self.managers:
+            for one in manager.take(source, message):
+                self.receive(*one)
 
 
 class GimbalEndpoint(Endpoint):

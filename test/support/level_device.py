@@ -6,17 +6,15 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Collection
+from collections.abc import Collection
 import functools
-import heapq
-import itertools
-import math
 from typing import Any
 
 from illuminator_ros.mavlink.command_sender import CommandSender
 from illuminator_ros.mavlink.dialect import mavlink
 from illuminator_ros.mavlink.messages import Address, CommandAck
 from illuminator_ros.payload.attempt import Change, Target
+from support.bench import Bench
 
 US, DEVICE = Address(1, 194), Address(1, 7)
 SET_LEVEL, STATUS_ID = 31000, 40000
@@ -37,7 +35,7 @@ def level_change(level: int, **options: Any) -> Change[int | None]:
         **options)
 
 
-class Bench(ABC):
+class LevelBench(Bench, ABC):
     """
     The sending side of a command under test, and the device; times are s since the start.
 
@@ -47,21 +45,17 @@ class Bench(ABC):
     :ivar executes: the last results of the commands that it executes.
     :ivar sends_status: whether it sends its status on request.
     :ivar tries: when commands were sent; likewise ``requests`` for the status.
-    :ivar sent: the commands.
     """
 
     def __init__(self, level: int | None = 0, *results: Any, **device: Any) -> None:
-        self.now = 0.0
         self.commands = CommandSender(US)
+        super().__init__(self.commands, 0.0)
         self.level = level
         self.results = list(results or [ACCEPTED])
         self.executes: Collection[int | None] = (ACCEPTED,)
         self.sends_status = True
-        self.sent: list[Any] = []
         self.tries: list[float] = []
         self.requests: list[float] = []
-        self._line: list[tuple[float, int, Callable[[], None]]] = []
-        self._number = itertools.count()
         for name, value in device.items():
             setattr(self, name, value)
 
@@ -77,51 +71,29 @@ class Bench(ABC):
         """Take a status."""
 
     @abstractmethod
-    def poll(self) -> None:
+    def act(self) -> None:
         """Do what is due."""
 
     @abstractmethod
+    def due(self) -> float:
+        """Return when :meth:`act` has something to do."""
+
     def next_deadline(self) -> float:
-        """Return when :meth:`poll` has something to do."""
+        """See :class:`Bench`."""
+        return min(self.commands.next_deadline(), self.due())
 
-    def step(self, until: float = math.inf) -> bool:
-        """Let time pass until something happens before then; return whether it does."""
-        self.flush()
-        due = min(self.commands.next_deadline(), self.next_deadline(),
-                  self._line[0][0] if self._line else math.inf)
-        if due >= until:
-            return False
-        self.now = max(self.now, due)
-        if self._line and self._line[0][0] <= self.now:
-            heapq.heappop(self._line)[2]()
+    def poll(self) -> None:
+        """See :class:`Bench`."""
         self.commands.poll(self.now)
-        self.poll()
-        return True
-
-    def run(self, until: float = math.inf) -> None:
-        """Let time pass until then, or until nothing is due."""
-        while self.step(until):
-            pass
+        self.act()
         self.flush()
-        self.now = until
 
     # The line and the device
 
-    def flush(self) -> None:
+    def answer(self, source: Address, message: Any) -> None:
         """Put what was sent on the line."""
-        while self.commands.outgoing:
-            message: Any = self.commands.outgoing.popleft()[1]
-            self.later(LATENCY, functools.partial(self._receive, message))
-            at = round(self.now, 3)
-            if message.command == SET_LEVEL:
-                self.sent.append(message)
-                self.tries.append(at)
-            else:
-                self.requests.append(at)
-
-    def later(self, seconds: float, call: Callable[[], None]) -> None:
-        """Call something after a time."""
-        heapq.heappush(self._line, (self.now + seconds, next(self._number), call))
+        self.later(LATENCY, functools.partial(self._receive, message))
+        (self.tries if message.command == SET_LEVEL else self.requests).append(round(self.now, 3))
 
     def acknowledge(self, result: int) -> None:
         """Acknowledge a command at once."""
