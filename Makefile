@@ -7,7 +7,7 @@ TESTS ?= test
 SECONDS ?= 60
 # Each of the many processes of the tests would compile each module again.
 export PYTHONDONTWRITEBYTECODE =
-# Arguments of bench/run.py, such as '--repeat 3 enable'.
+# Arguments of tools/bench, such as '--repeat 3 enable'.
 BENCH ?=
 
 .PHONY: help demo test check lint unit fuzz soak bench pictures doc-tables clean environment
@@ -31,7 +31,7 @@ environment:
 
 demo:
 	@python3 tools/environment.py demo $(ROS)
-	@$(PYTHON_IN_VENV) demo/run.py
+	@$(PYTHON_IN_VENV) -m tools.demo
 
 # The types of rclpy differ: mypy checks with those of Jazzy.
 test: $(if $(filter-out jazzy,$(ROS)),environment,check)
@@ -58,10 +58,10 @@ soak: environment
 	@$(PYTHON_IN_VENV) test/soak/run.py --seconds $(SECONDS)
 
 bench: environment
-	@$(PYTHON_IN_VENV) bench/run.py $(BENCH)
+	@$(PYTHON_IN_VENV) -m tools.bench $(BENCH)
 
 pictures: environment
-	@$(PYTHON_IN_VENV) demo/pictures.py
+	@$(PYTHON_IN_VENV) -m tools.pictures
 
 doc-tables: environment
 	@$(PYTHON_IN_VENV) -m tools.doc_tables

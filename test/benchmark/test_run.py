@@ -11,7 +11,7 @@ from support.processes import environment, ROOT
 
 def run(*arguments: str) -> subprocess.CompletedProcess[str]:
     return subprocess.run(
-        [sys.executable, str(ROOT / 'bench/run.py'), *arguments], env=environment(), cwd=ROOT,
+        [sys.executable, '-m', 'tools.bench', *arguments], env=environment(), cwd=ROOT,
         text=True, capture_output=True, timeout=110)
 
 

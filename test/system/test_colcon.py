@@ -21,7 +21,7 @@ from support.ros import Parameters, Ros
 
 COLCON = shutil.which('colcon', path=f'{Path(sys.executable).parent}:/usr/bin')
 LEFT_OUT = shutil.ignore_patterns(
-    '.*', '__pycache__', '*.egg-info', 'build', 'install', 'log', 'bench', 'demo')
+    '.*', '__pycache__', '*.egg-info', 'build', 'install', 'log', 'tools')
 EXECUTABLES = ('bridge', 'conformance', 'discover', 'doctor', 'monitor', 'set', 'simulator')
 
 pytestmark = [pytest.mark.skipif(COLCON is None, reason='colcon is not installed'),

@@ -16,8 +16,7 @@ import os, random, sys
 # A domain that no other test uses.
 domain = int(os.environ['ROS_DOMAIN_ID'])
 random.randrange = lambda *bounds: domain
-sys.path.insert(0, 'demo')
-import run
+from tools.demo import __main__ as run
 run.fly = lambda: True
 sys.exit(run.main())
 """

@@ -29,7 +29,7 @@ def test_images_of_a_flight_agree_with_the_truth_although_the_middleware_prints(
 ) -> None:
     (tmp_path / 'sitecustomize.py').write_text(PRINTING)
     pytest.importorskip('serial', reason='pyserial is not installed')
-    flight = Program(sys.executable, 'demo/flight.py', '--seconds', '36', '--speed', '3',
+    flight = Program(sys.executable, '-m', 'tools.demo.flight', '--seconds', '36', '--speed', '3',
                      env={'ROS_DOMAIN_ID': str(domain), 'PYTHONPATH': str(tmp_path)})
     try:
         # The flight ends by itself in less time if a program does not start.

@@ -13,7 +13,7 @@ import socket
 import subprocess
 import sys
 
-ROOT = Path(__file__).resolve().parent.parent
+ROOT = Path(__file__).resolve().parents[2]
 # s for a program to end after SIGINT.
 END_TIMEOUT = 5.0
 

@@ -13,30 +13,28 @@ import sys
 import threading
 import time
 
-from illuminator_ros.mavlink.dialect import mavlink
+from illuminator_ros.mavlink.link import Link
 from rcl_interfaces.srv import SetParameters
 from rclpy.parameter import Parameter
+from support.light import CONFIGURE, ServedLight
 from support.ports import free_port
 from support.processes import ended, Program, start_interpreter
 
-from ..devices import serving
 from ..rig import (
     alternate,
     Bench,
     bridge,
     Client,
     interleaved,
-    PATIENCE,
     peer,
     PEERS,
-    ready,
     simulator,
     udp,
 )
 from ..rows import at_most, quantiles, Row, times
 
-OURS, MINIMAL, EMPTY, SCRIPT = (
-    f'/{name}/enable' for name in ('illuminator', 'minimal', 'empty', 'straightforward'))
+OURS, EMPTY, SCRIPT = (
+    f'/{name}/enable' for name in ('illuminator', 'empty', 'straightforward'))
 CLIENTS = 20
 
 
@@ -44,31 +42,27 @@ def enable(bench: Bench) -> Iterator[Row]:
     """
     Call ``~/enable`` over UDP, acknowledged by the light and verified by a status.
 
-    The light is the simulator. In a second row it is a minimal light, which answers almost
-    immediately, so that the row shows the bridge's own share.
+    The light is the simulator.
     """
-    ports = [free_port() for _ in range(3)]
+    ports = [free_port() for _ in range(2)]
     with contextlib.ExitStack() as stack:
         for program in (
                 simulator(ports[0]), simulator(ports[1]),
-                ready(start_interpreter('bench.devices', str(ports[2])), 'ready'),
-                bridge(udp(ports[0])), bridge(udp(ports[2]), 'minimal'),
+                bridge(udp(ports[0])),
                 peer('straightforward', f'udpin:127.0.0.1:{ports[1]}'), peer('empty_server')):
             stack.enter_context(program)
         client = stack.enter_context(Client(bench))
-        for name in (OURS, MINIMAL, EMPTY, SCRIPT):
+        for name in (OURS, EMPTY, SCRIPT):
             client.meet(name)
         found = alternate({name: functools.partial(client.enable, name)
-                           for name in (OURS, MINIMAL, EMPTY, SCRIPT)},
+                           for name in (OURS, EMPTY, SCRIPT)},
                           bench.amount(1500, 3), bench.amount(50, 1))
-    ours, minimal, empty, script = found.values()
+    ours, empty, script = found.values()
     yield Row(
         '~/enable over UDP, verified', 'ms', ours,
         {'empty SetBool server': empty, 'straightforward script': script},
         [times(ours, empty, 1.8, 'p50'), times(ours, empty, 2.0, 'p99'),
          times(ours, script, 1.1, 'p50', 'the script')], 'the script does not verify')
-    yield Row('~/enable of a light that answers at once', 'ms', minimal,
-              {'empty SetBool server': empty})
     yield at_once(bench)
 
 
@@ -97,47 +91,6 @@ def at_once(bench: Bench) -> Row:
                {'': seconds}, targets=[at_most(answers.count(False), 0, 'calls unanswered')])
 
 
-LIGHTS, CALLS, ROUNDS = 4, 100, 3
-BESIDE, ALONE = 'beside a silent light', 'undisturbed'
-
-
-def parallel(bench: Bench) -> Iterator[Row]:
-    """Call three lights; in every second round one more is silent and called meanwhile."""
-    port = free_port()
-    names = ['illuminator', *(f'illuminator_1_{243 + number}' for number in range(1, LIGHTS))]
-    *others, silent = (f'/{name}/enable' for name in names)
-    took: dict[str, list[float]] = {BESIDE: [], ALONE: []}
-    with (bridge(udp(port), target_component=243), serving(port, LIGHTS) as lights,
-          Client(bench) as client, Client(bench) as second):
-        for service in others:
-            client.meet(service)
-        second.meet(silent)
-        stop = threading.Event()
-
-        def keep_calling() -> None:
-            while not stop.is_set():
-                second.call(silent, patience=10.0)
-
-        for _ in range(bench.amount(ROUNDS, 1)):
-            for kind, values in took.items():
-                thread = threading.Thread(target=keep_calling)
-                if kind == BESIDE:
-                    stop.clear()
-                    lights[-1].silent = {mavlink.MAV_CMD_ILLUMINATOR_ON_OFF}
-                    lights[-1].asked.clear()
-                    thread.start()
-                    lights[-1].asked.wait(PATIENCE)
-                for number in range(bench.amount(CALLS, 3)):
-                    values.append(client.enable(others[number % len(others)])[0] * 1e3)
-                if kind == BESIDE:
-                    stop.set()
-                    lights[-1].silent = set()
-                    thread.join()
-    ours, alone = quantiles(took[BESIDE]), quantiles(took[ALONE])
-    yield Row('~/enable of three lights beside a silent one', 'ms', ours, {ALONE: alone},
-              [times(ours, alone, 3.0, 'p99')])
-
-
 def limited(what: str, took: list[float], limit: float) -> Row:
     """Return a row of times, s, the longest of which has a limit, ms."""
     took = [seconds * 1e3 for seconds in took]
@@ -161,9 +114,9 @@ def limits(bench: Bench) -> Iterator[Row]:
                       [client.call('/illuminator/enable')[0] for _ in tries], 300)
         yield limited('a set of parameters without a light fails',
                       [set_brightness(50.0) for _ in tries], 300)
-        with serving(port) as (light,):
+        with ServedLight(port, link=Link) as light:
             client.meet('/illuminator/enable')
-            light.silent = {mavlink.MAV_CMD_DO_ILLUMINATOR_CONFIGURE}
+            light.fake.results = {CONFIGURE: None}
             yield limited('a set of parameters is answered beside a silent light',
                           [set_brightness(10.0 + number) for number in tries], 900)
     for what, off in (('the bridge ends', False),

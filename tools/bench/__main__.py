@@ -5,8 +5,8 @@
 Measures the bridge beside its peers, and prints the table of doc/performance.md.
 
     make bench                               everything; needs ROS (rclpy)
-    python3 bench/run.py enable status       these subjects
-    python3 bench/run.py --repeat 3 enable   and how often each target was met
+    python3 -m tools.bench enable status     these subjects, in the folder of the repository
+    python3 -m tools.bench --repeat 3 enable   and how often each target was met
 
 Exit status: 0; 1 if a measurement fails; 2 if an argument is wrong. Measure on a machine without
 other load. A missed target is printed.
@@ -24,18 +24,18 @@ import signal
 import sys
 import time
 
-ROOT = Path(__file__).resolve().parents[1]
-sys.path[:0] = [str(ROOT), str(ROOT / 'test')]
+from .rows import Row, Target
+from .subjects import SUBJECTS
 
-from bench.rows import Row, Target  # noqa: E402
-from bench.subjects import SUBJECTS  # noqa: E402
+sys.path.append(str(Path(__file__).resolve().parents[2] / 'test'))
 
 
 def measure(names: Sequence[str], rows: list[Row], *, quick: bool) -> list[str]:
     """Print and append the rows of some subjects; return the subjects that failed."""
     # Slow, and not needed for --help.
-    from bench.rig import Bench
     from support.ports import claimed_domain
+
+    from .rig import Bench
 
     failed = []
     os.environ['ROS_AUTOMATIC_DISCOVERY_RANGE'] = 'LOCALHOST'
@@ -46,7 +46,7 @@ def measure(names: Sequence[str], rows: list[Row], *, quick: bool) -> list[str]:
         for name in names:
             print(f'  {name}', file=sys.stderr, flush=True)
             try:
-                module = importlib.import_module(f'bench.subjects.{SUBJECTS[name]}')
+                module = importlib.import_module(f'tools.bench.subjects.{SUBJECTS[name]}')
                 for row in getattr(module, name)(Bench(domain, quick)):
                     rows.append(row)
                     print(row, flush=True)

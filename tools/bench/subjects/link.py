@@ -19,14 +19,15 @@ from illuminator_ros.illuminator.settings import LightSettings
 from illuminator_ros.mavlink.dialect import mavlink
 from illuminator_ros.mavlink.messages import Address, heartbeat
 from support.client import Client
+from support.fake_light import FakeLight
 from support.frames import Codec, frame_of
+from support.live_link import EndpointLink
 from support.lossy_line import COMMANDS, CONFIRMED, Run
 from support.ports import free_port
 from support.ptys import PtyDevice
 from support.simulated_link import SimulatedLink
 from support.wire import Faults
 
-from ..devices import serving
 from ..rig import Bench, bridge, interleaved, PATIENCE, udp, wait_until
 from ..rows import at_most, quantiles, Row, times
 
@@ -37,11 +38,12 @@ SETTLING, COUNTED = 6.0, 10.0
 def overhead(bench: Bench) -> Iterator[Row]:
     """Count the bytes of MAVLink that the bridge adds to a link with one light."""
     port = free_port()
-    with bridge(udp(port)), serving(port) as (light,):
+    seconds = bench.amount(COUNTED, 0.2)
+    with bridge(udp(port)), EndpointLink(f'udpout://127.0.0.1:{port}', FakeLight()) as light:
         time.sleep(bench.amount(SETTLING, 0.2))
-        before, seconds = light.received, bench.amount(COUNTED, 0.2)
+        before = light.state().traffic.bytes_received
         time.sleep(seconds)
-        rate = (light.received - before) / seconds
+        rate = (light.state().traffic.bytes_received - before) / seconds
     yield Row('bytes added to the link by the bridge', 'B/s', {'': rate},
               targets=[at_most(rate, 60, 'B/s')], note='without UDP and IP headers')
 

@@ -4,7 +4,7 @@
 """
 Floods services and topics until it is killed, as fast as it can.
 
-    python3 -m bench.flooder /illuminator/enable std_srvs/srv/SetBool ~ ...
+    python3 -m tools.bench.flooder /illuminator/enable std_srvs/srv/SetBool ~ ...
 
 Each endpoint is a name, a type, and a kind of request: ~ for the plain one, else one of LARGE.
 """

@@ -13,18 +13,18 @@ from __future__ import annotations
 from collections.abc import Iterator
 import contextlib
 import math
-import random
+import os
+import select
+import threading
 import time
+import tty
 
-from geometry_msgs.msg import Quaternion as QuaternionMessage
-from illuminator_ros.payload.rotation import Quaternion
-from illuminator_ros.rededge import conversions
+from geometry_msgs.msg import Quaternion
 from sensor_msgs.msg import Imu, NavSatFix, NavSatStatus
 from std_msgs.msg import Header
 from support.processes import start_interpreter
 from support.strict_mavlink_1 import OVERHEAD, strict_frames
 
-from ..devices import SerialEnd
 from ..rig import Bench, Client, cpu, peer, ready, wait_until
 from ..rows import at_most, quantiles, Row, times
 
@@ -32,36 +32,51 @@ from ..rows import at_most, quantiles, Row, times
 LINE_RATE = 57600 / 10
 FIX_RATE = 10.0
 GPS_RAW_INT = 24
-ROTATIONS = 100_000
 
 
-class Line(SerialEnd):
-    """The far end of a serial line; it notes when each frame was sent, by its content."""
+class Line:
+    """
+    The far end of a serial line, read in a thread; it notes when each frame was sent.
+
+    :ivar device: the path of the near end.
+    :ivar sent: when the last byte of each fix was sent, s, by its latitude.
+    """
 
     def __init__(self) -> None:
-        super().__init__()
-        self.frames = 0
-        # When the last byte of each fix was sent, s, by its latitude.
+        self._far, self._near = os.openpty()
+        tty.setraw(self._near)
+        self.device = os.ttyname(self._near)
         self.sent: dict[int, float] = {}
         self._rest, self._free_at = b'', 0.0
+        self._stopping, self._stop = os.pipe()
+        self._thread = threading.Thread(target=self._run)
 
-    def take(self, data: bytes) -> None:
-        """Note when fixes were sent."""
-        self._free_at = max(self._free_at, time.perf_counter()) + len(data) / LINE_RATE
-        found, self._rest = strict_frames(self._rest + data)
-        end = self._free_at - len(self._rest) / LINE_RATE
-        for frame in reversed(found):
-            if frame.message_id == GPS_RAW_INT:
-                self.sent[int.from_bytes(frame.payload[8:12], 'little')] = end
-            end -= (len(frame.payload) + OVERHEAD) / LINE_RATE
-        self.frames += len(found)
+    def __enter__(self) -> Line:
+        self._thread.start()
+        return self
+
+    def __exit__(self, *error: object) -> None:
+        os.write(self._stop, b'\0')
+        self._thread.join()
+        for descriptor in (self._far, self._near, self._stopping, self._stop):
+            os.close(descriptor)
+
+    def _run(self) -> None:
+        while self._stopping not in select.select([self._far, self._stopping], [], [])[0]:
+            data = os.read(self._far, 65536)
+            self._free_at = max(self._free_at, time.perf_counter()) + len(data) / LINE_RATE
+            found, self._rest = strict_frames(self._rest + data)
+            end = self._free_at - len(self._rest) / LINE_RATE
+            for frame in reversed(found):
+                if frame.message_id == GPS_RAW_INT:
+                    self.sent[int.from_bytes(frame.payload[8:12], 'little')] = end
+                end -= (len(frame.payload) + OVERHEAD) / LINE_RATE
 
 
 def rededge(bench: Bench) -> Iterator[Row]:
     """Feed both at once, at a rate that the line can carry and at a rate that it cannot."""
     for rate in (50.0, 200.0):
         yield from fed(bench, rate)
-    yield orientation(bench)
 
 
 def fed(bench: Bench, rate: float) -> Iterator[Row]:
@@ -111,7 +126,7 @@ def publish(
         time.sleep(max(start + number / rate - time.perf_counter(), 0.0))
         header = Header(stamp=node.get_clock().now().to_msg())
         angle = number / rate
-        imus.publish(Imu(header=header, orientation=QuaternionMessage(
+        imus.publish(Imu(header=header, orientation=Quaternion(
             w=math.cos(angle), x=0.0, y=0.0, z=math.sin(angle))))
         if number % every == 0:
             began[number + 1] = time.perf_counter()
@@ -120,32 +135,3 @@ def publish(
                 longitude=8.0, altitude=500.0))
     return (began, [cpu(pid) - first for pid, first in zip(pids, before, strict=True)],
             time.perf_counter() - start)
-
-
-def orientation(bench: Bench) -> Row:
-    """Compose the sent angles of random attitudes and mounts, and compare them with the input."""
-    from scipy.spatial.transform import Rotation
-
-    chance = random.Random(1)
-    count = bench.amount(ROTATIONS, 100)
-    given: list[list[float]] = []
-    sent: list[list[float]] = []
-    for _ in range(count):
-        vehicle, body = (Quaternion(*(chance.gauss(0, 1) for _ in range(4))).normalized()
-                         for _ in range(2))
-        one, two = conversions.attitude(vehicle, (0.0, 0.0, 0.0), 0), conversions.mount_status(
-            conversions.mount_angles(body, conversions.MountFrame.CAMERA), (1, 100))
-        both = vehicle * body
-        given.append([both.x, both.y, both.z, both.w])
-        sent.append([one.yaw, one.pitch, one.roll, *(
-            math.radians(value / 100)
-            for value in (two.pointing_c, two.pointing_a, two.pointing_b))])
-    enu_ned = Rotation.from_matrix([[0, 1, 0], [1, 0, 0], [0, 0, -1]])
-    flu_frd = Rotation.from_euler('x', math.pi)
-    zero_pose = Rotation.from_matrix([[0, 0, -1], [0, 1, 0], [1, 0, 0]])
-    composed = (Rotation.from_euler('ZYX', [row[:3] for row in sent]) * zero_pose
-                * Rotation.from_euler('ZYX', [row[3:] for row in sent]))
-    wanted = enu_ned * Rotation.from_quat(given) * flu_frd
-    error = math.degrees(max((composed.inv() * wanted).magnitude()))
-    return Row(f'greatest error of {count:,} random attitudes with mounts, as sent', 'degrees',
-               {'': error}, targets=[at_most(error, 0.01, 'degrees')])

@@ -10,5 +10,5 @@ SUBJECTS = {
     'noise': 'receiving', 'memory': 'process', 'startup': 'services', 'overhead': 'link',
     'forward': 'forwarding',
     'lights': 'link', 'nodes': 'process', 'reconnection': 'link', 'loss': 'link',
-    'parallel': 'services', 'floods': 'floods', 'rededge': 'rededge', 'limits': 'services',
+    'floods': 'floods', 'rededge': 'rededge', 'limits': 'services',
     'browsers': 'browsers'}

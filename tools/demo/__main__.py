@@ -25,15 +25,11 @@ import textwrap
 import time
 from typing import NamedTuple
 
-sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
-# Before rclpy is imported: a ROS graph of its own, on this machine only.
-os.environ['ROS_DOMAIN_ID'] = str(random.randrange(1, 101))
-os.environ['ROS_AUTOMATIC_DISCOVERY_RANGE'] = 'LOCALHOST'
+from illuminator_ros.mavlink.messages import Address
 
-from ground_station import ADDRESS, GroundStation  # noqa: E402
-from illuminator_ros.mavlink.messages import Address  # noqa: E402
-from programs import free_port, running  # noqa: E402
-from ros_client import Failed, RosClient  # noqa: E402
+from .ground_station import ADDRESS, GroundStation
+from .programs import free_port, ROOT, running
+from .ros_client import Failed, RosClient
 
 LIGHT = Address(1, 243)
 # Of the light and the gimbal.
@@ -225,12 +221,15 @@ def fly() -> bool:
     """Run the flight of the camera; return whether it succeeded."""
     print(FLIGHT, flush=True)
     return not subprocess.run(
-        [sys.executable, Path(__file__).with_name('flight.py'), '--seconds', '36'],
+        [sys.executable, '-m', 'tools.demo.flight', '--seconds', '36'], cwd=ROOT,
         check=False).returncode
 
 
 def main() -> int:
     """Run the demonstration."""
+    # A ROS graph of its own, on this machine only.
+    os.environ['ROS_DOMAIN_ID'] = str(random.randrange(1, 101))
+    os.environ['ROS_AUTOMATIC_DISCOVERY_RANGE'] = 'LOCALHOST'
     print(INTRODUCTION.strip(), (WITH_ROS2 if shutil.which('ros2') else WITHOUT_ROS2).strip(),
           sep='\n')
     commands = {

@@ -70,12 +70,12 @@ class Flooded:
     def _running(self) -> Iterator[Program]:
         port, payload = free_port(), NODES[self._node]
         with contextlib.ExitStack() as stack:
-            stack.enter_context(
-                simulator(port, '--payload', payload) if payload else
-                ready(start_interpreter('bench.devices', str(port), str(self._count)), 'ready'))
+            stack.enter_context(simulator(port, *(
+                ('--payload', payload) if payload else
+                ('--count', str(self._count), '--component-id', '1'))))
             options = () if payload else ('--ros-args', '-p', 'off_on_shutdown:=true')
             bridge = stack.enter_context(ready(start_interpreter(
-                'bench.timed_bridge', self._node, udp(port), *options), 'link open'))
+                'tools.bench.timed_bridge', self._node, udp(port), *options), 'link open'))
             bridge.wait_for(' connected', PATIENCE, self._count)
             yield bridge
 
@@ -158,7 +158,7 @@ def floods(bench: Bench) -> Iterator[Row]:
 @contextlib.contextmanager
 def flooding(flood: Sequence[Endpoint]) -> Iterator[None]:
     """Flood endpoints from a process of its own."""
-    program = start_interpreter('bench.flooder', *(text for one in flood for text in one))
+    program = start_interpreter('tools.bench.flooder', *(text for one in flood for text in one))
     try:
         program.wait_for('flooding', PATIENCE)
         yield

@@ -1,14 +1,13 @@
 # Copyright 2026 The illuminator_ros developers
 # SPDX-License-Identifier: Apache-2.0
 
-"""Frames of others that are forwarded: delay, CPU and loss, and a slow line."""
+"""Frames of others that are forwarded: delay, CPU and loss."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator
 import contextlib
 import importlib.util
-import os
 from pathlib import Path
 import socket
 import statistics
@@ -17,12 +16,8 @@ import tempfile
 import threading
 import time
 
-from illuminator_ros.mavlink import messages as mav
-from illuminator_ros.mavlink.dialect import decode, mavlink
-from support.frames import Codec
 from support.processes import Program
 
-from ..devices import SerialEnd
 from ..rig import (
     alternate,
     Bench,
@@ -35,7 +30,7 @@ from ..rig import (
     settle,
     wait_until,
 )
-from ..rows import at_most, quantiles, Row, times
+from ..rows import at_most, Row, times
 from ..traffic import frames, Line
 
 OURS, MAVPROXY, BARE = 'bridge', 'MAVProxy', 'bare UDP forwarder'
@@ -45,10 +40,6 @@ RATE, BLOCK = 5000, 10_000
 PREPARED = 8192
 # s between two frames whose delay is measured.
 PERIOD = 0.004
-# The far end of the slow line, and a ground station that commands it.
-FAR, STATION = mav.Address(42, 1), mav.Address(255, 190)
-# bytes/s
-LINE_RATE = 57600 / 10
 
 
 class Sink:
@@ -97,7 +88,7 @@ def split(data: bytes) -> Iterator[bytes]:
 
 
 def forward(bench: Bench) -> Iterator[Row]:
-    """Measure between two UDP ports, then over a slow line."""
+    """Measure between two UDP ports."""
     prepared = frames(count=PREPARED)
     with contextlib.ExitStack() as stack:
         names = [OURS, BARE] + [MAVPROXY] * (importlib.util.find_spec('MAVProxy') is not None)
@@ -110,7 +101,6 @@ def forward(bench: Bench) -> Iterator[Row]:
         yield delay(bench, prepared, lines, sinks)
         yield from load(bench, prepared, lines, sinks,
                         {name: program.pid for name, program in programs.items()})
-    yield slow_line(bench, prepared)
 
 
 @contextlib.contextmanager
@@ -180,58 +170,3 @@ def load(
               for name, number in lost.items()}
     yield Row(f'frames lost of {count * len(cost[OURS]):,} at {RATE:,} frames/s', '%',
               shares.pop(OURS), shares, [at_most(lost[OURS], 0, 'frames')])
-
-
-class SlowLine(SerialEnd):
-    """
-    The far end of a serial line of 57,600 baud, on which a component is heard.
-
-    Each byte takes the time of the line, from its arrival or from the end of the byte before.
-
-    :ivar sent: when the last byte of each command was sent, s, by its first parameter.
-    """
-
-    def __init__(self) -> None:
-        super().__init__()
-        self.sent: dict[float, float] = {}
-        self._codec = Codec()
-        self._free_at = 0.0
-
-    def beat(self) -> None:
-        """Send a heartbeat of the component."""
-        os.write(self.far, self._codec.frame(FAR, mav.heartbeat(mavlink.MAV_TYPE_GENERIC)))
-
-    def take(self, data: bytes) -> None:
-        """Note when commands were sent."""
-        self._free_at = max(self._free_at, time.monotonic()) + len(data) / LINE_RATE
-        for frame in self._codec.decoder.feed(data):
-            if frame.message_id == mav.CommandLong.id:
-                self.sent[decode(mav.CommandLong, frame.payload).param1] = self._free_at
-
-
-def slow_line(bench: Bench, prepared: list[bytes]) -> Row:
-    """Measure the delay of commands through a line that cannot carry the other frames."""
-    began: dict[float, float] = {}
-    with contextlib.ExitStack() as stack:
-        slow = stack.enter_context(SlowLine())
-        telemetry = stack.enter_context(Line('UDP'))
-        stack.enter_context(bridge(
-            telemetry.urls[0], forward_urls=f"['serial://{slow.device}:57600']"))
-        station = stack.enter_context(socket.socket(type=socket.SOCK_DGRAM))
-        codec = Codec()
-
-        def command() -> None:
-            number = float(len(began))
-            began[number] = time.monotonic()
-            station.sendto(codec.frame(STATION, mav.CommandLong(
-                *FAR, mavlink.MAV_CMD_DO_SET_MODE, 0, number, 0, 0, 0, 0, 0, 0)),
-                ('127.0.0.1', telemetry.port))
-
-        for _ in range(bench.amount(100, 3)):
-            slow.beat()
-            telemetry.feed(prepared, RATE, RATE // 5)
-            command()
-        wait_until(lambda: slow.sent.keys() >= began.keys(), 'all commands have arrived')
-    delays = quantiles([1e3 * (slow.sent[number] - at) for number, at in began.items()], 0.5, 1)
-    return Row('delay of a COMMAND_LONG over a line of 57,600 baud, beside '
-               f'{RATE:,} frames/s for it', 'ms', delays)

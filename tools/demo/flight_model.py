@@ -11,12 +11,10 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
-import itertools
 import math
 from typing import NamedTuple
 
 from illuminator_ros.payload.rotation import Quaternion, Vector
-from illuminator_ros.rededge.conversions import interpolate
 
 # m/s, degrees, m/s^2
 SPEED, BANK, GRAVITY = 5.0, 40.0, 9.81
@@ -36,11 +34,8 @@ METRES_PER_DEGREE = 111_319.49
 # m from the truth at the time of the image, for a fix that is not older than one interval; m from
 # the truth at the time of the fix, for any; degrees from the truth at one and the same moment.
 MAX_POSITION_ERROR, MAX_FIX_ERROR, MAX_ANGLE_ERROR = 0.5, 0.05, 0.05
-# s after which the node takes an attitude for stale, and up to which it interpolates between two.
-ATTITUDE_TIMEOUT = 0.5
-# s between the delays that are tried; degrees, the error of a true rotation above which no
-# interpolation is tried.
-DELAY_STEP, MAX_GAP_ERROR = 0.05, 1.5
+# s between the delays that are tried.
+DELAY_STEP = 0.05
 
 # From the axes of the camera, FRD with x out of the lens, to those of the image.
 LENS = Quaternion.from_euler(0.0, -math.pi / 2, 0.0)
@@ -187,13 +182,10 @@ class Fit(NamedTuple):
     :param error: the difference from the truth that it leaves, degrees.
     :param delay: how long before its reception the rotation was true, s. It is negative if the
         clock of the camera is late, which is set by fixes.
-    :param gap: the time between the two true rotations of which the node has sent the
-        interpolation because it has not received those between; 0 for a true rotation.
     """
 
     error: float
     delay: float
-    gap: float = 0.0
 
 
 def explain(
@@ -205,12 +197,8 @@ def explain(
     :param truth: returns the rotation at a time.
     :param limit: the longest delay, s.
     """
-    def error(delay: float, before: float = 0.0, after: float = 0.0) -> float:
-        """Return the error of a rotation between two that were true so long before and after."""
-        time, gap = received - delay, before + after
-        true = interpolate(truth(time - before), truth(time + after), before / gap) if gap else (
-            truth(time))
-        return math.degrees(rotation.angle_to(true))
+    def error(delay: float) -> float:
+        return math.degrees(rotation.angle_to(truth(received - delay)))
 
     step = min(limit, DELAY_STEP)
     count = math.ceil(limit / step)
@@ -223,29 +211,7 @@ def explain(
             found.append(_least(error, step * number, step))
             if found[-1].error <= MAX_ANGLE_ERROR:
                 return found[-1]
-    for fit in [one for one in found if one.error < MAX_GAP_ERROR]:
-        for gap in (0.1, 0.25, 0.4):
-            found.append(_between(error, fit.delay, gap / 2))
-            if found[-1].error <= MAX_ANGLE_ERROR:
-                return found[-1]
     return min(found)
-
-
-def _between(error: Callable[[float, float, float], float], delay: float, half: float) -> Fit:
-    """Return the delay and the times before and after it with the least error near these."""
-    found = error(delay, half, half), delay, half, half
-    step = DELAY_STEP / 2
-    while step > DELAY_STEP / 500:
-        _, delay, before, after = found
-        near = [(delay + step * d, max(before + step * b, 0.0), max(after + step * a, 0.0))
-                for d, b, a in itertools.product((-1, 0, 1), repeat=3)]
-        best = min((error(*one), *one) for one in near
-                   if 0.0 < one[1] + one[2] <= ATTITUDE_TIMEOUT)
-        if best >= found:
-            step /= 2
-        found = min(found, best)
-    least, delay, before, after = found
-    return Fit(least, delay, before + after)
 
 
 def _least(error: Callable[[float], float], delay: float, step: float) -> Fit:
@@ -314,7 +280,6 @@ class Comparison:
         of the image, at most, m.
     :param fix_error: of every injected position, from the truth at the time of the fix, m.
     :param angle_error: of every injected attitude and mount, from the truth, degrees.
-    :param interpolated: images whose attitude or mount is between two that were true.
     :param delay: the longest time from an attitude, a mount or a fix to its reception by the
         camera, s.
     :param oldest: age of the oldest injected position or attitude, s.
@@ -327,7 +292,6 @@ class Comparison:
     position_error: float = 0.0
     fix_error: float = 0.0
     angle_error: float = 0.0
-    interpolated: int = 0
     delay: float = 0.0
     oldest: float = 0.0
     own: int = 0
@@ -342,12 +306,14 @@ class Comparison:
 
 def compare(
     images: Iterable[Image], flight: Flight, *, max_delay: float, least_fresh: float,
+    max_angle_error: float = MAX_ANGLE_ERROR,
 ) -> Comparison:
     """
     Compare the images of a flight with the truth.
 
     :param max_delay: s that a message may take from its stamp to the camera, flight time.
     :param least_fresh: the share of images outside the disturbances whose fix must be fresh.
+    :param max_angle_error: of an attitude, degrees.
     """
     result, calm = Comparison(), 0
     images = [one for one in images if 0.0 <= one.time < flight.seconds]
@@ -355,7 +321,6 @@ def compare(
         fit = flight.explain(pair, max_delay)
         result.angle_error = max(result.angle_error, fit.error)
         result.delay = max(result.delay, abs(fit.delay))
-        result.interpolated += fit.gap > 0.0
     for one in images:
         time = one.time
         result.images += 1
@@ -386,7 +351,7 @@ def compare(
     check(result.position_error <= MAX_POSITION_ERROR,
           f'a position is wrong by {result.position_error:.2f} m')
     check(result.fix_error <= MAX_FIX_ERROR, f'a fix is wrong by {result.fix_error:.2f} m')
-    check(result.angle_error <= MAX_ANGLE_ERROR,
+    check(result.angle_error <= max_angle_error,
           f'an attitude is wrong by {result.angle_error:.3f} degrees')
     check(result.fresh >= least_fresh * calm,
           f'only {result.fresh} of {calm} images have a fresh fix')

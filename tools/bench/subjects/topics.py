@@ -21,9 +21,10 @@ from illuminator_ros.mavlink import messages as mav
 from illuminator_ros.mavlink.dialect import mavlink
 from illuminator_ros.payload.messages import GimbalDeviceAttitudeStatus
 from std_msgs.msg import Bool, Float64
+from support.fake_light import LIGHT, status_message
 from support.ports import free_port
 
-from ..devices import MinimalLight, Side
+from ..devices import Side
 from ..rig import alternate, Bench, bridge, Client, peer, udp, wait_until
 from ..rows import Row, times
 
@@ -52,9 +53,13 @@ def over(bench: Bench, topic: str, type_: type[Any], place: str) -> Row:
         stack.enter_context(bridge(udp(port)))
         stack.enter_context(peer('publisher', control_port))
         client = stack.enter_context(Client(bench))
-        light = stack.enter_context(MinimalLight(port))
+        light = stack.enter_context(
+            Side(port, mavlink.MAV_TYPE_ILLUMINATOR, LIGHT))
         control = stack.enter_context(socket.socket(type=socket.SOCK_DGRAM))
         control.connect(('127.0.0.1', control_port))
+
+        def report() -> float:
+            return light.send(status_message(int(time.monotonic() * 1000)))
 
         def collected() -> list[tuple[float, Any]]:
             wait_until(lambda: len(arrived) >= block, 'all messages arrive')
@@ -67,7 +72,7 @@ def over(bench: Bench, topic: str, type_: type[Any], place: str) -> Row:
             light.drain()
             sent = []
             for _ in range(block):
-                sent.append(light.status())
+                sent.append(report())
                 time.sleep(INTERVAL)
             return [at - began for (at, _), began in zip(collected(), sent, strict=True)]
 
@@ -84,7 +89,7 @@ def over(bench: Bench, topic: str, type_: type[Any], place: str) -> Row:
 
         for of_topic, name, send in (
                 (Float64, '/publisher/time', functools.partial(control.send, b'1 0')),
-                (type_, f'/illuminator/{topic}', light.status)):
+                (type_, f'/illuminator/{topic}', report)):
             client.subscribe(of_topic, name, lambda message: arrived.append(
                 (time.monotonic(), message.data)))
             # The first ones may get lost.
