@@ -9,6 +9,7 @@ import re
 import xml.etree.ElementTree as ET
 
 from illuminator_ros.cli import bridge
+from illuminator_ros.cli.payloads import PAYLOADS
 from illuminator_ros.cli.simulator.options import parser
 from illuminator_ros.illuminator.ros.parameters import LIGHT_PARAMETERS
 from illuminator_ros.illuminator.simulated_properties import PROFILES
@@ -170,6 +171,17 @@ def test_parameter_of_the_bridge_exists_with_that_type() -> None:
     for node in FILES['bridge.launch.xml'].findall('node'):
         for name in re.findall(r'-p (\w+):=', node.attrib['ros_args']):
             assert name in known
+
+
+def test_gimbal_on_the_link_of_the_light_is_a_payload_of_its_bridge() -> None:
+    # A list of launch_ros becomes a tuple in the ROS argument; a string in quotes stays as it is.
+    given = [yaml.safe_load(one.attrib['value'])
+             for one in FILES['vehicle.launch.xml'].iter('set_parameter')
+             if one.attrib['name'] == 'payloads']
+
+    assert [yaml.safe_load(one) for one in given] == [
+        ['illuminator', 'gimbal'], ['illuminator', 'gimbal_manager']]
+    assert all(one in PAYLOADS for value in given for one in yaml.safe_load(value))
 
 
 def test_simulator_accepts_the_arguments_of_the_demonstration() -> None:
