@@ -193,7 +193,7 @@ import sys
 from illuminator_ros.cli.monitor import app, run
 from illuminator_ros.cli.payloads import PAYLOADS
 views = [one.load('view') for one in PAYLOADS.values() if one.view]
-print(len(views), *(name for name in sys.modules if 'mavlink' in name))
+print(len(views), *(name for name in sys.modules if 'pymavlink' in name))
 """
     loaded = subprocess.run([sys.executable, '-c', script], cwd=ROOT, text=True, check=True,
                             capture_output=True, env=environment()).stdout

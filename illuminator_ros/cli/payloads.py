@@ -8,6 +8,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from functools import cached_property
 
+from ..mavlink.device_kind import DeviceKind
 from ..payload.payload_type import PayloadType
 
 # The payload of the executables without ``--payload``, and of ``bridge``.
@@ -19,20 +20,28 @@ OWN_PAYLOADS: Mapping[str, PayloadType] = {one.name: one for one in (
         'illuminator', ros='illuminator_ros.illuminator.ros.lights:ILLUMINATOR',
         simulated='illuminator_ros.illuminator.simulated:SIMULATED',
         checks='illuminator_ros.illuminator.checks.requirements:CHECKS',
-        view='illuminator_ros.illuminator.ros.monitor_view:VIEW'),
+        view='illuminator_ros.illuminator.ros.monitor_view:VIEW',
+        # ILLUMINATOR_STATUS
+        device=DeviceKind('light', 44, (440,))),
     PayloadType('rededge', ros='illuminator_ros.rededge.ros.camera_node:REDEDGE',
                 simulated='illuminator_ros.rededge.simulated:SIMULATED',
                 checks='illuminator_ros.rededge.checks:CHECKS',
-                view='illuminator_ros.rededge.ros.monitor_view:VIEW'),
+                view='illuminator_ros.rededge.ros.monitor_view:VIEW',
+                # MAV_TYPE_GENERIC with a reserved autopilot; MAV_COMP_ID_CAMERA stays.
+                device=DeviceKind('MicaSense camera', 0, component=100, option='camera')),
     PayloadType(
         'gimbal', ros='illuminator_ros.gimbal.ros.gimbals:GIMBAL',
         simulated='illuminator_ros.gimbal.simulated_device:SIMULATED',
         checks='illuminator_ros.gimbal.checks.device:CHECKS',
-        view='illuminator_ros.gimbal.ros.monitor_view:VIEW'),
+        view='illuminator_ros.gimbal.ros.monitor_view:VIEW',
+        # GIMBAL_MANAGER_INFORMATION, GIMBAL_MANAGER_STATUS
+        device=DeviceKind('gimbal manager', messages=(280, 281))),
     PayloadType(
         'gimbal_manager', ros='illuminator_ros.gimbal.ros.manager_node:GIMBAL_MANAGER',
         simulated='illuminator_ros.gimbal.simulated_manager:SIMULATED',
-        checks='illuminator_ros.gimbal.checks.manager:CHECKS'),
+        checks='illuminator_ros.gimbal.checks.manager:CHECKS',
+        # MAV_TYPE_GIMBAL; GIMBAL_DEVICE_INFORMATION, GIMBAL_DEVICE_ATTITUDE_STATUS
+        device=DeviceKind('gimbal', 26, (283, 285))),
 )}
 
 
@@ -74,3 +83,8 @@ class _Payloads(Mapping[str, PayloadType]):
 
 
 PAYLOADS: Mapping[str, PayloadType] = _Payloads()
+
+
+def devices(types: Mapping[str, PayloadType]) -> tuple[DeviceKind, ...]:
+    """Return how the devices of payloads are recognised."""
+    return tuple(one.device for one in types.values() if one.device)

@@ -7,51 +7,46 @@ from __future__ import annotations
 
 from collections.abc import Collection, Mapping
 
+from .device_kind import DeviceKind
 from .dialect import mavlink, short_names
 from .messages import Address, Heartbeat
 
-AUTOPILOT, LIGHT, MANAGER, GIMBAL = 'autopilot', 'light', 'gimbal manager', 'gimbal'
-MICASENSE = 'MicaSense camera'
-# By MAV_TYPE. Each other type is an autopilot, or else is called as in the dialect.
+AUTOPILOT = 'autopilot'
+# By MAV_TYPE. Each other type is a device of a payload, an autopilot, or called as in the dialect.
 TYPES = {
-    mavlink.MAV_TYPE_ILLUMINATOR: LIGHT,
-    mavlink.MAV_TYPE_GIMBAL: GIMBAL,
     mavlink.MAV_TYPE_CAMERA: 'camera',
     mavlink.MAV_TYPE_GCS: 'ground station',
     mavlink.MAV_TYPE_ONBOARD_CONTROLLER: 'onboard computer',
 }
 AUTOPILOTS = {mavlink.MAV_AUTOPILOT_ARDUPILOTMEGA: 'ArduPilot', mavlink.MAV_AUTOPILOT_PX4: 'PX4'}
-# By message. ArduSub is a light, and an autopilot a gimbal manager, without a HEARTBEAT of it.
-MESSAGES = {
-    440: LIGHT,  # ILLUMINATOR_STATUS
-    mavlink.MAVLINK_MSG_ID_GIMBAL_MANAGER_INFORMATION: MANAGER,
-    mavlink.MAVLINK_MSG_ID_GIMBAL_MANAGER_STATUS: MANAGER,
-    mavlink.MAVLINK_MSG_ID_GIMBAL_DEVICE_INFORMATION: GIMBAL,
-    mavlink.MAVLINK_MSG_ID_GIMBAL_DEVICE_ATTITUDE_STATUS: GIMBAL,
-}
 # The most components that are named in one text.
 MAX_NAMED = 8
 
 
 def kinds(
     address: Address, heartbeat: Heartbeat | None, messages: Collection[int] = (),
+    known: Collection[DeviceKind] = (),
 ) -> list[str]:
     """
     Return what a component is, such as ``['autopilot', 'ArduPilot', 'light']``.
 
     :param messages: the ids of messages that it has sent.
+    :param known: the devices of payloads.
     """
-    found = [kind for id_, kind in MESSAGES.items() if id_ in messages]
-    return [*dict.fromkeys([*(_by_heartbeat(address, heartbeat) if heartbeat else ()), *found])]
+    # ArduSub is a light, and an autopilot a gimbal manager, without a HEARTBEAT of it.
+    found = [kind.name for kind in known if not {*kind.messages}.isdisjoint(messages)]
+    return [*dict.fromkeys([
+        *(_by_heartbeat(address, heartbeat, known) if heartbeat else ()), *found])]
 
 
-def _by_heartbeat(address: Address, heartbeat: Heartbeat) -> list[str]:
+def _by_heartbeat(
+    address: Address, heartbeat: Heartbeat, known: Collection[DeviceKind],
+) -> list[str]:
     kind, autopilot = heartbeat.type, heartbeat.autopilot
-    if kind in TYPES:
-        return [TYPES[kind]]
-    # A MicaSense camera has the type 0 and a reserved autopilot, and its component id stays.
-    if kind == mavlink.MAV_TYPE_GENERIC and address.component == mavlink.MAV_COMP_ID_CAMERA:
-        return [MICASENSE]
+    devices = [one.name for one in known
+               if one.mav_type == kind and one.component in (None, address.component)]
+    if devices or kind in TYPES:
+        return devices or [TYPES[kind]]
     if autopilot != mavlink.MAV_AUTOPILOT_INVALID:
         return [AUTOPILOT, *([AUTOPILOTS[autopilot]] if autopilot in AUTOPILOTS else [])]
     return [short_names('MAV_TYPE').get(kind, f'type {kind}').lower().replace('_', ' ')]
@@ -62,8 +57,8 @@ def described(
 ) -> str:
     """Return components with their kinds, the first few by name."""
     def one(address: Address) -> str:
-        known = kinds(address, heartbeats.get(address))
-        return f'{address} ({", ".join(known) or "no HEARTBEAT"})'
+        found = kinds(address, heartbeats.get(address))
+        return f'{address} ({", ".join(found) or "no HEARTBEAT"})'
 
     return listed([one(address) for address in sorted(addresses)])
 

@@ -5,13 +5,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Collection, Iterable, Sequence
 import contextlib
 from dataclasses import dataclass, field
 import selectors
 import time
 
 from .component_kinds import kinds
+from .device_kind import DeviceKind
 from .dialect import CRC_EXTRA, decode
 from .frame import Frame
 from .frame_writer import FrameWriter
@@ -81,10 +82,9 @@ class Listener:
         """Return the present rate, 0 where there is none."""
         return self.scan.rate
 
-    @property
-    def kinds(self) -> dict[Address, list[str]]:
-        """Return the kinds of each component."""
-        return {address: kinds(address, one.heartbeat, one.messages)
+    def kinds(self, known: Collection[DeviceKind]) -> dict[Address, list[str]]:
+        """Return the kinds of each component, given the devices of payloads."""
+        return {address: kinds(address, one.heartbeat, one.messages, known)
                 for address, one in sorted(self.components.items())}
 
     @property

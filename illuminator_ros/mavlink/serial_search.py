@@ -5,7 +5,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Collection, Mapping
 import glob
 import os
 import re
@@ -13,7 +13,8 @@ import selectors
 import threading
 import time
 
-from .component_kinds import GIMBAL, LIGHT, listed, MANAGER, MICASENSE
+from .component_kinds import listed
+from .device_kind import DeviceKind
 from .dialect import mavlink
 from .frame_writer import FrameWriter
 from .listener import Listener
@@ -32,7 +33,6 @@ TICK = 0.1
 # and until it is tried again.
 OTHERS, AGAIN = 5.0, 60.0
 INTERVAL = 1.0
-ANY = tuple(frozenset({kind}) for kind in (LIGHT, MANAGER, GIMBAL, MICASENSE))
 
 
 class SerialSearch:
@@ -55,6 +55,7 @@ class SerialSearch:
         make_selector: Callable[[], selectors.BaseSelector] = selectors.DefaultSelector,
     ) -> None:
         self._url = url
+        self._wanted = url.devices or tuple(frozenset({one.name}) for one in url.known)
         self._rates = [*url.rates]
         self._writer = writer
         self._address = address
@@ -90,7 +91,8 @@ class SerialSearch:
             if fitting and (self._url.serial or now >= self._first + DECISION):
                 if len(fitting) > 1:
                     self._first = now
-                    raise OSError(_ambiguous(fitting))
+                    raise OSError('several ports have such a device: give one of ' + ', '.join(
+                        f'{one.tuned_url} ({_heard(one, self._url.known)})' for one in fitting))
                 return self._take(fitting[0])
             if not fitting and now >= end:
                 raise OSError(self._reason())
@@ -130,9 +132,9 @@ class SerialSearch:
 
     def _fits(self, one: Listener) -> bool:
         """Return whether a device that is wanted is heard, with the serial number if one is."""
-        found = {kind for kinds in one.kinds.values() for kind in kinds}
+        found = {kind for kinds in one.kinds(self._url.known).values() for kind in kinds}
         return (one.channel is not None
-                and any(kinds <= found for kinds in self._url.devices or ANY)
+                and any(kinds <= found for kinds in self._wanted)
                 and self._url.serial in (
                     '', *(heard.serial_number for heard in one.components.values())))
 
@@ -167,22 +169,17 @@ class SerialSearch:
         """Return why no device fits, for people."""
         if not self._listeners:
             return f'no serial port{self._url.ports and " "}{self._url.ports}'
-        wanted = listed([' and '.join(sorted(one)) for one in self._url.devices or ANY])
+        wanted = listed([' and '.join(sorted(one)) for one in self._wanted])
         number = self._url.serial and f' with the serial number {self._url.serial!r}'
         return f'no {wanted}{number}: ' + '; '.join(
-            f'{path}: {_heard(one)}' for path, one in self._listeners.items()
+            f'{path}: {_heard(one, self._url.known)}' for path, one in self._listeners.items()
         ) + ' (discover tells more)'
 
 
-def _heard(one: Listener) -> str:
+def _heard(one: Listener, known: Collection[DeviceKind]) -> str:
     return ', '.join(
         f'{address} ({", ".join(kinds) or "no HEARTBEAT"}'
         + (number and f', serial number {number!r}') + ')'
-        for address, kinds in one.kinds.items()
+        for address, kinds in one.kinds(known).items()
         for number in [one.components[address].serial_number]) or (
             one.trouble or re.sub(r'^\d+ ', '', one.silence()).partition(':')[0])
-
-
-def _ambiguous(fitting: list[Listener]) -> str:
-    return 'several ports have such a device: give one of ' + ', '.join(
-        f'{one.tuned_url} ({_heard(one)})' for one in fitting)

@@ -9,12 +9,13 @@ An empty host to listen on means all interfaces, as in all three. IPv6 addresses
 
 from __future__ import annotations
 
-from collections.abc import Callable, Hashable
+from collections.abc import Callable, Collection, Hashable
 import ipaddress
 import re
 from typing import Literal, NamedTuple, NoReturn
 
-from .component_kinds import AUTOPILOT, GIMBAL, LIGHT, MANAGER, MICASENSE
+from .component_kinds import AUTOPILOT
+from .device_kind import DeviceKind
 from .rate_scan import RATES
 
 MAVROS_UDP_BIND_PORT = 14555
@@ -90,14 +91,16 @@ class AutoUrl(NamedTuple):
     :param rates: to try, Bd.
     :param ports: pattern of the paths of the ports, '' for those of the machine.
     :param serial: the serial number of the device, '' for any.
+    :param known: the devices of payloads.
     :param devices: the sets of kinds, one of which must be heard; see
-        :func:`~.component_kinds.kinds`.
+        :func:`~.component_kinds.kinds`. By default any of :attr:`known`.
     """
 
     rates: tuple[int, ...] = RATES
     ports: str = ''
     serial: str = ''
     devices: tuple[frozenset[str], ...] = ()
+    known: tuple[DeviceKind, ...] = ()
 
 
 class PtyUrl(NamedTuple):
@@ -119,14 +122,17 @@ class MemoryUrl(NamedTuple):
 Url = UdpUrl | TcpUrl | SerialUrl | AutoUrl | PtyUrl | MemoryUrl
 
 
-def parse_url(text: str, *, can_search: bool = True) -> Url:
+def parse_url(
+    text: str, *, can_search: bool = True, known: Collection[DeviceKind] = (),
+) -> Url:
     """
     Parse a connection URL.
 
     :param can_search: whether the program looks for a device, as ``serial://auto`` does.
+    :param known: the devices that it may look for.
     :raises UrlError: if it is wrong; the message quotes the wrong part.
     """
-    parser = _Parser(text)
+    parser = _Parser(text, known)
     url = parser.parse()
     if isinstance(url, AutoUrl) and not can_search:
         parser.fail('only the nodes and conformance look for a device')
@@ -146,8 +152,9 @@ def resource(url: Url) -> Hashable:
 class _Parser:
     """Parses one URL; keeps it for the error messages."""
 
-    def __init__(self, text: str) -> None:
+    def __init__(self, text: str, known: Collection[DeviceKind]) -> None:
         self.text = text
+        self.known = tuple(known)
 
     def parse(self) -> Url:
         text = self.text
@@ -279,15 +286,16 @@ class _Parser:
         return SerialUrl(device, self.baud(baud), hardware_flow_control)
 
     def auto(self, baud: str | None, query: str | None) -> Url:
-        url = AutoUrl() if baud is None else AutoUrl((self.baud(baud),))
+        url = AutoUrl(RATES if baud is None else (self.baud(baud),), known=self.known)
+        kinds = {**{one.url_option: one.name for one in self.known}, AUTOPILOT: AUTOPILOT}
         for option in query.split('&') if query else ():
             name, _, value = option.partition('=')
             if not value or name not in ('ports', 'serial', 'kind'):
                 self.fail(f'{option!r} is not ports=PATTERN, serial=NUMBER or kind=KIND')
             if name == 'kind':
-                if value not in _KINDS:
-                    self.fail(f'kind {value!r} is not one of {", ".join(_KINDS)}')
-                url = url._replace(devices=(frozenset({_KINDS[value]}),))
+                if value not in kinds:
+                    self.fail(f'kind {value!r} is not one of {", ".join(kinds)}')
+                url = url._replace(devices=(frozenset({kinds[value]}),))
             elif name == 'ports':
                 url = url._replace(ports=value)
             else:
@@ -344,8 +352,6 @@ def _means_any(host: str) -> bool:
     return not host or _ip_version(host) > 0 and ipaddress.ip_address(host).is_unspecified
 
 
-_KINDS = {'light': LIGHT, 'gimbal': GIMBAL, 'gimbal_manager': MANAGER, 'camera': MICASENSE,
-          'autopilot': AUTOPILOT}
 _Reader = Callable[[_Parser, str], Url]
 
 _WITH_SLASHES: dict[str, _Reader] = {

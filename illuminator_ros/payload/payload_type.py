@@ -8,6 +8,8 @@ from __future__ import annotations
 from importlib import import_module
 from typing import Any, NamedTuple
 
+from ..mavlink.device_kind import DeviceKind
+
 
 class PayloadType(NamedTuple):
     """
@@ -21,8 +23,8 @@ class PayloadType(NamedTuple):
     :param simulated: its simulated device.
     :param checks: the requirements that ``conformance`` checks.
     :param view: how the monitor shows its devices.
-    :param kind: the kind of a component that shows one, as ``discover`` names it; for a payload
-        of another package.
+    :param device: how a device is recognised, for ``discover``, ``serial://auto`` and reports of
+        what is heard.
     """
 
     name: str
@@ -30,7 +32,7 @@ class PayloadType(NamedTuple):
     simulated: str = ''
     checks: str = ''
     view: str = ''
-    kind: str = ''
+    device: DeviceKind | None = None
 
     def load(self, part: str) -> Any:
         """

@@ -89,13 +89,15 @@ class Bridge:
         self.node = node
         self.log = NodeLog(node.get_logger())
         frame_log = self._frame_log = LogForwarder(self.log)
-        kinds = [_load(name, types) for name in declare_payloads(node, payload)]
+        names = declare_payloads(node, payload)
+        kinds = [_load(name, types) for name in names]
         nodes = [node, *(
             PayloadNode(kind.node_name, namespace=node.get_namespace(), context=node.context,
                         cli_args=without_node_name(arguments), use_global_arguments=False)
             for kind in kinds[1:])]
         _refuse_same_names(nodes)
-        parameters = _link_parameters(node, kinds, url)
+        parameters = _link_parameters(
+            node, dict(zip(names, kinds, strict=True)), types, url)
         values = [declare_given(own, kind.parameters)
                   for own, kind in zip(nodes, kinds, strict=True)]
         signing, store = parameters.signing()
@@ -311,15 +313,20 @@ class Bridge:
         self._wake()
 
 
-def _link_parameters(node: Node, kinds: Sequence[RosPayload], url: str) -> LinkParameters:
+def _link_parameters(
+    node: Node, payloads: Mapping[str, RosPayload], types: Mapping[str, PayloadType], url: str,
+) -> LinkParameters:
     """Declare the parameters of a link that carries these payloads."""
     given = given_parameters(node).get('connection_url')
     if url and given is not None and given.value != url:
         raise ParameterError(f'connection_url: {given.value!r}, but the argument is {url!r}: '
                              'give one of them only')
+    kinds = [*payloads.values()]
     defaults = {**kinds[0].all_link_defaults, **({'connection_url': url} if url else {})}
+    known = {name: one.device for name, one in types.items() if one.device}
     parameters = declare_link_parameters(node, defaults, [
-        devices for kind in kinds for devices in kind.devices])
+        devices for name, kind in payloads.items() for devices in kind.devices or (
+            [frozenset({known[name].name})] if name in known else [])], known.values())
     needed = {kind.node_name: kind.mavlink_version for kind in kinds if kind.mavlink_version}
     if set(needed.values()) - {parameters.mavlink_version}:
         needs = ', '.join(f'{name} needs {version}' for name, version in needed.items())

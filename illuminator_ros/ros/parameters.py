@@ -5,7 +5,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Collection, Iterable, Mapping
 import inspect
 import math
 import threading
@@ -20,6 +20,7 @@ from .executor_calls import ExecutorCalls
 from .rclpy_private import parameter_overrides
 from .ros_home import state_folder
 from .throttled_log import NodeLog
+from ..mavlink.device_kind import DeviceKind
 from ..mavlink.messages import Address
 from ..mavlink.signing import Signing, SigningMode
 from ..mavlink.signing_files import KeyFileError, load_signing, TimestampStore
@@ -206,24 +207,28 @@ def declare_payloads(node: Node, default: str) -> tuple[str, ...]:
 
 def declare_link_parameters(
     node: Node, defaults: Values | None = None, devices: Iterable[frozenset[str]] = (),
+    known: Collection[DeviceKind] = (),
 ) -> LinkParameters:
     """
     Declare the other parameters of the link and return them.
 
     :param defaults: replace those of :data:`LINK_PARAMETERS`.
     :param devices: to look for on a serial port, see :class:`~..mavlink.url.AutoUrl`.
+    :param known: the devices of all payloads.
     :raises ParameterError: if one is wrong.
     """
     values = dict(declare_given(
         node, [spec for spec in LINK_PARAMETERS if spec.name != 'payloads'], defaults))
     return LinkParameters(
-        urls=_urls(values.pop('connection_url'), values.pop('forward_urls'), tuple(devices)),
+        urls=_urls(values.pop('connection_url'), values.pop('forward_urls'), tuple(devices),
+                   known),
         address=Address(values.pop('system_id'), values.pop('component_id')),
         signing_mode=SigningMode(values.pop('signing_mode')), **values)
 
 
 def _urls(
     first: str, further: list[str], devices: tuple[frozenset[str], ...],
+    known: Collection[DeviceKind],
 ) -> Mapping[str, Url]:
     """Return the URLs by their texts; no two of them use the same port or device."""
     urls: dict[str, Url] = {}
@@ -231,7 +236,7 @@ def _urls(
         raise ParameterError(f'forward_urls: {len(further)} URLs, but {MAX_FURTHER} are possible')
     for name, text in [('connection_url', first), *(('forward_urls', one) for one in further)]:
         try:
-            url = parse_url(text)
+            url = parse_url(text, known=known)
         except UrlError as error:
             raise ParameterError(f'{name}: {error}') from None
         for other, used in urls.items():

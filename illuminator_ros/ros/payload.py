@@ -86,7 +86,8 @@ class RosPayload:
     :param examples: commands, for ``--help``.
     :param link_defaults: defaults of the link's parameters where it is the first payload.
     :param devices: the sets of kinds of components that show one of its devices, see
-        :class:`~..mavlink.url.AutoUrl`.
+        :class:`~..mavlink.url.AutoUrl`; by default the device of its
+        :class:`~..payload.payload_type.PayloadType`.
     :param mavlink_version: the version that its devices need, 1 or 2; None for any.
     """
 

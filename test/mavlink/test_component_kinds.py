@@ -3,7 +3,9 @@
 
 """The kind of a component, by its heartbeat and the messages that it sends."""
 
+from illuminator_ros.cli.payloads import devices, PAYLOADS
 from illuminator_ros.mavlink.component_kinds import described, kinds
+from illuminator_ros.mavlink.device_kind import DeviceKind
 from illuminator_ros.mavlink.dialect import mavlink
 from illuminator_ros.mavlink.messages import Address, Heartbeat
 import pytest
@@ -42,7 +44,17 @@ def beat(kind: int, autopilot: int = NO_AUTOPILOT) -> Heartbeat:
 def test_a_component_has_the_kinds_of_its_heartbeat_and_of_its_messages(
     address: str, heartbeat: Heartbeat | None, messages: list[int], expected: list[str],
 ) -> None:
-    assert kinds(Address(*map(int, address.split('/'))), heartbeat, messages) == expected
+    assert kinds(Address(*map(int, address.split('/'))), heartbeat, messages,
+                 devices(PAYLOADS)) == expected
+
+
+def test_a_payload_of_another_package_adds_the_kinds_of_its_devices() -> None:
+    winch = DeviceKind('deck winch', 42, (9005,))
+    address = Address(1, 169)
+    assert kinds(address, beat(42), [], [winch]) == ['deck winch']
+    assert kinds(address, beat(*AUTOPILOT), [9005], [winch]) == [
+        'autopilot', 'ArduPilot', 'deck winch']
+    assert kinds(address, None, [], [winch]) == []
 
 
 def test_only_the_first_components_are_described() -> None:

@@ -90,15 +90,14 @@ OURS: dict[str, Url] = {
     'serial://auto': AutoUrl(),
     'serial://auto:9600?serial=SIM-1-243&ports=/dev/ttyUSB*': AutoUrl(
         (9600,), '/dev/ttyUSB*', 'SIM-1-243'),
-    'serial://auto?kind=gimbal_manager': AutoUrl(devices=(frozenset({'gimbal manager'}),)),
+    'serial://auto?kind=autopilot': AutoUrl(devices=(frozenset({'autopilot'}),)),
     'pty://': PtyUrl(),
     'pty:///tmp/ttyCAMERA': PtyUrl('/tmp/ttyCAMERA'),
     'memory://bench': MemoryUrl('bench')}
 # Wrong URL -> the wrong part, and the reason.
 WRONG: dict[str, tuple[str, str]] = {
     '': ('', 'it is empty'),
-    'serial://auto?kind=lamp': ('lamp', 'is not one of light, gimbal, gimbal_manager, '
-                                'camera, autopilot'),
+    'serial://auto?kind=lamp': ('lamp', 'is not one of autopilot'),
     'serial://auto?baud=9600': ('baud=9600', 'is not ports=PATTERN, serial=NUMBER or kind=KIND'),
     'udp://127.0.0.1': ("'127.0.0.1'", 'no port'),
     '/udp://localhost:99': ("'/udp://localhost:99'", 'not a device path'),

@@ -20,6 +20,7 @@ from illuminator_ros.checks.session import Session, Transaction
 from illuminator_ros.checks.specifications import MESSAGES
 from illuminator_ros.mavlink.command_sender import CommandSender
 from illuminator_ros.mavlink.component import Payload
+from illuminator_ros.mavlink.device_kind import DeviceKind
 from illuminator_ros.mavlink.dialect import mavlink
 from illuminator_ros.mavlink.messages import Address, AnyCommand, Heartbeat, Message
 from illuminator_ros.payload.attempt import Change, Sending, Served, Target
@@ -32,9 +33,10 @@ from illuminator_ros.payload.requests import Done, Goal, Request, Requests, Resu
 from illuminator_ros.simulation import simulated
 from illuminator_ros.simulation.faults import Behaviour
 
-WINCH = PayloadType('winch', ros='payloads.winch_ros:WINCH', simulated='payloads.winch:SIMULATED',
-                    checks='payloads.winch:CHECKS', view='payloads.winch_ros:VIEW', kind='winch')
 WinchStatus = mavlink.MAVLink_winch_status_message
+WINCH = PayloadType('winch', ros='payloads.winch_ros:WINCH', simulated='payloads.winch:SIMULATED',
+                    checks='payloads.winch:CHECKS', view='payloads.winch_ros:VIEW',
+                    device=DeviceKind('winch', mavlink.MAV_TYPE_WINCH, (WinchStatus.id,)))
 
 
 # The client

@@ -160,7 +160,9 @@ class Bridge(EndpointLink[Client]):
     :ivar lights: ``connected`` or ``lost``, and the light, in order.
     """
 
-    def __init__(self, url: str, settings: LightSettings | None = None, **options: Any) -> None:
+    def __init__(
+        self, url: str | Url, settings: LightSettings | None = None, **options: Any,
+    ) -> None:
         self.lights: Log[tuple[str, Light]] = Log()
         client = Client(
             BRIDGE, settings or LightSettings(), command_timeout=PATIENCE / 10, command_retries=9)

@@ -14,7 +14,7 @@ import socket
 import threading
 from typing import cast
 
-from illuminator_ros.mavlink.component_kinds import GIMBAL, LIGHT
+from illuminator_ros.cli.payloads import devices, PAYLOADS
 from illuminator_ros.mavlink.dialect import decode, mavlink, replaced
 from illuminator_ros.mavlink.frame_writer import FrameWriter
 from illuminator_ros.mavlink.messages import (
@@ -92,7 +92,7 @@ class Machine:
             return b''
 
     def search(self, url: str, *kinds: str) -> SerialSearch:
-        parsed = parse_url(url)
+        parsed = parse_url(url, known=devices(PAYLOADS))
         assert isinstance(parsed, AutoUrl)
         machine = self
 
@@ -150,14 +150,14 @@ def test_the_port_with_the_device_is_opened_and_nothing_is_sent(machine: Machine
     path = machine.plug_in('light', LIGHT_BEAT)
     begun = machine.now
 
-    with taken(machine.search('serial://auto', LIGHT), path):
+    with taken(machine.search('serial://auto', 'light'), path):
         assert DECISION <= machine.now - begun < DECISION + 2.0
         assert [machine.received(one) for one in (path, *others)] == [b''] * 4
 
 
 def test_two_devices_are_both_named_until_one_is_unplugged(machine: Machine) -> None:
     first, second = (machine.plug_in(name, LIGHT_BEAT) for name in ('first', 'second'))
-    search = machine.search('serial://auto', LIGHT)
+    search = machine.search('serial://auto', 'light')
 
     with pytest.raises(OSError, match=f'give one of serial://{first}:57600 .*'
                                       f'serial://{second}:57600 '):
@@ -184,7 +184,7 @@ def test_a_device_with_the_wanted_serial_number_is_asked_for_it_and_chosen(
                         decode(ComponentInformationBasic, b''), serial_number=number.encode())))
 
     machine.each_second = answer
-    with taken(machine.search('serial://auto?serial=SIM-2', LIGHT), paths['SIM-2']):
+    with taken(machine.search('serial://auto?serial=SIM-2', 'light'), paths['SIM-2']):
         assert {*asked} == {(243, 396)}
 
 
@@ -192,7 +192,7 @@ def test_without_the_device_the_reason_names_what_each_port_has(machine: Machine
     gps, gimbal, console = (machine.plug_in(name, data) for name, data in (
         ('gps', NMEA), ('gimbal', GIMBAL_BEAT), ('console', LIGHT_BEAT)))
     machine.consoles.add(console)
-    search = machine.search('serial://auto:57600', LIGHT)
+    search = machine.search('serial://auto:57600', 'light')
 
     with pytest.raises(OSError, match='no light') as error:
         opened(search)
@@ -207,7 +207,7 @@ def test_a_port_of_other_devices_is_closed_for_their_searches_and_tried_again(
     machine: Machine,
 ) -> None:
     path = machine.plug_in('gimbal', GIMBAL_BEAT)
-    search = machine.search('serial://auto', LIGHT)
+    search = machine.search('serial://auto', 'light')
     for _ in range(2):
         with pytest.raises(OSError, match=re.escape(f'no light: {path}: 1/243 (gimbal)')):
             opened(search)
@@ -226,7 +226,7 @@ def test_only_ports_that_match_the_pattern_are_tried(machine: Machine, tmp_path:
     machine.plug_in('first', GIMBAL_BEAT)
     second = machine.plug_in('second', GIMBAL_BEAT)
 
-    with taken(machine.search(f'serial://auto?ports={tmp_path}/sec*', GIMBAL), second):
+    with taken(machine.search(f'serial://auto?ports={tmp_path}/sec*', 'gimbal'), second):
         pass
 
 
@@ -235,7 +235,7 @@ def test_a_search_that_is_stopped_closes_its_ports(machine: Machine) -> None:
     machine.each_second = stopping.set
 
     with pytest.raises(OSError, match='stopped'):
-        machine.search('serial://auto', LIGHT).open(stopping)
+        machine.search('serial://auto', 'light').open(stopping)
     with pytest.raises(BrokenPipeError):
         machine.lines[path].far.send(b'x')
 
@@ -246,7 +246,8 @@ def test_a_light_that_is_unplugged_is_found_under_another_name(
     pytest.importorskip('serial', reason='pyserial is not installed')
     monkeypatch.setattr('illuminator_ros.mavlink.serial_search.DECISION', 0.0)
     monkeypatch.setattr('illuminator_ros.mavlink.serial_search.INTERVAL', 0.1)
-    bridge = run(live_link.Bridge(f'serial://auto?ports={tmp_path}/tty*'))
+    bridge = run(live_link.Bridge(parse_url(
+        f'serial://auto?ports={tmp_path}/tty*', known=devices(PAYLOADS))))
     for count, name in enumerate(('ttyFIRST', 'ttySECOND'), 1):
         with live_link.Lights(f'pty://{tmp_path}/{name}'):
             light = bridge.wait_connected(count)

@@ -23,7 +23,7 @@ from types import FrameType
 from ..arguments import invocation, option, Parser
 from ..entry_point import print_output
 from ..options import add_mavlink_version, add_signing, address, mavlink_version, signing
-from ..payloads import DEFAULT_PAYLOAD, PAYLOADS
+from ..payloads import DEFAULT_PAYLOAD, devices, PAYLOADS
 from ..termination import ENDING
 from ...checks.components import names
 from ...checks.coroutines import Main
@@ -158,7 +158,7 @@ def run(
         return 0 if _print(*catalogue(checks.requirements, checks.device)) else 1
     address = Address(options.system_id, options.component_id)
     try:
-        url = parse_url(options.url)
+        url = parse_url(options.url, known=devices(payloads))
         signs, store = signing(options, f'conformance {address}')
         conformance = Conformance(options, checks, address, url, signs, store)
     except ValueError as error:

@@ -10,16 +10,14 @@ import shlex
 from typing import Any
 
 from ..arguments import invocation
-from ..payloads import OWN_PAYLOADS, PAYLOADS
-from ...mavlink.component_kinds import AUTOPILOT, GIMBAL, LIGHT, MANAGER, MICASENSE
+from ..payloads import devices, OWN_PAYLOADS, PAYLOADS
+from ...mavlink.component_kinds import AUTOPILOT
 from ...mavlink.listener import Listener, NOT_ASKED
 from ...mavlink.url import SerialUrl
 
 CAMERA = ['rededge']
-# The payloads of other packages, by the kind of component.
-OTHERS = {one.kind: name for name, one in PAYLOADS.items()
-          if one.kind and name not in OWN_PAYLOADS}
-SERVED = {LIGHT, MANAGER, GIMBAL, MICASENSE, *OTHERS}
+# The kinds of devices, with the payloads that serve them.
+SERVED = {one.device.name: name for name, one in PAYLOADS.items() if one.device}
 NOT_SERVED = ('none of these is a light, a gimbal or a MicaSense camera; an autopilot or router '
               'may forward their frames only to a program that sends, unlike this one')
 ONLY_VERSION_1 = ('only MAVLink 1 is heard, which cannot carry the messages of a light or a '
@@ -29,12 +27,12 @@ ONLY_VERSION_1 = ('only MAVLink 1 is heard, which cannot carry the messages of a
 
 def report(port: Listener) -> dict[str, Any]:
     """Return what was heard, and the commands, for ``--json``."""
-    known, elapsed = port.kinds, max(port.elapsed, 1e-3)
+    known, elapsed = port.kinds(devices(PAYLOADS)), max(port.elapsed, 1e-3)
     components = [
         {'address': str(address), 'kinds': known[address],
          'mavlink_versions': sorted(one.versions), 'signed': one.signed,
          'frames_per_s': round(one.frames / elapsed, 1),
-         'served': not SERVED.isdisjoint(known[address])}
+         'served': any(one in SERVED for one in known[address])}
         for address, one in sorted(port.components.items())]
     payloads = payloads_for({kind for one in known.values() for kind in one})
     only_version_1 = all(one.versions == {1} for one in port.components.values())
@@ -86,11 +84,13 @@ def _command(port: Listener, payloads: list[str], signed: bool) -> str:
 
 def payloads_for(found: set[str]) -> list[list[str]]:
     """Return the payloads that serve kinds, by process: only a camera needs MAVLink 1."""
-    managed = MANAGER in found or {GIMBAL, AUTOPILOT} <= found
-    shared = [*(['illuminator'] if LIGHT in found else []),
-              *(['gimbal'] if managed else ['gimbal_manager'] if GIMBAL in found else []),
-              *(name for kind, name in OTHERS.items() if kind in found)]
-    return [*([shared] if shared else []), *([CAMERA] if MICASENSE in found else [])]
+    shared = [name for kind, name in SERVED.items() if kind in found]
+    # An autopilot manages the gimbal that is beside it.
+    if 'gimbal_manager' in shared and ('gimbal' in shared or AUTOPILOT in found):
+        shared = [*dict.fromkeys(name.replace('gimbal_manager', 'gimbal') for name in shared)]
+    alone = [name for name in CAMERA if name in shared]
+    shared = [name for name in shared if name not in alone]
+    return [one for one in (shared, alone) if one]
 
 
 def lines(report: Mapping[str, Any]) -> Iterator[str]:

@@ -18,8 +18,9 @@ import sys
 import threading
 from typing import Any, TypeVar
 
-from .report import executable, OTHERS, payloads_for, program
+from .report import executable, payloads_for, program
 from ..entry_point import Refusal
+from ..payloads import OWN_PAYLOADS
 from ...illuminator.client import IlluminatorClient
 from ...illuminator.model import SafetyLimits
 from ...illuminator.settings import LightSettings
@@ -104,7 +105,7 @@ def set_up(reports: Sequence[Mapping[str, Any]], given: Sequence[str]) -> int:
     payload, url = payloads_for({*device['kinds'], *others})[0][0], report['url']
     name = ask('name', 'name of its node', payload, matching('[A-Za-z][A-Za-z0-9_]*', 'a name'))
     values: dict[str, object] = {'connection_url': url}
-    if payload in OTHERS.values():
+    if payload not in OWN_PAYLOADS:
         values['payloads'] = [payload]
     if payload == 'illuminator':
         values |= {'target_system': address.system, 'target_component': address.component}

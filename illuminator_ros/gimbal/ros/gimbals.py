@@ -16,7 +16,7 @@ from ..client import GimbalClient
 from ..events import GimbalEvent, GimbalKey
 from ..gimbal import GimbalSettings
 from ..setpoint_mixer import STEP_LIMIT
-from ...mavlink import component_kinds as kinds
+from ...mavlink.component_kinds import AUTOPILOT
 from ...payload.device_events import DeviceConnected
 from ...payload.requests import Result
 from ...ros.command_sources import SOURCE_PARAMETERS, source_settings
@@ -127,5 +127,5 @@ GIMBAL = RosPayload(
         'ros2 service call /gimbal/take_control std_srvs/srv/Trigger',
         'ros2 topic pub -1 /gimbal/cmd/angles geometry_msgs/msg/Vector3Stamped '
         '"{header: {frame_id: base_link_stabilized}, vector: {y: 0.785, z: 0.524}}"'),
-    devices=(frozenset({kinds.MANAGER}), frozenset({kinds.GIMBAL, kinds.AUTOPILOT})),
+    devices=(frozenset({'gimbal manager'}), frozenset({'gimbal', AUTOPILOT})),
     mavlink_version=2)

@@ -27,7 +27,6 @@ from ..manager_control import ControlSettings, Role, RoleHolderChanged
 from ..manager_state import ManagerState, StateChanged
 from ..manager_with_client import ManagerWithClient
 from ..setpoint_mixer import AnglesClipped, RateStopped, ReferenceLost, SetpointSent
-from ...mavlink import component_kinds as kinds
 from ...mavlink.command_sender import CommandSender
 from ...mavlink.messages import Address
 from ...payload.arbitration import Cause, Policy
@@ -349,5 +348,4 @@ GIMBAL_MANAGER = RosPayload(
     'gimbal_manager', _make, ManagerNode, (*GIMBAL_PARAMETERS, *MANAGER_PARAMETERS),
     summary='the manager of a gimbal, which obeys one player at a time', examples=(
         'ros2 run illuminator_ros gimbal_manager --ros-args -p gimbal_device_id:=154',
-        'ros2 service call /gimbal_manager/take_control std_srvs/srv/Trigger'),
-    devices=(frozenset({kinds.GIMBAL}),))
+        'ros2 service call /gimbal_manager/take_control std_srvs/srv/Trigger'))

@@ -18,7 +18,6 @@ from .. import events
 from ..client import enable_all, IlluminatorClient
 from ..light import Light
 from ...mavlink.command_sender import CommandSender
-from ...mavlink.component_kinds import LIGHT
 from ...mavlink.messages import Address
 from ...payload.device_events import DeviceConnected
 from ...payload.requests import Done, Result
@@ -195,5 +194,4 @@ ILLUMINATOR = RosPayload(
     summary='a MAVLink illuminator (searchlight, torch, strobe)', examples=(
         'ros2 service call /illuminator/enable std_srvs/srv/SetBool "{data: true}"',
         'ros2 param set /illuminator brightness 60'),
-    devices=(frozenset({LIGHT}),),
     mavlink_version=2)

@@ -38,7 +38,6 @@ from ..input_states import (
 )
 from ..messages import CameraFeedback, Shot
 from ...mavlink.command_sender import CommandSender
-from ...mavlink.component_kinds import MICASENSE
 from ...mavlink.dialect import mavlink
 from ...payload.rotation import Vector
 from ...ros.conversions import GEOID_SEPARATION, quaternion_message
@@ -309,5 +308,4 @@ REDEDGE = RosPayload(
         'ros2 param set /rededge mount_pitch 15.0'),
     # MAV_COMP_ID_ONBOARD_COMPUTER.
     link_defaults={'connection_url': 'udpin://127.0.0.1:14592', 'component_id': 191},
-    devices=(frozenset({MICASENSE}),),
     mavlink_version=1)
