@@ -88,7 +88,7 @@ def tool_tables() -> Tables:
         ('conformance', 'requirement on a gimbal manager'): requirements(
             manager.REQUIREMENTS, 'moves'),
         ('conformance', 'requirement on a camera'): requirements(CAMERA_REQUIREMENTS, 'images'),
-        ('details', 'message'): [
+        ('rededge', 'message'): [
             [cls.msgname, f'`{name}`', field.source, field.unit,
              '' if field.scale is None else f'{field.scale:g}',
              f'{field.low:.10g} to {field.high:.10g}',

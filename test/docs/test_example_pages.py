@@ -1,7 +1,7 @@
 # Copyright 2026 The illuminator_ros developers
 # SPDX-License-Identifier: Apache-2.0
 
-"""Pages show each program of examples/ whole, and import what there is."""
+"""Pages link to each program of examples/, and import what there is."""
 
 from pathlib import Path
 import re
@@ -14,12 +14,10 @@ PAGES = [path.read_text() for path in (ROOT / 'doc').glob('*.md')]
 
 @pytest.mark.parametrize('example', sorted((ROOT / 'examples').glob('*.py')),
                          ids=lambda path: path.stem)
-def test_an_example_is_whole_in_one_page_but_for_its_licence(example: Path) -> None:
-    program = example.read_text().partition('\n\n')[2]
-
-    assert [page.count(f'```python\n{program}```') for page in PAGES
-            if f'examples/{example.name}' in page] == [1]
-    assert len(re.findall('^# Change these: ', program, re.M)) == 1
+def test_an_example_has_a_link_and_the_command_that_copies_it_in_one_page(example: Path) -> None:
+    assert [page.count(f'/examples/{example.name} .') for page in PAGES
+            if f'](../examples/{example.name})' in page] == [1]
+    assert len(re.findall('^# Change these: ', example.read_text(), re.M)) == 1
 
 
 @pytest.mark.parametrize('line', sorted(

@@ -12,11 +12,11 @@ import pytest
 from support.processes import ROOT
 from support.tables import table
 
-GIMBAL, DETAILS = ((ROOT / 'doc' / f'{page}.md').read_text() for page in ('gimbal', 'details'))
+GIMBAL, DESIGN = ((ROOT / 'doc' / f'{page}.md').read_text() for page in ('gimbal', 'design'))
 
 
 def test_each_requirement_on_the_camera_is_listed_and_has_a_test() -> None:
-    listed = [row[0] for row in table(DETAILS, 'requirement')]
+    listed = [row[0] for row in table(DESIGN, 'requirement')]
     tested = {f'RE-{number}' for path in (ROOT / 'test').rglob('test_*.py')
               for name in re.findall(r'^def test(\w+)', path.read_text(), re.MULTILINE)
               for number in re.findall(r'_re_(\d+)', name)}

@@ -117,7 +117,7 @@ def test_each_rule_of_gimbals_is_listed_with_its_requirements_and_has_a_test_or_
               for name in re.findall(r'^(?:async )?def test(\w+)', path.read_text(), re.MULTILINE)
               for number in re.findall(r'_gm_(\d+)', name)}
     listed = {rule: re.findall('`(.+?)`', names) for rule, _, names in table(
-        (DOC / 'details.md').read_text(), 'rule')}
+        (DOC / 'design.md').read_text(), 'rule')}
 
     assert {*listed} == tested | {*checked}
     assert {rule: names for rule, names in listed.items() if names} == checked

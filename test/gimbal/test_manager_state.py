@@ -41,7 +41,7 @@ from support.gimbal_manager import (
 )
 from support.tables import transitions
 
-PAGE = Path(__file__).parents[2] / 'doc' / 'details.md'
+PAGE = Path(__file__).parents[2] / 'doc' / 'gimbal_manager.md'
 OTHER = Address(1, 191)
 
 

@@ -91,7 +91,7 @@ MANAGER_PARAMETERS = (
 
 # The values of the status of the manager, with their meanings for the pages.
 MANAGER_VALUES = {
-    'state': '[no device, listening, active or inactive](details.md#one-manager-for-one-gimbal)',
+    'state': '[no device, listening, active or inactive](#one-manager-for-one-gimbal)',
     'gimbal_device_id': 'of the device',
     'policy': 'as the parameter',
     **dict.fromkeys((f'{role.value}_control' for role in Role),
