@@ -10,6 +10,8 @@ import math
 import types
 from typing import NamedTuple
 
+from ..mavlink.schedule import Schedule
+
 
 class Interrupted(BaseException):
     """The run must end now."""
@@ -33,21 +35,24 @@ class CoroutineRunner:
     """
     Runs one coroutine after another; each awaits :meth:`until` and :meth:`sleep`.
 
+    :param schedule: of the link, which calls :meth:`advance`.
     :ivar now: time of the latest message or poll, s.
     :ivar interrupted: whether :meth:`interrupt` was called.
     :ivar restoring: whether interruption is ignored, because the device is being restored.
     """
 
-    def __init__(self) -> None:
+    def __init__(self, schedule: Schedule) -> None:
         self.now = 0.0
         self.interrupted = False
         self.restoring = False
+        self._schedule = schedule
         self._main: Main | None = None
         self._wait = _Wait(lambda: True, 0.0)
 
     def run(self, main: Main) -> None:
         """Run a coroutine from the next :meth:`advance` on."""
         self._main, self._wait = main, _Wait(lambda: True, self.now)
+        self._schedule.at(self.advance, self.now)
 
     @property
     def running(self) -> bool:
@@ -64,10 +69,8 @@ class CoroutineRunner:
                 self._wait = self._main.send(None)
             except (StopIteration, Interrupted):
                 self._main = None
-
-    def next_deadline(self) -> float:
-        """Return when :meth:`advance` is due, infinity if never."""
-        return math.inf if self._main is None else self._wait.deadline
+        self._schedule.at(
+            self.advance, math.inf if self._main is None else self._wait.deadline)
 
     def interrupt(self, now: float) -> None:
         """Raise :class:`Interrupted` in the coroutine, unless it restores the device."""

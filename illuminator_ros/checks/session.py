@@ -175,11 +175,12 @@ class Session(Endpoint):
         self.danger = ''
         self.components = Components(self.address, conditions.target, self.component)
         self.record = Record(self.messages)
-        self.runner = CoroutineRunner()
+        self.runner = CoroutineRunner(self.schedule)
         self.idle_until = -math.inf
         self.transactions: History[Transaction] = History()
         self._latest: dict[int, Transaction] = {}
-        self._heartbeat = HeartbeatTimer(self.address, mavlink.MAV_TYPE_GCS, self.outgoing)
+        self._heartbeat = HeartbeatTimer(self.address, mavlink.MAV_TYPE_GCS, self.outgoing,
+                                         self.schedule)
 
     # A payload overrides these
 
@@ -251,15 +252,6 @@ class Session(Endpoint):
                 self.runner.restoring = False
                 self.runner.interrupt(now)
         self.runner.advance(now)
-
-    def poll(self, now: float) -> None:
-        """See :meth:`Endpoint.poll`."""
-        self._heartbeat.poll(now)
-        self.runner.advance(now)
-
-    def next_deadline(self) -> float:
-        """See :meth:`Endpoint.next_deadline`."""
-        return min(self._heartbeat.due, self.runner.next_deadline())
 
     # The record
 

@@ -70,7 +70,7 @@ class GimbalClient(Payload):
     def __init__(self, commands: CommandSender, settings: GimbalSettings) -> None:
         self.events: Listeners[GimbalEvent] = Listeners()
         self.discovery = Discovery[GimbalKey, Gimbal](
-            self.events.emit,
+            commands.schedule, self.events.emit,
             limit=lambda key: MAX_GIMBALS + (key.device_id == self.settings.device_id))
         self.gimbals: Mapping[GimbalKey, Gimbal] = self.discovery.devices
         self.settings = settings
@@ -186,21 +186,29 @@ class GimbalClient(Payload):
             elif now >= component.heard_at + RETURN_AFTER:
                 component.query = Retries(GIMBAL_MESSAGE)
             component.heard_at = now
+            self._set_due()
 
     def _reopen(self, manager: Address, now: float) -> None:
         """Request the information of a manager that has sent a status but no information."""
         component = self._component(manager, now)
         if component is not None and component.query.due == math.inf:
             component.query = Retries(GIMBAL_MESSAGE, now)
+            self._set_due()
 
     def _request_information(self, now: float) -> None:
-        if now < self._query_due():
-            return
+        if now >= self._query_due():
+            self._request_next(now)
+        self._set_due()
+
+    def _request_next(self, now: float) -> None:
         address, component = min(self._components.items(), key=lambda item: item[1].query.due)
         component.query.note_try(now)
         self._next_query = now + REQUEST_SPACING
         if now < component.heard_at + FORGET_AFTER:
             self._commands.start(request_message(address, GimbalManagerInformation.id), now)
+
+    def _set_due(self) -> None:
+        self._commands.schedule.at(self._request_information, self._query_due())
 
     def _query_due(self) -> float:
         return max(self._next_query, min(
@@ -220,14 +228,3 @@ class GimbalClient(Payload):
         """See :meth:`Payload.close`."""
         for gimbal in self.gimbals.values():
             gimbal.close(now)
-
-    # Time
-
-    def poll(self, now: float) -> None:
-        """See :meth:`Payload.poll`."""
-        self._request_information(now)
-        self.discovery.poll(now)
-
-    def next_deadline(self) -> float:
-        """See :meth:`Payload.next_deadline`."""
-        return min(self._query_due(), self.discovery.next_deadline())

@@ -102,7 +102,7 @@ class Gimbal:
         self._commands = commands
         self._settings = settings
         self._emit = emit
-        self._commanded = GimbalRequests(key, manager, commands, self.requests)
+        self._commanded = GimbalRequests(key, manager, commands, self.requests, self.poll)
         self.setpoints = SetpointStream(
             self._message, commands.send, settings.setpoint_timeout,
             lambda stands: emit(events.RateStopped(key, stands, self.setpoints.rate_stop.turns)))
@@ -159,12 +159,13 @@ class Gimbal:
 
     def update(self, now: float) -> None:
         """Follow changes of the manager, of the connection, and of control."""
+        self._commands.schedule.by(self.poll, now)
         reports, setpoints = self.reports, self.setpoints
         if reports.choose(now):
             self._end('the manager was lost', now, CONTROL, POSE, PLACE)
             self._step(now)
             self._commanded = GimbalRequests(
-                self.key, reports.manager.address, self._commands, self.requests)
+                self.key, reports.manager.address, self._commands, self.requests, self.poll)
         if reports.connect(now):
             self._repetition.forget()
             self._take_due = self._settings.auto_take_control
@@ -267,6 +268,7 @@ class Gimbal:
         self._yaw_lock.step(now)
         self.requests.answer(now)
         self._commanded.control.answer(now)
+        self._set_due()
 
     def _end_one(self, one: Request, result: Result, now: float) -> None:
         (field, value), = one.values.items()
@@ -305,6 +307,7 @@ class Gimbal:
         if settings.sources:
             self.requests.claims.set_lease(settings.sources.timeout)
             self._expire(now)
+        self._set_due()
 
     # Sources
 
@@ -323,6 +326,7 @@ class Gimbal:
             self._end_commands(f'held by {source}', now)
         if not is_call:
             requests.claim(source, now)
+            self._set_due()
         return refusal
 
     def release(self, source: str, now: float) -> str:
@@ -426,6 +430,7 @@ class Gimbal:
             self._end('superseded by a setpoint', now, POSE, PLACE, superseded=True)
             self._step(now)
             self.setpoints.set_attitude(rotation, frame, now)
+            self._set_due()
         return reason
 
     def set_angles(self, angles: Vector, frame: YawFrame, now: float) -> str:
@@ -464,6 +469,7 @@ class Gimbal:
             self._end('superseded by a setpoint', now, POSE, PLACE, superseded=True)
             self._step(now)
             self.setpoints.set_rates(rates, now)
+            self._set_due()
         return reason
 
     def _message(
@@ -495,16 +501,18 @@ class Gimbal:
             if control.primary is None:
                 self._request_control(True, now, taken)
         self.reports.poll(now)
+        self._set_due()
 
-    def next_deadline(self) -> float:
-        """Return when :meth:`poll` is due, infinity if never."""
+    def _set_due(self) -> None:
+        """Have :meth:`poll` called when it is due."""
         reports = self.reports
         if self._take_due and reports.is_connected and reports.control is not None:
-            return -math.inf
-        return min(self.requests.claims.next_deadline(), self._yaw_lock.next_deadline(),
-                   self._commanded.next_deadline(), reports.next_deadline(),
-                   self.setpoints.next_deadline(may_stop=not self._commanded.may_turn)
-                   if reports.in_control else math.inf)
+            due = -math.inf
+        else:
+            due = min(self.requests.claims.due, self._yaw_lock.due, self._commanded.due,
+                      reports.due, self.setpoints.due(may_stop=not self._commanded.may_turn)
+                      if reports.in_control else math.inf)
+        self._commands.schedule.at(self.poll, due)
 
     def snapshot(self, now: float) -> events.GimbalSnapshot:
         """Return the gimbal at this moment."""

@@ -450,7 +450,8 @@ class GimbalReports:
         if self._can_request_attitudes:
             self.device.request.poll(now)
 
-    def next_deadline(self) -> float:
+    @property
+    def due(self) -> float:
         """Return when :meth:`poll` is due, or connection or control may have changed, s."""
         manager = self.manager
         due = math.inf if self.control is None else min(

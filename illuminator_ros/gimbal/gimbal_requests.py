@@ -45,11 +45,13 @@ class GimbalRequests:
     Sends one manager of a gimbal what is wanted by command. No I/O; times are s.
 
     :param requests: for poses and places; those for control are in a table of their own.
+    :param poll: of the gimbal.
     :ivar control: the standing requests for control.
     """
 
     def __init__(
         self, key: GimbalKey, manager: Address, commands: CommandSender, requests: Requests,
+        poll: Callable[[float], None],
     ) -> None:
         self.control = Requests(f'gimbal {key}', None, describe)
         self._requests = requests
@@ -61,14 +63,14 @@ class GimbalRequests:
         # ArduPilot's manager does not report the flags. No status shows the place.
         self._properties: dict[str, Property[Any]] = {
             CONTROL: Property(Target(
-                manager, commands, 'gimbal manager', GimbalManagerStatus.id,
+                manager, commands, 'gimbal manager', poll, GimbalManagerStatus.id,
                 GimbalManagerStatus.msgname, needs_status=True), self._planner(
                 lambda take: configure(self._us, self._device_id, take=take))),
             POSE: Property(Target(
-                manager, commands, 'gimbal device', GimbalDeviceAttitudeStatus.id,
+                manager, commands, 'gimbal device', poll, GimbalDeviceAttitudeStatus.id,
                 GimbalDeviceAttitudeStatus.msgname, key.address, needs_status=True),
                 self._planner(lambda flag: flag.change(self._device_id))),
-            PLACE: Property(Target(manager, commands, 'gimbal manager'), self._planner(
+            PLACE: Property(Target(manager, commands, 'gimbal manager', poll), self._planner(
                 lambda place: point(self._device_id, place)))}
 
     @staticmethod
@@ -144,8 +146,9 @@ class GimbalRequests:
         """Do what is due; return the requests that have ended."""
         return [served for one in self._properties.values() for served in one.poll(now)]
 
-    def next_deadline(self) -> float:
-        """Return when :meth:`poll` or :meth:`step` has something to do."""
+    @property
+    def due(self) -> float:
+        """Return when :meth:`poll` or :meth:`step` has something to do, s."""
         waits = [one.due for one in self.control.live() if not one.is_under_way]
         return min([*waits, *(one.due for one in self._properties.values())])
 
@@ -223,7 +226,8 @@ class YawLock:
                     False, f'{wanted.goal} not confirmed: {shown} within {LOCK_LIMIT:g} s'
                     f'{advice}'), now)
 
-    def next_deadline(self) -> float:
+    @property
+    def due(self) -> float:
         """Return when :meth:`poll` or :meth:`step` is due, infinity if never."""
         waiting = self._waiting
         return min([waiting[0].since + LOCK_LIMIT, *self._resend]) if waiting else math.inf

@@ -90,6 +90,7 @@ class ManagedDevice:
         """Request its information."""
         if self._tracker.has_mavlink and self.information is None:
             self.request.due = now
+            self._set_due()
 
     def lost(self) -> None:
         """Forget its abilities: the next device may be another one."""
@@ -103,8 +104,10 @@ class ManagedDevice:
         self.capabilities, self.ranges = read_capabilities(message), known_ranges(message)
         self.request.stop()
 
-    def poll(self, now: float) -> None:
-        """Request the information if that is due."""
+    def _set_due(self) -> None:
+        self._commands.schedule.at(self._request_information, self.request.due)
+
+    def _request_information(self, now: float) -> None:
         if now >= self.request.due and self._tracker.device is not None:
             self.request.stop()
             self._commands.start(
@@ -114,6 +117,7 @@ class ManagedDevice:
     def _answered(self, result: CommandResult, now: float) -> None:
         if self.information is None and self._tracker.state is not ManagerState.NO_DEVICE:
             self.request.note_try(now)
+            self._set_due()
 
     # Reports
 

@@ -130,10 +130,12 @@ class GimbalManager(Payload):
     def link_opened(self, now: float) -> None:
         """See :meth:`Payload.link_opened`."""
         self.tracker.link_opened(now)
+        self._commands.schedule.by(self.poll, now)
 
     def link_closed(self, now: float, reason: str) -> None:
         """See :meth:`Payload.link_closed`."""
         self.tracker.link_closed(now)
+        self._commands.schedule.by(self.poll, now)
 
     def components_lost(self, lost: Collection[Address], now: float, reason: str) -> None:
         """See :meth:`Payload.components_lost`."""
@@ -142,9 +144,11 @@ class GimbalManager(Payload):
         elif self.control.primary.holder in lost:
             # Its control ends with its lease, unless it is heard again.
             self.setpoints.stop(now)
+        self._commands.schedule.by(self.poll, now)
 
     def receive(self, source: Address, message: mav.Message, now: float) -> None:
         """See :meth:`Payload.receive`."""
+        self._commands.schedule.by(self.poll, now)
         if isinstance(message, AnySetpoint):
             self.take_setpoint(source, message, now)
         elif isinstance(message, mav.Heartbeat):
@@ -174,12 +178,12 @@ class GimbalManager(Payload):
         """See :meth:`Payload.receive_conflicting`."""
         if isinstance(message, gimbal.GimbalManagerInformation | gimbal.GimbalManagerStatus):
             self.tracker.hear_manager(self.address, message.gimbal_device_id, now)
+            self._commands.schedule.by(self.poll, now)
 
     def poll(self, now: float) -> None:
-        """See :meth:`Payload.poll`."""
+        """Do what is due."""
         self.tracker.poll(now)
         self._control_changed(self.control.poll(now), now)
-        self._device.poll(now)
         if now >= self._status_due:
             self._status_due = max(self._status_due + STATUS_INTERVAL, now)
             self._report(self.status(now))
@@ -195,12 +199,9 @@ class GimbalManager(Payload):
         if now >= self.setpoints.due:
             self.setpoints.poll(now)
         self.setpoints.rate_stop.poll(now)
-
-    def next_deadline(self) -> float:
-        """See :meth:`Payload.next_deadline`."""
-        return min(self.tracker.next_deadline(), self.control.next_deadline(),
-                   self._device.request.due, self._status_due, self.setpoints.due,
-                   self.setpoints.rate_stop.due)
+        self._commands.schedule.at(self.poll, min(
+            self.tracker.due, self.control.due, self._status_due, self.setpoints.due,
+            self.setpoints.rate_stop.due))
 
     def _state_changed(self, change: StateChanged, now: float) -> None:
         after = change.after
@@ -230,6 +231,7 @@ class GimbalManager(Payload):
     def close(self, now: float) -> None:
         """See :meth:`Payload.close`: the device stays where it is, and follows nothing more."""
         self.setpoints.close(now)
+        self._commands.schedule.by(self.poll, now)
 
     # The device and the vehicle, from the link or from ROS
 
@@ -237,6 +239,7 @@ class GimbalManager(Payload):
         """Take the attitude of a device without MAVLink, from ROS."""
         self._measured_at = now
         self._take_attitude(self._measured(to_mavlink(*value), value[1], now), now)
+        self._commands.schedule.by(self.poll, now)
 
     def _measured(
         self, q: Sequence[float], frame: YawFrame, now: float,
@@ -282,6 +285,7 @@ class GimbalManager(Payload):
 
     def execute(self, source: Address, command: AnyCommand, now: float) -> int | None:
         """See :meth:`Payload.execute`."""
+        self._commands.schedule.by(self.poll, now)
         params = params_of(command)
         if command.command == mavlink.MAV_CMD_REQUEST_MESSAGE:
             return self._send_requested(params[0], now)

@@ -129,9 +129,10 @@ class ControlArbiter:
         return [RoleHolderChanged(role, change.before, change.after, change.cause)
                 for role, arbiter in self._arbiters.items() if (change := arbiter.poll(now))]
 
-    def next_deadline(self) -> float:
+    @property
+    def due(self) -> float:
         """Return when :meth:`poll` is due, infinity if never."""
-        return min(self.primary.next_deadline(), self.secondary.next_deadline())
+        return min(self.primary.due, self.secondary.due)
 
     def _wanted(
         self, role: Role, source: Address, system: float, component: float,

@@ -166,7 +166,8 @@ class StateTracker:
         if now >= self._listening_until:
             self._take(ManagerInput.TIME_OVER, now)
 
-    def next_deadline(self) -> float:
+    @property
+    def due(self) -> float:
         """Return when :meth:`poll` is due, infinity if never."""
         return min(
             self._listening_until,

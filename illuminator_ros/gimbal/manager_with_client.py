@@ -12,8 +12,10 @@ to ROS as to all other players.
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Collection
+from collections.abc import Callable, Collection
+import functools
 import math
+from typing import TypeVar
 
 from .client import GimbalClient
 from .gimbal import GimbalSettings
@@ -25,6 +27,25 @@ from ..mavlink.component import Component, Payload
 from ..mavlink.messages import AnyCommand
 
 _FOR_CLIENT = frozenset(GimbalClient.messages)
+
+M = TypeVar('M')
+
+
+class Mailbox(deque[M]):
+    """
+    The messages that one of both has for the other.
+
+    :param wake: called after each of them.
+    """
+
+    def __init__(self, wake: Callable[[], None]) -> None:
+        super().__init__()
+        self._wake = wake
+
+    def append(self, message: M) -> None:
+        """Append a message."""
+        super().append(message)
+        self._wake()
 
 
 class ManagerWithClient(Payload):
@@ -42,11 +63,13 @@ class ManagerWithClient(Payload):
         self, commands: CommandSender, settings: ManagerSettings, client: GimbalSettings,
     ) -> None:
         # The reports of the manager, which the client has not received yet.
-        self._reports: deque[mav.Message] = deque()
+        wake = functools.partial(commands.schedule.by, self._exchange, -math.inf)
+        self._reports: Mailbox[mav.Message] = Mailbox(wake)
         self.manager = GimbalManager(commands, settings, reported=self._reports.append)
         self._commands = commands
         own = CommandSender(
-            commands.address, commands.timeout, commands.retries, commands.clock_fault)
+            commands.address, commands.timeout, commands.retries, commands.clock_fault,
+            Mailbox(wake), schedule=commands.schedule)
         self.client = GimbalClient(own, client)
         # It is given no messages: it would drop those of its own address.
         self._component = Component(own, [self.client])
@@ -101,23 +124,14 @@ class ManagerWithClient(Payload):
         """See :meth:`Payload.execute`."""
         return self.manager.execute(source, command, now)
 
-    def poll(self, now: float) -> None:
-        """See :meth:`Payload.poll`."""
-        self.manager.poll(now)
-        self._component.poll(now)
-        # Pass the messages of manager and client to each other until neither has one.
+    def _exchange(self, now: float) -> None:
+        """Pass the messages of manager and client to each other until neither has one."""
         outgoing = self._component.outgoing
         while self._reports or outgoing:
             if self._reports:
                 self.client.receive(self._commands.address, self._reports.popleft(), now)
             else:
                 self._deliver(*outgoing.popleft(), now)
-
-    def next_deadline(self) -> float:
-        """See :meth:`Payload.next_deadline`."""
-        if self._reports or self._component.outgoing:
-            return -math.inf
-        return min(self.manager.next_deadline(), self._component.next_deadline())
 
     def _deliver(self, source: mav.Address, message: mav.Message, now: float) -> None:
         """Give a message of the client to the manager, or send it to another component."""

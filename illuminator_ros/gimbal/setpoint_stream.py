@@ -299,7 +299,7 @@ class SetpointStream:
         if may_stop:
             self.rate_stop.poll(now)
 
-    def next_deadline(self, *, may_stop: bool) -> float:
+    def due(self, *, may_stop: bool) -> float:
         """Return when :meth:`poll` is due, infinity if never."""
         return min([*(self._last.due[:1] if self._last is not None else ()),
                     *([self.rate_stop.due] if may_stop else ())], default=math.inf)

@@ -66,7 +66,7 @@ class IlluminatorClient(Payload):
         # Takes the results of the OFF at the end of the process.
         self._report_off: Callable[[Light, Result, float], None] | None = None
         self.discovery = Discovery[Address, Light](
-            self.events.emit, found=self._found, wanted=wanted,
+            commands.schedule, self.events.emit, found=self._found, wanted=wanted,
             dropped=lambda one, now: commands.end_all(now, CommandStatus.CANCELLED, one))
         self.lights: Mapping[Address, Light] = self.discovery.devices
         self.messages = (Heartbeat, IlluminatorStatus, ComponentInformationBasic, CommandAck,
@@ -162,14 +162,6 @@ class IlluminatorClient(Payload):
     def _switch_off_finally(self, light: Light, now: float) -> None:
         if self._report_off is not None:
             light.switch_off_finally(now, functools.partial(self._report_off, light))
-
-    def poll(self, now: float) -> None:
-        """See :meth:`Payload.poll`."""
-        self.discovery.poll(now)
-
-    def next_deadline(self) -> float:
-        """See :meth:`Payload.next_deadline`."""
-        return self.discovery.next_deadline()
 
 
 def enable_all(

@@ -95,7 +95,7 @@ class Light:
         self.liveness = Liveness(settings.heartbeat_timeout)
         self._commands = commands
         self._emit = emit
-        target = Target(address, commands, 'light', STATUS_ID, STATUS)
+        target = Target(address, commands, 'light', self.poll, STATUS_ID, STATUS)
         self.twin = twin = Twin(target, emit)
         self._requests = requests = Requests(
             f'light {address}', settings.sources, describe,
@@ -105,7 +105,6 @@ class Light:
         self._control = LightControl(target, requests, twin, rules, emit)
         self._queries = LightQueries(
             target, self.liveness, settings.status_interval, settings.heartbeat_timeout)
-        self._due = -math.inf
         # Whether a status without news changes nothing.
         self._is_calm = False
 
@@ -128,7 +127,7 @@ class Light:
             rules.silence = Silence(settings.off_after_silence, now)
         if settings.sources:
             self._requests.claims.set_lease(settings.sources.timeout)
-        self._due = -math.inf
+        self._commands.schedule.by(self.poll, -math.inf)
 
     # Reception
 
@@ -164,7 +163,7 @@ class Light:
                 self._emit(events.StatesChanging(self.address, True))
             control.reported(status, now)
         self._queries.take_status(now)
-        if has_news:
+        if has_news or order is Order.RESTARTED:
             self._step(now)
             self._is_calm = control.is_settled(now)
         # Last, so that a caller has its answer before topics show the change.
@@ -365,8 +364,10 @@ class Light:
         if self.connected:
             self._control.step(now)
         self._requests.answer(now)
-        due = self._silence_due(now) if self.connected else math.inf
-        self._due = min(due, self._requests.next_due(now))
+        self._commands.schedule.at(self.poll, min(
+            self._silence_due(now) if self.connected else math.inf,
+            self._requests.next_due(now), self._control.command_due, self._queries.due,
+            self.twin.changing.until, self.liveness.silent_at))
 
     def poll(self, now: float) -> None:
         """Do what is due."""
@@ -378,8 +379,3 @@ class Light:
         self._queries.poll(now)
         self._control.poll(now)
         self._step(now)
-
-    def next_deadline(self) -> float:
-        """Return when :meth:`poll` has something to do, or earlier."""
-        return min(self._due, self._control.command_due, self._queries.next_deadline(),
-                   self.twin.changing.until, self.liveness.silent_at)

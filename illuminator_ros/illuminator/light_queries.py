@@ -83,6 +83,7 @@ class MessageQuery:
         if is_answered and result.result != mavlink.MAV_RESULT_TEMPORARILY_REJECTED:
             self._refusal = '' if result.accepted else result.describe_failure()
             self.retries.note_try(now)
+            self._target.wake(self.retries.due)
         else:
             # It was sent as often as a command may be.
             self.finish(result.describe_failure(), now)
@@ -184,6 +185,7 @@ class LightQueries:
         """Take the identity."""
         self.identity = identity
         self.serials.take(identity.serial_number, now)
+        self._target.wake(self.serials.due)
         self._identity.finish('', now)
 
     def identity_is_settled(self, now: float) -> bool:
@@ -228,7 +230,8 @@ class LightQueries:
         heard_at = self._liveness.heard_at if self._liveness.connected else math.inf
         return min(self._due, max(heard_at, self._asked_at) + self._longest_silence)
 
-    def next_deadline(self) -> float:
-        """Return when :meth:`poll` has something to do."""
+    @property
+    def due(self) -> float:
+        """Return when :meth:`poll` has something to do, s."""
         return min(self._status_due, self._status.retries.due, self._identity.retries.due,
-                   self.serials.next_deadline())
+                   self.serials.due)

@@ -51,12 +51,13 @@ class SerialNumbers:
 
     def is_due(self, now: float) -> bool:
         """Return whether the identity must be asked for now, and note that it is."""
-        if now < self.next_deadline():
+        if now < self.due:
             return False
         self._forget(now)
         self._asked_at = now
         return True
 
-    def next_deadline(self) -> float:
+    @property
+    def due(self) -> float:
         """Return when :meth:`is_due` is true next, infinity if never."""
         return self._asked_at + INTERVAL if len(self._received) > 1 else math.inf

@@ -23,6 +23,7 @@ from . import messages
 from .dialect import mavlink
 from .messages import Address, Message
 from .retries import CLOSING, COMMAND, REJECTED
+from .schedule import Schedule
 
 # s between two reports of progress. The specification does not define it; MAVSDK also uses 3 s.
 PROGRESS_TIMEOUT = 3.0
@@ -267,7 +268,7 @@ class CommandCounters:
     unanswered: int = 0
 
 
-@dataclass
+@dataclass(eq=False)
 class CommandSender:
     """
     Sends commands to any number of components, in parallel across them.
@@ -278,10 +279,10 @@ class CommandSender:
     :param clock_fault: returns why a target may ignore our signed frames, for people; '' in
         general.
     :ivar outgoing: messages to send, each with the address that sends it.
+    :ivar schedule: of the parts that send by it, which the link calls again.
     :ivar unanswering: the targets whose last command got no acknowledgement, at most
         :data:`MAX_TARGETS`.
     :ivar refusal: why no device may be changed any more, for people; '' if it may be.
-    :ivar version: counts what has happened to commands, for those who keep a deadline of theirs.
     :ivar round_trips: the last round-trip time of each target, s, at most :data:`MAX_TARGETS`.
     :ivar answers: how many acknowledgements, but those of progress, each kind of command got
         lately, by target and MAV_CMD, at most :data:`MAX_TARGETS`.
@@ -293,11 +294,11 @@ class CommandSender:
     retries: int = int(COMMAND.tries) - 1
     clock_fault: Callable[[], str] = str
     outgoing: deque[tuple[Address, Message]] = field(default_factory=deque)
+    schedule: Schedule = field(default_factory=Schedule)
     counters: CommandCounters = field(default_factory=CommandCounters)
     unanswering: dict[Address, None] = field(default_factory=dict)
     round_trips: dict[Address, float] = field(default_factory=dict)
     answers: dict[tuple[Address, int], int] = field(default_factory=dict)
-    version: int = 0
     refusal: str = ''
     _may_send: Callable[[Command | Message], bool] | None = None
     _pending: dict[CommandKind, Transmission] = field(default_factory=dict)
@@ -406,7 +407,6 @@ class CommandSender:
         """
         if not messages.target_of(ack).includes(self.address):
             return False
-        self.version += 1
         self.unanswering.pop(source, None)
         key = source, ack.command
         if key in self.answers and ack.result != mavlink.MAV_RESULT_IN_PROGRESS:
@@ -428,10 +428,10 @@ class CommandSender:
         state = TRANSITIONS.get((pending.state, ack.result))
         if state is CommandState.IN_PROGRESS:
             pending.progress = ack.progress if ack.progress <= 100 else None
-            pending.due = now + PROGRESS_TIMEOUT
+            self._wait_until(pending, now + PROGRESS_TIMEOUT)
         elif state is CommandState.BACKOFF:
             pending.rejected += 1
-            pending.due = now + REJECTED.wait(pending.rejected)
+            self._wait_until(pending, now + REJECTED.wait(pending.rejected))
             if pending.due >= min(pending.first_sent + self._patience, pending.deadline):
                 self._end(pending, CommandStatus.ANSWERED, now)
                 return
@@ -460,6 +460,8 @@ class CommandSender:
         for pending in list(self._pending.values()):
             if now >= min(pending.due, pending.deadline):
                 self._overdue(pending, now)
+        self.schedule.at(self.poll, min(
+            (min(one.due, one.deadline) for one in self._pending.values()), default=math.inf))
 
     def _overdue(self, pending: Transmission, now: float) -> None:
         if now >= pending.deadline:
@@ -474,13 +476,6 @@ class CommandSender:
             pending.state = CommandState.SENT
             self._transmit(pending, now)
 
-    def next_deadline(self) -> float:
-        """Return when :meth:`poll` has something to do, infinity if never."""
-        due = math.inf
-        for pending in self._pending.values():
-            due = min(due, pending.due, pending.deadline)
-        return due
-
     def end_all(
         self, now: float, status: CommandStatus, target: Address | None = None,
     ) -> None:
@@ -494,18 +489,21 @@ class CommandSender:
             (self.address, pending.command.message(pending.tries, pending.as_int)))
         if pending.follow_up is not None:
             self.send_once(pending.follow_up)
-        pending.due = now + self._wait(pending.tries - pending.rejected)
+        self._wait_until(pending, now + self._wait(pending.tries - pending.rejected))
         pending.tries += 1
         self.counters.sent += 1
         self.counters.resent += pending.tries > 1
         pending.last_sent = now
+
+    def _wait_until(self, pending: Transmission, due: float) -> None:
+        pending.due = due
+        self.schedule.by(self.poll, min(due, pending.deadline))
 
     def _end(self, pending: Transmission, status: CommandStatus, now: float) -> None:
         key = pending.command.key
         if self._pending.get(key) is not pending:
             return
         del self._pending[key]
-        self.version += 1
         if status is CommandStatus.NO_ANSWER:
             self.counters.unanswered += 1
             _keep(self.unanswering, pending.command.target, None)

@@ -8,7 +8,6 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections import deque
 from collections.abc import Callable, Collection, Sequence
-import contextlib
 import math
 
 from .command_receiver import CommandReceiver
@@ -26,20 +25,13 @@ from .messages import (
     heartbeat,
     Message,
 )
+from .schedule import Schedule
 from .statistics import MAX_SOURCES
 
 # s between heartbeats (heartbeat protocol).
 HEARTBEAT_INTERVAL = 1.0
 # s for which a message from our own address counts as an address conflict.
 CONFLICT_MEMORY = 10.0
-
-
-def call_each(functions: Sequence[Callable[..., None]], *arguments: object) -> None:
-    """Call functions in their order; raise the exception of one once all have been called."""
-    with contextlib.ExitStack() as calls:
-        # The stack calls the last one first.
-        for function in reversed(functions):
-            calls.callback(function, *arguments)
 
 
 class MessageHandler(ABC):
@@ -84,22 +76,17 @@ class MessageHandler(ABC):
     def sent(self, message: Message, now: float) -> None:  # noqa: B027 - optional
         """Note that a message of ``streams`` is sent; others have replaced those between."""
 
-    def poll(self, now: float) -> None:  # noqa: B027 - optional
-        """Do everything that is due."""
-
-    def next_deadline(self) -> float:
-        """Return when :meth:`poll` is due, infinity if never."""
-        return math.inf
-
 
 class Endpoint(MessageHandler):
     """
     The handler of all messages of a link.
 
-    A :class:`~.link.Link` calls it only in its thread, and sends the messages in ``outgoing``.
+    A :class:`~.link.Link` calls it only in its thread, sends the messages in ``outgoing``, and
+    runs the ``schedule``.
 
     :ivar inspect: called with the frame and the class of a message before that is received.
     :ivar outgoing: messages to send, each with the address that sends it.
+    :ivar schedule: the functions of its parts that want to be called.
     :ivar address: of a component that has one only.
     """
 
@@ -108,6 +95,7 @@ class Endpoint(MessageHandler):
 
     def __init__(self) -> None:
         self.outgoing: deque[tuple[Address, Message]] = deque()
+        self.schedule = Schedule()
 
 
 class Payload(MessageHandler):
@@ -117,7 +105,8 @@ class Payload(MessageHandler):
     It names HEARTBEAT among its ``messages`` if it needs heartbeats, and COMMAND_LONG and
     COMMAND_INT if it executes commands. It receives no messages from the component's own address,
     and no acknowledgements for other components.
-    All its commands have ended when :meth:`link_closed` is called.
+    All its commands have ended when :meth:`link_closed` is called. Its parts are called again by
+    the schedule of the command sender.
     """
 
     def receive_conflicting(self, message: Message, now: float) -> None:  # noqa: B027 - optional
@@ -151,30 +140,25 @@ class HeartbeatTimer:
     not heard.
 
     :param outgoing: takes the heartbeats, each with the address.
-    :ivar due: when the next one is sent, s; infinity before the first and after :meth:`stop`.
     """
 
     def __init__(
         self, address: Address, mav_type: int, outgoing: deque[tuple[Address, Message]],
+        schedule: Schedule,
     ) -> None:
-        self.due = math.inf
         self._address = address
         self._mav_type = mav_type
         self._outgoing = outgoing
-
-    def poll(self, now: float) -> None:
-        """Send a heartbeat if one is due."""
-        if now >= self.due:
-            self.send(now)
+        self._schedule = schedule
 
     def send(self, now: float) -> None:
         """Send a heartbeat now; the next is due an interval later."""
         self._outgoing.append((self._address, heartbeat(self._mav_type)))
-        self.due = now + HEARTBEAT_INTERVAL
+        self._schedule.at(self.send, now + HEARTBEAT_INTERVAL)
 
     def stop(self) -> None:
         """Send none until the next :meth:`send`: the link is closed."""
-        self.due = math.inf
+        self._schedule.at(self.send, math.inf)
 
 
 class Component(Endpoint):
@@ -192,6 +176,7 @@ class Component(Endpoint):
         mav_type: int = mavlink.MAV_TYPE_ONBOARD_CONTROLLER,
     ) -> None:
         self.outgoing = commands.outgoing
+        self.schedule = commands.schedule
         self.commands = commands
         self.address = commands.address
         self.heartbeats: dict[Address, Heartbeat] = {}
@@ -207,9 +192,7 @@ class Component(Endpoint):
         self._receivers = {cls: tuple(one for one in payloads if cls in one.messages)
                            for cls in self.messages}
         self._received = CommandReceiver(self.address)
-        self._heartbeat = HeartbeatTimer(self.address, mav_type, self.outgoing)
-        # A payload may end a command that is due to be sent again.
-        self._polls = (self._heartbeat.poll, *(one.poll for one in payloads), commands.poll)
+        self._heartbeat = HeartbeatTimer(self.address, mav_type, self.outgoing, self.schedule)
         self._conflict_at = -math.inf
         # The last heartbeat from another sender with our address.
         self._conflicting: Heartbeat | None = None
@@ -301,14 +284,3 @@ class Component(Endpoint):
     def _execute(self, source: Address, command: AnyCommand, now: float) -> int | None:
         return next((result for payload in self._receivers[type(command)]
                      if (result := payload.execute(source, command, now)) is not None), None)
-
-    def poll(self, now: float) -> None:
-        """See :meth:`Endpoint.poll`."""
-        call_each(self._polls, now)
-
-    def next_deadline(self) -> float:
-        """See :meth:`Endpoint.next_deadline`."""
-        due = min(self._heartbeat.due, self.commands.next_deadline())
-        for payload in self._payloads:
-            due = min(due, payload.next_deadline())
-        return due

@@ -23,6 +23,7 @@ from .link_thread import FaultLog
 from .messages import Address
 from .receiver import Receiver
 from .retries import RESOURCE
+from .schedule import Schedule
 from .silent_port import SilentPort
 from .transport import Channel, Peer
 from .url import Url
@@ -86,7 +87,8 @@ class Line:
     """
 
     def __init__(
-        self, url: Url, user: LineUser, receiver: Receiver, *, label: str, faults: FaultLog,
+        self, url: Url, user: LineUser, schedule: Schedule, receiver: Receiver, *,
+        label: str, faults: FaultLog,
         selector: selectors.BaseSelector, call: Callable[[Callable[[float], None]], None],
         clock: Callable[[], float], opener: Callable[[threading.Event], Channel] | None = None,
     ) -> None:
@@ -102,19 +104,21 @@ class Line:
         self._connector = Connector(
             url, lambda outcome: call(functools.partial(self._connector_reports, outcome)),
             opener=opener)
-        # When to connect, s; infinity while the connector tries, and while there is a channel.
-        self._connect_at = -math.inf
+        self._schedule = schedule
         self._channel: Channel | None = None
         self._watch = functools.partial(SilentPort, call=call)
         self._silent: SilentPort | None = None
-        # When the channel is proved without a frame, s.
-        self._proven_at = math.inf
-        self._announce_at = math.inf
+        schedule.at(self._connect, -math.inf)
 
     @property
     def is_open(self) -> bool:
         """Return whether there is a channel."""
         return self._channel is not None
+
+    @property
+    def name(self) -> str:
+        """Return the name of the channel, of the line while there is none."""
+        return self._channel.name if self._channel else self.status.label
 
     @property
     def silence(self) -> str:
@@ -129,7 +133,7 @@ class Line:
         """Return the line at this moment; the counters of signing are of all lines."""
         status, receiver, channel = self.status, self.receiver, self._channel
         return LinkSnapshot(
-            status.state, status.since, channel.name if channel else status.label,
+            status.state, status.since, self.name,
             status.reason, status.openings, receiver.routes.peer_count(now),
             receiver.traffic.snapshot(now), copy.copy(receiver.counters),
             copy.copy(receiver.signing.counters),
@@ -142,8 +146,8 @@ class Line:
         self._channel = channel
         self.receiver.leads_to = channel.leads_to
         self._silent = self._watch(channel.serial, channel) if channel.serial else None
-        self._proven_at = now + PROOF_TIME
-        self._announce_at = now + ANNOUNCE_INTERVAL
+        self._schedule.at(self._prove, now + PROOF_TIME)
+        self._schedule.at(self._announce, now + ANNOUNCE_INTERVAL)
         try:
             channel.register(self._selector, self._serve)
         except (OSError, ValueError) as error:
@@ -191,47 +195,13 @@ class Line:
             self._lost(error)
             return
         self._forwarded += len(frames) * len(peers)
+        self._schedule.at(self._forward_more, self._channel.forward_due)
 
     @property
     def free_at(self) -> float:
         """Return when our next frames can be sent without waiting, infinity if that is unknown."""
         channel = self._channel
         return math.inf if channel is None or channel.is_waiting else channel.free_at
-
-    def poll(self, now: float) -> None:
-        """Do what is due."""
-        if now >= self._connect_at:
-            self._connect(now)
-        channel = self._channel
-        if channel is None:
-            return
-        if now >= self._proven_at:
-            # The channel has lasted, so the next try after its loss is immediate.
-            self._proven_at = math.inf
-            self._connector.backoff.succeeded()
-            self.status.take(LinkInput.PROVED, now, channel.name)
-        for peer, frames in self.receiver.give_up(now):
-            self._handle(channel, peer, frames, now)
-        if now >= channel.next_deadline():
-            try:
-                channel.forward_more(now)
-            except OSError as error:
-                self._lost(error)
-        if now >= self._announce_at:
-            self._announce_at = now + ANNOUNCE_INTERVAL
-            self._user.silent(self, now)
-            if self._silent:
-                self._silent.poll(self.receiver.traffic.frames_received, now)
-
-    def next_deadline(self) -> float:
-        """Return when :meth:`poll` is due."""
-        if self.status.events:
-            return -math.inf
-        due = min(self._connect_at, self._proven_at, self._announce_at)
-        # Most lines wait for none, and this is called for each frame.
-        if self.receiver.waits:
-            due = min(due, self.receiver.next_deadline())
-        return min(due, self._channel.next_deadline()) if self._channel else due
 
     def pause(self, now: float) -> float:
         """Return for how long to let foreign frames collect before the next read, s."""
@@ -250,33 +220,65 @@ class Line:
         with contextlib.suppress(OSError):
             channel.close()
         self._not_forwarded += channel.not_forwarded
-        self._proven_at = self._announce_at = math.inf
+        for call in self._prove, self._announce, self._give_up, self._forward_more:
+            self._schedule.at(call, math.inf)
         self.receiver.clear()
+
+    # Calls of the schedule
 
     def _connect(self, now: float) -> None:
         try:
             self._connector.start()
-            self._connect_at = math.inf
         except RuntimeError as error:
             self.status.failed(str(error))
-            self._connect_at = now + RESOURCE.first
+            self._schedule.at(self._connect, now + RESOURCE.first)
+
+    def _prove(self, now: float) -> None:
+        """Note that the channel has lasted, so the next try after its loss is immediate."""
+        self._connector.backoff.succeeded()
+        self.status.take(LinkInput.PROVED, now, self.name)
+
+    def _announce(self, now: float) -> None:
+        """Have the user announce itself to a peer that is not heard."""
+        self._schedule.at(self._announce, now + ANNOUNCE_INTERVAL)
+        self._user.silent(self, now)
+        if self._silent:
+            self._silent.poll(self.receiver.traffic.frames_received, now)
+
+    def _give_up(self, now: float) -> None:
+        """Take the frames behind beginnings of frames that have waited too long."""
+        for peer, frames in self.receiver.give_up(now):
+            if self._channel is not None:
+                self._handle(self._channel, peer, frames, now)
+        self._schedule.at(self._give_up, self.receiver.due)
+
+    def _forward_more(self, now: float) -> None:
+        """Send frames of others that have waited."""
+        if self._channel is None:
+            return
+        try:
+            self._channel.forward_more(now)
+        except OSError as error:
+            self._lost(error)
+        else:
+            self._schedule.at(self._forward_more, self._channel.forward_due)
 
     def _connector_reports(self, outcome: Channel | str | None, now: float) -> None:
         if isinstance(outcome, str):
             self.status.failed(outcome)
         elif outcome is None:
-            self._connect_at = now + RESOURCE.first
+            self._schedule.at(self._connect, now + RESOURCE.first)
         else:
             self.opened(outcome, now)
 
     def _lost(self, error: OSError) -> None:
-        """Close the channel; the next poll opens it again."""
+        """Close the channel; it is opened again in this turn of the thread."""
         if self._channel is None:
             return
         name, reason, now = self._channel.name, error.strerror or str(error), self._clock()
         heard = self.receiver.routes.sources()
         self.close()
-        self._connect_at = -math.inf
+        self._schedule.at(self._connect, -math.inf)
         self.status.take(LinkInput.CLOSED, now, name, reason)
         self._user.lost(heard, reason, now)
 
@@ -289,6 +291,7 @@ class Line:
         try:
             if events & selectors.EVENT_WRITE:
                 channel.writable(handle)
+                self._schedule.at(self._forward_more, channel.forward_due)
             if events & selectors.EVENT_READ and not self._user.is_behind:
                 for peer, data in channel.receive(handle):
                     if self._silent and self._silent.is_away:
@@ -296,6 +299,9 @@ class Line:
                         continue
                     now = self._clock()
                     frames = self.receiver.take(peer, data, now)
+                    # Most lines wait for none.
+                    if self.receiver.waits:
+                        self._schedule.by(self._give_up, self.receiver.due)
                     if frames is not None:
                         self._handle(channel, peer, frames, now)
                     elif self._silent:
@@ -313,7 +319,7 @@ class Line:
         if self.status.state is not LinkState.OPEN:
             self._connector.backoff.answered()
             self.status.take(LinkInput.PROVED, now, channel.name)
-        self._announce_at = now + SILENCE
+        self._schedule.at(self._announce, now + SILENCE)
         if channel.heard(peer, now):
             if _frame_log.isEnabledFor(logging.DEBUG):
                 _frame_log.debug('new peer %s on %s', peer, channel.name)

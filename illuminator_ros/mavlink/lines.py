@@ -65,7 +65,6 @@ class Lines(LineUser):
         self._endpoint = endpoint
         self._classes = {cls.id: cls for cls in endpoint.messages}
         self._faults = faults
-        self._clock = clock
         self._defer = defer
         # Frames of messages that were received, and their lines.
         self._received: deque[tuple[Line, Frame]] = deque()
@@ -78,8 +77,9 @@ class Lines(LineUser):
         writer = FrameWriter(signing, mavlink_version, self._duplicates)
         sources: dict[Address, SequenceCounter] = {}
         self._lines = [
-            Line(url, self, Receiver(signing, self._classes, writer, wall_clock, sources,
-                                     self._duplicates, index),
+            Line(url, self, endpoint.schedule,
+                 Receiver(signing, self._classes, writer, wall_clock, sources, self._duplicates,
+                          index),
                  label=label, faults=faults, selector=selector, call=call, clock=clock,
                  opener=SerialSearch(
                      url, FrameWriter(copy.copy(signing), mavlink_version), endpoint.address).open
@@ -127,26 +127,16 @@ class Lines(LineUser):
         if counter := self._sources.get(source):
             counter.reset_loss()
 
-    def flush(self) -> None:
+    def flush(self, now: float) -> None:
         """Send the messages of the endpoint; without a channel they are dropped."""
         if not self._endpoint.outgoing and not self._sender.is_holding:
             return
         messages = list(self._endpoint.outgoing)
         self._endpoint.outgoing.clear()
         if any(line.is_open for line in self._lines):
-            self._sender.send(messages, self._clock())
-
-    def poll(self, now: float) -> None:
-        """Do what is due."""
-        for line in self._lines:
-            line.poll(now)
-
-    def next_deadline(self) -> float:
-        """Return when :meth:`poll` or :meth:`flush` is due."""
-        due = self._sender.next_deadline() if self._sender.is_holding else math.inf
-        for line in self._lines:
-            due = min(due, line.next_deadline())
-        return due
+            self._sender.send(messages, now)
+            self._endpoint.schedule.at(
+                self.flush, self._sender.due if self._sender.is_holding else math.inf)
 
     def pause(self, now: float) -> float:
         """Return for how long to let foreign frames collect before the next read, s."""
@@ -159,7 +149,7 @@ class Lines(LineUser):
     def opened(self, now: float) -> None:
         """See :meth:`LineUser.opened`."""
         self._faults.call(self._endpoint.link_opened, now)
-        self.flush()
+        self.flush(now)
 
     def lost(self, heard: Sequence[Address], reason: str, now: float) -> None:
         """See :meth:`LineUser.lost`."""

@@ -7,7 +7,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 import functools
-import math
 import selectors
 import time
 
@@ -63,7 +62,6 @@ class Link:
         self._on_event = on_event
         self._signing = signing or Signing()
         self._store = store
-        self._store_due = 0.0 if store else math.inf
         self._faults = FaultLog(clock)
         self._thread = LinkThread(
             self._work, self._finish, self._faults, clock, selector,
@@ -73,6 +71,8 @@ class Link:
             selector=self._thread.selector, call=self._thread.call,
             defer=self._thread.defer, signing=self._signing, mavlink_version=mavlink_version,
             clock=clock, wall_clock=wall_clock)
+        if store:
+            endpoint.schedule.at(self._store_regularly, 0.0)
 
     # From any thread
 
@@ -118,30 +118,21 @@ class Link:
 
     def _work(self) -> float:
         now = self.clock()
-        self.lines.flush()
-        due = self._next_deadline()
-        if self.clock() >= due:
-            self._poll()
-            due = self._next_deadline()
-        if seconds := self.lines.pause(now):
-            self._thread.pause(seconds)
-        return due
-
-    def _next_deadline(self) -> float:
-        return min(self.endpoint.next_deadline(), self.lines.next_deadline(), self._store_due)
-
-    def _poll(self) -> None:
-        """Do what is due."""
-        self.lines.poll(self.clock())
-        self._faults.call(self.endpoint.poll, self.clock())
-        self.lines.flush()
-        now = self.clock()
-        if now >= self._store_due:
-            self._store_due = now + STORE_INTERVAL
-            self._store_timestamp(last=False)
+        self.lines.flush(now)
+        schedule = self.endpoint.schedule
+        if (at := self.clock()) >= schedule.due:
+            self._faults.call(schedule.run, at)
+            self.lines.flush(self.clock())
         for line in self.lines:
             while line.status.events:
                 self._faults.call(self._on_event, line.status.events.pop(0))
+        if seconds := self.lines.pause(now):
+            self._thread.pause(seconds)
+        return schedule.due
+
+    def _store_regularly(self, now: float) -> None:
+        self.endpoint.schedule.at(self._store_regularly, now + STORE_INTERVAL)
+        self._store_timestamp(last=False)
 
     def _finish(self) -> None:
         self._store_timestamp(last=True)

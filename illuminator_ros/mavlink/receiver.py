@@ -119,7 +119,7 @@ class Receiver:
 
         Later bytes may be the beginning of a valid frame, and are kept.
         """
-        if now < self.next_deadline():
+        if now < self.due:
             return []
         found = []
         for peer, wait in list(self.waits.items()):
@@ -132,7 +132,8 @@ class Receiver:
                     found.append((peer, accepted))
         return found
 
-    def next_deadline(self) -> float:
+    @property
+    def due(self) -> float:
         """Return when :meth:`give_up` has something to do, infinity if never."""
         if not self.waits:
             return math.inf

@@ -73,7 +73,7 @@ class Sender:
                 at_once += [*self._streams.take_for(target_of(message)), (source, message)]
         self._send_now(at_once, now)
         self.is_holding = bool(self._streams)
-        while self.is_holding and self.next_deadline() <= now:
+        while self.is_holding and self.due <= now:
             taken = self._streams.take(now)
             self._send_now(taken, now)
             for _, message in taken:
@@ -81,7 +81,8 @@ class Sender:
             self.is_holding = bool(self._streams)
         self._lines[0].receiver.traffic.frames_dropped += self._streams.dropped - dropped
 
-    def next_deadline(self) -> float:
+    @property
+    def due(self) -> float:
         """Return when held messages of streams can be sent; infinity while each line is full."""
         now = self._clock()
         target = target_of(self._streams.first)

@@ -119,7 +119,8 @@ class Arbiter(Generic[K]):
             return None
         return self._give(self._next(), Cause.SILENCE, now)
 
-    def next_deadline(self) -> float:
+    @property
+    def due(self) -> float:
         """Return when :meth:`poll` is due, infinity if never."""
         return min(self._claims.values(), default=math.inf) + self._lease
 

@@ -67,6 +67,7 @@ class Target(NamedTuple):
     The device that commands go to.
 
     :param kind: a noun for it, such as ``light``.
+    :param poll: goes on with what is due for the device; the schedule calls it.
     :param status_id: the message id of its status, None if no status shows what the commands
         change: then the acknowledgement decides.
     :param status_source: the component that sends the status, None for the device itself.
@@ -77,10 +78,15 @@ class Target(NamedTuple):
     address: Address
     commands: CommandSender
     kind: str
+    poll: Callable[[float], None]
     status_id: int | None = None
     status_name: str = ''
     status_source: Address | None = None
     needs_status: bool = False
+
+    def wake(self, time: float) -> None:
+        """Have :attr:`poll` called at a time, s, or before."""
+        self.commands.schedule.by(self.poll, time)
 
     @property
     def status_request(self) -> Command | None:
@@ -346,6 +352,7 @@ class Attempt(Generic[S]):
         elif answer.status is not CommandStatus.CANCELLED:
             self._answer = answer
             self._ends_at = now
+        self._target.wake(self.due)
 
     # The status
 

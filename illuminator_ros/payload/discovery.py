@@ -16,7 +16,7 @@ import math
 from typing import Generic, Protocol, TypeVar
 
 from .device_events import DeviceEvent, DeviceForgotten, DeviceFound
-from ..mavlink.component import call_each
+from ..mavlink.schedule import Schedule
 
 # Devices of one kind; one more is ignored, so that memory is bounded.
 MAX_DEVICES = 128
@@ -41,10 +41,7 @@ class DiscoveredDevice(Protocol):
         """Whether a user has ever sent it a command."""
 
     def poll(self, now: float) -> None:
-        """Do everything that is due."""
-
-    def next_deadline(self) -> float:
-        """Return when :meth:`poll` is due, infinity if never."""
+        """Do everything that is due; the schedule calls it."""
 
 
 K = TypeVar('K', bound=Hashable)
@@ -55,6 +52,7 @@ class Discovery(Generic[K, D]):
     """
     The devices of one kind on a link, by keys such as their addresses.
 
+    :param schedule: of the link.
     :param emit: takes :class:`DeviceFound` when a device is announced, and
         :class:`DeviceForgotten` when it was dropped.
     :param found: called when a device was announced.
@@ -68,7 +66,8 @@ class Discovery(Generic[K, D]):
     """
 
     def __init__(
-        self, emit: Callable[[DeviceEvent[K]], None] = lambda event: None, *,
+        self, schedule: Schedule,
+        emit: Callable[[DeviceEvent[K]], None] = lambda event: None, *,
         found: Callable[[D, float], None] = lambda device, now: None,
         dropped: Callable[[K, float], None] = lambda key, now: None,
         wanted: Callable[[K], bool] = lambda key: True,
@@ -78,6 +77,7 @@ class Discovery(Generic[K, D]):
         self.candidates: dict[K, D] = {}
         self.ignored: dict[K, None] = {}
         self.limit_reached = False
+        self._schedule = schedule
         self._emit = emit
         self._found = found
         self._dropped = dropped
@@ -110,6 +110,7 @@ class Discovery(Generic[K, D]):
             if not self._has_room(key, now, proved=proved):
                 return None
             self.candidates[key], self._found_at[key] = make(key), now
+            self._schedule.by(self._forget, now + FORGET_AFTER)
         device = self.candidates[key]
         if proved:
             self.prove(key, now)
@@ -141,30 +142,24 @@ class Discovery(Generic[K, D]):
 
     def _drop(self, key: K, now: float) -> None:
         self._found_at.pop(key, None)
+        if device := self.get(key):
+            self._schedule.at(device.poll, math.inf)
         self.candidates.pop(key, None)
-        device = self.devices.pop(key, None)
+        was_announced = self.devices.pop(key, None) is not None
         self._dropped(key, now)
-        if device is not None:
+        if was_announced:
             self.limit_reached = False
             self._emit(DeviceForgotten(key))
 
-    def poll(self, now: float) -> None:
-        """Poll the devices that have something to do, and forget silent ones."""
-        due = []
-        for key, device in [*self.devices.items(), *self.candidates.items()]:
-            if not device.was_commanded and now >= device.lost_at + FORGET_AFTER:
-                self._drop(key, now)
-            elif now >= device.next_deadline():
-                due.append(device.poll)
-        call_each(due, now)
-
-    def next_deadline(self) -> float:
-        """Return when :meth:`poll` is due, infinity if never."""
+    def _forget(self, now: float) -> None:
+        """Forget the devices that were lost long ago and that no user has commanded."""
         due = math.inf
-        for devices in (self.devices, self.candidates):
-            for device in devices.values():
-                due = min(due, device.next_deadline())
-                lost_at = device.lost_at
-                if lost_at < math.inf and not device.was_commanded:
-                    due = min(due, lost_at + FORGET_AFTER)
-        return due
+        for key, device in [*self.devices.items(), *self.candidates.items()]:
+            if device.was_commanded:
+                continue
+            # One that is heard now cannot be forgotten before this time.
+            if now >= (forget_at := min(device.lost_at, now) + FORGET_AFTER):
+                self._drop(key, now)
+            else:
+                due = min(due, forget_at)
+        self._schedule.at(self._forget, due)

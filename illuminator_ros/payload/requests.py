@@ -14,7 +14,7 @@ from typing import Any, NamedTuple
 
 from .arbitration import Arbiter, Cause, HolderChanged, Policy
 from .command_sources import DEFAULT, SourceSettings
-from ..mavlink.component import call_each
+from ..mavlink.schedule import call_each
 
 # By field; whether a light is on is a field like the others.
 Values = Mapping[str, Any]
@@ -405,7 +405,7 @@ class Requests:
 
     def expire(self, now: float) -> HolderChanged[str] | None:
         """End the claims of silent sources; return the change of the holder."""
-        if not self.are_ranked or now < self.claims.next_deadline():
+        if not self.are_ranked or now < self.claims.due:
             return None
         before = self._claimed()
         return self._expired(self.claims.poll(now), before, now)
@@ -439,7 +439,7 @@ class Requests:
 
     def next_due(self, now: float) -> float:
         """Return when a request becomes due or is late next, or when a claim ends, s."""
-        due = self.claims.next_deadline() if self.are_ranked else math.inf
+        due = self.claims.due if self.are_ranked else math.inf
         for one in self.standing:
             if one.is_open:
                 due = min(due, one.until, one.due if one.due > now else math.inf)

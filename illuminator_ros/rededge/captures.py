@@ -6,15 +6,14 @@
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Callable
 from dataclasses import dataclass
 import math
 
 from . import messages as rededge
 from .pings import PingDone
-from ..mavlink.command_sender import format_seconds
+from ..mavlink.command_sender import CommandSender, format_seconds
 from ..mavlink.dialect import entry_names, mavlink
-from ..mavlink.messages import Address, Message
+from ..mavlink.messages import Address
 
 # s from DIGICAM_CONTROL to CAMERA_FEEDBACK.
 CAPTURE_TIMEOUT = 5.0
@@ -57,15 +56,15 @@ class Captures:
     """
     Requests one image at a time, and assigns the reports of images to the requests.
 
-    :param send: sends a message.
+    :param commands: sends the requests.
     :ivar images: images that were reported since the start.
     :ivar newest: index of the newest reported image; None before it, and after a loss.
     """
 
-    def __init__(self, send: Callable[[Message], None]) -> None:
+    def __init__(self, commands: CommandSender) -> None:
         self.images = 0
         self.newest: int | None = None
-        self._send = send
+        self._commands = commands
         self._capture: _Capture | None = None
         # The ends of the times in which late answers to captures may come, s.
         self._late: deque[float] = deque(maxlen=MAX_LATE)
@@ -79,8 +78,9 @@ class Captures:
             done(False, self._capture.described(now))
             return
         self._capture = _Capture(now, done)
+        self._commands.schedule.at(self._expire, self._capture.due)
         # The manufacturer recommends 1 for session and zoom_pos.
-        self._send(rededge.DigicamControl(*target, 1, 1, 0, 0, shot, 0, 0, 0.0))
+        self._commands.send(rededge.DigicamControl(*target, 1, 1, 0, 0, shot, 0, 0, 0.0))
 
     def forget_count(self) -> None:
         """Note that the camera is lost: after a restart it counts its images from the start."""
@@ -151,8 +151,8 @@ class Captures:
         if capture is not None:
             capture.done(success, text)
 
-    def poll(self, now: float) -> None:
-        """See :meth:`Payload.poll`."""
+    def _expire(self, now: float) -> None:
+        """End a request whose time is over."""
         capture, limit = self._capture, format_seconds(CAPTURE_TIMEOUT)
         if capture is None or now < capture.due:
             return
@@ -168,7 +168,3 @@ class Captures:
             self._late.appendleft(capture.late_until)
             text += '; an image was reported that an earlier request may have caused'
         self._end(False, text)
-
-    def next_deadline(self) -> float:
-        """See :meth:`Payload.next_deadline`."""
-        return math.inf if self._capture is None else self._capture.due

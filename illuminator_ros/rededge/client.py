@@ -98,11 +98,10 @@ class RedEdgeClient(Payload):
     ) -> None:
         self.settings = settings
         self.events: Listeners[CameraEvent] = Listeners()
-        self.feeder = Feeder(settings, commands.send, lambda: self.target)
+        self.feeder = Feeder(settings, commands.send, lambda: self.target, commands.schedule)
         self._commands = commands
-        self._pings = Pings(commands.address, commands.send,
-                            random.getrandbits(32) if sequence is None else sequence)
-        self._captures = Captures(commands.send)
+        self._pings = Pings(commands, random.getrandbits(32) if sequence is None else sequence)
+        self._captures = Captures(commands)
         self._address: Address | None = None
         self._liveness = Liveness(settings.heartbeat_timeout, 'the link is not open')
         self._heartbeats: deque[float] = deque(maxlen=CONFLICT_HEARTBEATS)
@@ -130,6 +129,7 @@ class RedEdgeClient(Payload):
         """See :meth:`Payload.link_opened`."""
         self._liveness.link_failure = ''
         self.feeder.set_link(is_open=True)
+        self._pings.poll(now)
 
     def link_closed(self, now: float, reason: str) -> None:
         """See :meth:`Payload.link_closed`."""
@@ -154,6 +154,7 @@ class RedEdgeClient(Payload):
         self._address = source
         if self._liveness.hear(now):
             self.events.emit(DeviceConnected(source))
+        self._commands.schedule.at(self._expire, self._liveness.silent_at)
 
     def _lose(self, reason: str, now: float) -> None:
         if self._liveness.lose(now):
@@ -210,17 +211,7 @@ class RedEdgeClient(Payload):
         self._pings.end(self._commands.refusal)
         self._captures.end(self._commands.refusal)
 
-    def poll(self, now: float) -> None:
-        """See :meth:`Payload.poll`."""
+    def _expire(self, now: float) -> None:
+        """Note that the camera is silent."""
         if now >= self._liveness.silent_at:
             self._lose(self._liveness.silence(now), now)
-        if not self._liveness.link_failure:
-            self._pings.poll(now)
-        self._captures.poll(now)
-        self.feeder.orientation.poll(now)
-
-    def next_deadline(self) -> float:
-        """See :meth:`Payload.next_deadline`."""
-        due = min(self._liveness.silent_at, self._captures.next_deadline(),
-                  self.feeder.orientation.next_deadline())
-        return due if self._liveness.link_failure else min(due, self._pings.next_deadline())

@@ -34,6 +34,7 @@ from .messages import GpsRawInt
 from .orientation_feeder import OrientationFeeder
 from ..mavlink.command_sender import format_seconds
 from ..mavlink.messages import Address, Message, time_boot_ms
+from ..mavlink.schedule import Schedule
 from ..payload.messages import Attitude, GlobalPositionInt
 from ..payload.rotation import Quaternion, Vector
 
@@ -78,17 +79,18 @@ class Feeder:
 
     :param send: sends a message.
     :param target: returns the address of the camera.
+    :param schedule: of the link.
     :ivar orientation: takes attitudes and mounts.
     """
 
     def __init__(
         self, settings: CameraSettings, send: Callable[[Message], None],
-        target: Callable[[], Address],
+        target: Callable[[], Address], schedule: Schedule,
     ) -> None:
         self._settings = settings
         self._send = send
         self._inputs = InputStates(settings)
-        self.orientation = OrientationFeeder(settings, send, target, self._inputs)
+        self.orientation = OrientationFeeder(settings, send, target, schedule, self._inputs)
         self._velocities: dict[Input, Vector] = {}
         self._satellites: int | None = None
         self._gps_status_due = -math.inf

@@ -14,6 +14,7 @@ from . import conversions
 from .conversions import MountParent
 from .input_states import CameraSettings, Input, InputStates, PAIR, Stamp, UNKNOWN
 from ..mavlink.messages import Address, Message, time_boot_ms
+from ..mavlink.schedule import Schedule
 from ..payload.rotation import Quaternion, Vector
 
 # s between messages about a fixed mount while there is no attitude; the camera uses it for 5 s.
@@ -55,17 +56,19 @@ class OrientationFeeder:
 
     :param send: sends a message.
     :param target: returns the address of the camera.
+    :param schedule: of the link.
     :ivar fixed_mount: roll, pitch and yaw of a fixed mount, degrees; None if ~/mount has a
         publisher.
     """
 
     def __init__(
         self, settings: CameraSettings, send: Callable[[Message], None],
-        target: Callable[[], Address], inputs: InputStates,
+        target: Callable[[], Address], schedule: Schedule, inputs: InputStates,
     ) -> None:
         self._settings = settings
         self._send = send
         self._target = target
+        self._schedule = schedule
         self._inputs = inputs
         self._samples: dict[Input, deque[_Sample]] = {
             name: deque(maxlen=MAX_SAMPLES)
@@ -81,6 +84,7 @@ class OrientationFeeder:
         self._pair_time = 0
         # When attitude and mount were sent last, s.
         self._pair_sent_at = -math.inf
+        self._set_due()
 
     def take_attitude(
         self, name: Input, orientation: Quaternion | None, rates: Vector, stamp: Stamp,
@@ -129,6 +133,7 @@ class OrientationFeeder:
     def expect_mount(self) -> None:
         """Stop sending the fixed mount, since ``~/mount`` has a publisher."""
         self.fixed_mount = None
+        self._set_due()
 
     def set_fixed_mount(self, angles: Vector, since: float) -> None:
         """
@@ -139,6 +144,7 @@ class OrientationFeeder:
         if self.fixed_mount is not None:
             self.fixed_mount, self._fixed_since = angles, since
             self._mount_sent_at = -math.inf
+            self._set_due()
 
     def _send_pair(self, now: float) -> None:
         """Send the newest known attitude and mount of one instant, back to back."""
@@ -190,6 +196,7 @@ class OrientationFeeder:
     def _send_mount(self, angles: Vector, now: float) -> None:
         self._send(conversions.mount_status(angles, self._target()))
         self._mount_sent_at = now
+        self._set_due()
 
     def clock_jumped(self) -> None:
         """Forget everything that depends on ROS time."""
@@ -197,12 +204,10 @@ class OrientationFeeder:
         for samples in self._samples.values():
             samples.clear()
 
-    def poll(self, now: float) -> None:
-        """See :meth:`Payload.poll`."""
-        if self.fixed_mount is not None and now >= self.next_deadline():
+    def _repeat_mount(self, now: float) -> None:
+        if self.fixed_mount is not None:
             self._send_mount(self.fixed_mount, now)
 
-    def next_deadline(self) -> float:
-        """See :meth:`Payload.next_deadline`."""
-        return math.inf if self.fixed_mount is None else max(
-            self._fixed_since, self._mount_sent_at + MOUNT_INTERVAL)
+    def _set_due(self) -> None:
+        self._schedule.at(self._repeat_mount, math.inf if self.fixed_mount is None else max(
+            self._fixed_since, self._mount_sent_at + MOUNT_INTERVAL))

@@ -10,7 +10,8 @@ import math
 from typing import NamedTuple
 
 from . import messages as rededge
-from ..mavlink.messages import Address, Message, target_of
+from ..mavlink.command_sender import CommandSender
+from ..mavlink.messages import target_of
 from ..mavlink.retries import PING
 
 # s between PINGs.
@@ -31,22 +32,20 @@ class _Request(NamedTuple):
 
 class Pings:
     """
-    Sends a PING at an interval, and on request; is polled while the link is open.
+    Sends a PING at an interval, and on request, from the first :meth:`poll` until :meth:`stop`.
 
-    :param own: the address of this component.
-    :param send: sends a message.
+    :param commands: of this component.
     :param sequence: the sequence number before the first PING.
     :ivar round_trip: of the last answered PING, s; None if no PING was answered.
     :ivar unanswered: PINGs without a reply since the last reply.
     """
 
     def __init__(
-        self, own: Address, send: Callable[[Message], None], sequence: int,
+        self, commands: CommandSender, sequence: int,
     ) -> None:
         self.round_trip: float | None = None
         self.unanswered = 0
-        self._own = own
-        self._send = send
+        self._commands = commands
         self._sequence = sequence
         # When each unanswered PING was sent, by sequence number, s.
         self._sent: dict[int, float] = {}
@@ -58,6 +57,7 @@ class Pings:
         self._due = -math.inf
         self._sent.clear()
         self.end(reason)
+        self._commands.schedule.at(self.poll, math.inf)
 
     def end(self, reason: str) -> None:
         """End all requests."""
@@ -69,16 +69,17 @@ class Pings:
         """Measure the round trip."""
         self._requests.append(_Request(now, done))
         self._ping(now)
+        self._set_due()
 
     def _ping(self, now: float) -> None:
         self._due = now + (PING.first if self._requests else PING_INTERVAL)
         self._sequence = (self._sequence + 1) & 0xFFFFFFFF
         self._sent[self._sequence] = now
-        self._send(rededge.Ping(int(now * 1e6), self._sequence, 0, 0))
+        self._commands.send(rededge.Ping(int(now * 1e6), self._sequence, 0, 0))
 
     def take(self, message: rededge.Ping, now: float) -> None:
         """Take a PING of the camera, which is a reply if its target is our address."""
-        if target_of(message) != self._own:
+        if target_of(message) != self._commands.address:
             return
         sent_at = self._sent.pop(message.seq, None)
         if sent_at is None:
@@ -91,7 +92,7 @@ class Pings:
             request.done(True, f'{self.round_trip * 1000:.1f} ms round trip')
 
     def poll(self, now: float) -> None:
-        """See :meth:`Payload.poll`."""
+        """Send what is due, and end what is over."""
         for sequence, sent_at in list(self._sent.items()):
             if now >= sent_at + PING.first:
                 del self._sent[sequence]
@@ -101,8 +102,9 @@ class Pings:
             request.done(False, f'no reply to {PING.tries} PINGs')
         if now >= self._due:
             self._ping(now)
+        self._set_due()
 
-    def next_deadline(self) -> float:
-        """See :meth:`Payload.next_deadline`."""
-        return min(self._due, min(self._sent.values(), default=math.inf) + PING.first,
-                   min((one.until for one in self._requests), default=math.inf))
+    def _set_due(self) -> None:
+        self._commands.schedule.at(self.poll, min(
+            self._due, min(self._sent.values(), default=math.inf) + PING.first,
+            min((one.until for one in self._requests), default=math.inf)))

@@ -480,8 +480,9 @@ class SimulatedRedEdge(simulated.SimulatedDevice):
             self.capture(rededge.Shot.SURVEY, 'interval', self._image_due)
             self._image_due += self._interval
 
-    def next_deadline(self) -> float:
-        """See :meth:`SimulatedDevice.next_deadline`."""
+    @property
+    def due(self) -> float:
+        """See :attr:`SimulatedDevice.due`."""
         return min(self._image_due, self._pending[0][0] if self._pending else math.inf)
 
     def snapshot(self, now: float) -> simulated.Snapshot:

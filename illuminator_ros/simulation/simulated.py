@@ -21,6 +21,7 @@ from ..mavlink import messages
 from ..mavlink.component import Endpoint
 from ..mavlink.dialect import mavlink
 from ..mavlink.messages import Address, AnyCommand, Message
+from ..mavlink.schedule import Schedule
 from ..payload.listeners import Listeners
 
 # s; the shortest interval of a stream, which also serves requests for shorter ones.
@@ -182,7 +183,8 @@ class SimulatedDevice(ABC):
         """Do what is due, besides streams; return the messages to send."""
         return ()
 
-    def next_deadline(self) -> float:
+    @property
+    def due(self) -> float:
         """Return when :meth:`poll` is due, s."""
         return math.inf
 
@@ -319,17 +321,19 @@ class SimulatedComponent(Generic[D]):
     One simulated component: heartbeat, commands, streams and faults. No I/O.
 
     :param outgoing: takes the messages that it sends, each with its address.
-    :param changed: called when :meth:`next_deadline` may have changed.
+    :param schedule: of the link, which calls :meth:`poll`.
     """
 
     def __init__(
         self, device: D, now: float,
         outgoing: deque[tuple[Address, Message]] | None = None,
+        schedule: Schedule | None = None,
     ) -> None:
         self.device = device
         self.address = device.properties.address
         self.name = device.properties.name
         self.outgoing = deque() if outgoing is None else outgoing
+        self.schedule = Schedule() if schedule is None else schedule
         self._injector = FaultInjector(f'{device.properties.seed} {self.address}')
         self.power_on(now)
 
@@ -355,6 +359,7 @@ class SimulatedComponent(Generic[D]):
         # Actions that are due later.
         self._delayed: list[tuple[float, Callable[[float], None]]] = []
         self._reboot_due = now + (self.device.behaviour.reboot_interval or math.inf)
+        self._set_due()
 
     def behave(self, behaviour: Behaviour, now: float) -> None:
         """Behave differently from now on."""
@@ -366,6 +371,7 @@ class SimulatedComponent(Generic[D]):
             self._reboot_due = now + (behaviour.reboot_interval or math.inf)
         if behaviour.heartbeat_interval != before.heartbeat_interval:
             self._heartbeat_due = now if behaviour.heartbeat_interval else math.inf
+        self._set_due()
 
     def apply(self, effect: Effect, now: float) -> None:
         """Apply an effect, of a command or by hand, and send the streamed messages."""
@@ -375,6 +381,7 @@ class SimulatedComponent(Generic[D]):
                 if stream.interval:
                     stream.due = now + stream.interval
                     self._send(self.device.message(message_id, now), now)
+        self._set_due()
 
     def _is_addressed(self, message: Message) -> bool:
         """Return whether a message is for this component (MAVLink guide, "Routing")."""
@@ -388,7 +395,11 @@ class SimulatedComponent(Generic[D]):
             system == 0 or system == self.address.system and component == 0))
 
     def receive(self, source: Address, message: Message, now: float) -> None:
-        """Take a command or a message for this component, or a broadcast one."""
+        """Receive a command or a message for this component, or a broadcast one."""
+        self._take(source, message, now)
+        self._set_due()
+
+    def _take(self, source: Address, message: Message, now: float) -> None:
         behaviour = self.device.behaviour
         if now < self._silent_until:
             return
@@ -531,9 +542,10 @@ class SimulatedComponent(Generic[D]):
             behaviour.heartbeat_type, behaviour.heartbeat_autopilot,
             behaviour.heartbeat_base_mode, behaviour.heartbeat_custom_mode,
             behaviour.heartbeat_state, messages.MAVLINK_VERSION), now)
+        self._set_due()
 
     def poll(self, now: float) -> None:
-        """See :meth:`Endpoint.poll`."""
+        """Do what is due."""
         if now >= self._silent_until > -math.inf:
             self._silent_until = -math.inf
             self.device.behave(replace(self.device.behaviour, silence=0.0), now)
@@ -551,14 +563,14 @@ class SimulatedComponent(Generic[D]):
                 self._send(self.device.message(message_id, now), now)
         for message in self.device.poll(now):
             self._send(message, now)
+        self._set_due()
 
-    def next_deadline(self) -> float:
-        """See :meth:`Endpoint.next_deadline`."""
+    def _set_due(self) -> None:
         end_of_silence = math.inf if self._silent_until == -math.inf else self._silent_until
-        return min(self._heartbeat_due, self._reboot_due, end_of_silence,
-                   self.device.next_deadline(),
-                   *(stream.due for stream in self._streams.values()),
-                   *(due for due, _ in self._delayed))
+        self.schedule.at(self.poll, min(
+            self._heartbeat_due, self._reboot_due, end_of_silence, self.device.due,
+            *(stream.due for stream in self._streams.values()),
+            *(due for due, _ in self._delayed)))
 
 
 class SimulatedComponents(Endpoint, Generic[D]):
@@ -573,7 +585,8 @@ class SimulatedComponents(Endpoint, Generic[D]):
         super().__init__()
         self.new_peers: Listeners[Address] = Listeners()
         self._peers: set[Address] = set()
-        self.components = [SimulatedComponent(one, now, self.outgoing) for one in devices]
+        self.components = [
+            SimulatedComponent(one, now, self.outgoing, self.schedule) for one in devices]
         self.sends = tuple(dict.fromkeys(
             cls for one in self.components
             for cls in (*one.device.sends, *one.device.reports())))
@@ -593,13 +606,3 @@ class SimulatedComponents(Endpoint, Generic[D]):
             self.new_peers.emit(source)
         for component in self.components:
             component.receive(source, message, now)
-
-    def poll(self, now: float) -> None:
-        """See :meth:`Endpoint.poll`."""
-        for component in self.components:
-            if now >= component.next_deadline():
-                component.poll(now)
-
-    def next_deadline(self) -> float:
-        """See :meth:`Endpoint.next_deadline`."""
-        return min((one.next_deadline() for one in self.components), default=math.inf)

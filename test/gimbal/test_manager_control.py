@@ -85,7 +85,7 @@ def test_control_ends_after_the_lease_without_a_heartbeat_of_its_player(
     one.heard(PLAYER, heartbeat(2), 1.0)
     one.heard(LOWER, heartbeat(2), 3.9)
 
-    assert one.next_deadline() == 1.0 + LEASE
+    assert one.due == 1.0 + LEASE
     assert one.poll(3.9) == []
     assert one.poll(4.0) == [RoleHolderChanged(role, PLAYER, None, Cause.SILENCE)]
     assert one.holder(role) is None

@@ -34,8 +34,8 @@ class Heard(Client):
 
     def run(self, until: float) -> None:
         """Let time pass without a peer."""
-        while (due := self.next_deadline()) <= until:
-            self.poll(due)
+        while (due := self.schedule.due) <= until:
+            self.schedule.run(due)
 
 
 @pytest.fixture

@@ -40,9 +40,9 @@ def statuses(messages: Iterable[Any]) -> list[IlluminatorStatus]:
 def test_a_stream_keeps_its_rate_when_polled_late_and_leaves_out_what_it_missed() -> None:
     bench = LightBench(status_interval=0.1)
     for turn in range(101):
-        bench.component.poll(turn * 0.1 + 0.03)
+        bench.component.schedule.run(turn * 0.1 + 0.03)
     for now in (60.2, 60.21):
-        bench.component.poll(now)
+        bench.component.schedule.run(now)
     assert len(statuses(message for _, message in bench.component.outgoing)) == 102
 
 

@@ -59,5 +59,5 @@ def test_random_schedules_end_with_one_answer_each_and_the_true_state(seed: int)
         assert followed == actual or actual.mode is Mode.EXTERNAL_SYNC
         assert light.twin.status is not None
         assert light.twin.status.enabled == simulated.device.enabled
-        assert light.next_deadline() > pair.now
-    assert pair.controller.sender.next_deadline() == float('inf')
+    assert pair.controller.schedule.due > pair.now
+    assert not pair.controller.sender

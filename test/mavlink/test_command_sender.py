@@ -87,7 +87,7 @@ def test_command_ends_as_its_answers_say(
     run = rig.start(limit=options.get('limit', math.inf))
     rig.run(LONG)
     assert (str(run.outcome), [round(at - 1000.0, 6) for at, _ in run.frames]) == (said, times)
-    assert rig.sender.next_deadline() == math.inf
+    assert rig.sender.schedule.due == math.inf
 
 
 def test_a_command_without_an_answer_names_a_clock_that_is_not_set() -> None:

@@ -119,6 +119,7 @@ class Sender(Endpoint):
 
     def link_opened(self, now: float) -> None:
         self.outgoing.append((SOURCE, heartbeat(18)))
+        self.schedule.by(self.poll, now)
 
     def receive(self, source: Address, message: Message, now: float) -> None:
         raise AssertionError(message)
@@ -128,9 +129,7 @@ class Sender(Endpoint):
             if now >= stream.due(self.start):
                 self.outgoing.extend((SOURCE, one) for one in stream.make(stream.number))
                 stream.number += 1
-
-    def next_deadline(self) -> float:
-        return min(stream.due(self.start) for stream in self.due)
+        self.schedule.at(self.poll, min(stream.due(self.start) for stream in self.due))
 
 
 def run(

@@ -49,17 +49,17 @@ def test_pieces_are_put_together_for_each_peer_and_counted_over_all(receiver: Re
 def test_good_frame_behind_false_starts_comes_after_the_stall_time_without_more_bytes(
         receiver: Receiver, noise: bytes) -> None:
     assert receiver.take('a', noise + FRAME, 0.0) is None
-    assert receiver.next_deadline() == STALL
+    assert receiver.due == STALL
     assert receiver.give_up(STALL - 0.01) == []
     assert [(peer, sources(frames)) for peer, frames in receiver.give_up(STALL)] == [
         ('a', [LIGHT])]
-    assert receiver.next_deadline() == math.inf
+    assert receiver.due == math.inf
 
 
 def test_frame_that_began_behind_a_false_start_is_still_awaited(receiver: Receiver) -> None:
     receiver.take('a', FALSE_STARTS[0], 0.0)
     receiver.take('a', FRAME[:9], 0.4)
-    assert receiver.next_deadline() == STALL
+    assert receiver.due == STALL
     assert receiver.give_up(STALL) == []
     assert sources(receiver.take('a', FRAME[9:], STALL + 0.1)) == [LIGHT]
 
@@ -74,7 +74,7 @@ def test_signed_frames_pass_and_are_counted_where_signing_is_off() -> None:
 def test_wait_begins_anew_with_the_next_frame(receiver: Receiver) -> None:
     receiver.take('a', FRAME[:9], 0.0)
     receiver.take('a', FRAME[9:] + FRAME[:9], 0.4)
-    assert receiver.next_deadline() == 0.4 + STALL
+    assert receiver.due == 0.4 + STALL
 
 
 def test_longest_frame_at_9600_baud_is_not_given_up(receiver: Receiver) -> None:
@@ -104,7 +104,7 @@ def test_unsigned_frames_do_not_pass_where_signing_is_required() -> None:
 def test_closed_link_awaits_nothing(receiver: Receiver) -> None:
     receiver.take('a', FRAME[:9], 0.0)
     receiver.clear()
-    assert receiver.next_deadline() == math.inf
+    assert receiver.due == math.inf
     assert receiver.take('a', FRAME[9:], 0.1) is None
 
 

@@ -103,4 +103,4 @@ def test_the_holder_has_claimed_and_neither_released_nor_been_silent(
         assert one.holder is None or one.holder in heard
         if policy is PRIORITY and remembers:
             assert one.holder == min(heard, key=RANKS.__getitem__, default=None)
-        assert one.next_deadline() > now or math.isinf(one.next_deadline())
+        assert one.due > now or math.isinf(one.due)

@@ -54,10 +54,11 @@ class CommandBench(LevelBench):
             self._take(self.command.reported(level, self.gap or 0.0, self.now))
 
     def act(self) -> None:
-        if self.now >= self.due():
+        if self.now >= self.act_due:
             self._take(self.command.poll(self.now))
 
-    def due(self) -> float:
+    @property
+    def act_due(self) -> float:
         return math.inf if self.result else self.command.due
 
     @property

@@ -88,7 +88,8 @@ class PropertyBench(LevelBench):
     def act(self) -> None:
         self.steer(*self.property.poll(self.now))
 
-    def due(self) -> float:
+    @property
+    def act_due(self) -> float:
         return self.property.due
 
 

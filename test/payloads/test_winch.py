@@ -68,7 +68,7 @@ class Vehicle:
         while self.now < end:
             ends: tuple[Endpoint, Endpoint] = (self.devices, self.component)
             for side, other in (ends, ends[::-1]):
-                side.poll(self.now)
+                side.schedule.run(self.now)
                 while side.outgoing:
                     source, message = side.outgoing.popleft()
                     self.sent.append((source, message))

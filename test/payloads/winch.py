@@ -65,14 +65,20 @@ class Winch:
     def __init__(self, address: Address, commands: CommandSender) -> None:
         self.liveness = Liveness(timeout=3.0)
         self.was_commanded = False
+        self._schedule = commands.schedule
         self._requests = Requests(f'winch {address}')
         self._status: WinchStatus | None = None
         self._length: Property[WinchStatus] = Property(
-            Target(address, commands, 'winch', WinchStatus.id, WinchStatus.msgname), self._plan)
+            Target(address, commands, 'winch', self.poll, WinchStatus.id, WinchStatus.msgname),
+            self._plan)
 
     @property
     def lost_at(self) -> float:
         return self.liveness.lost_at
+
+    def heard(self, now: float) -> None:
+        self.liveness.hear(now)
+        self._step(now)
 
     def take_status(self, status: WinchStatus, now: float) -> None:
         gap = now - self.liveness.heard_at
@@ -104,6 +110,7 @@ class Winch:
         goal = Goal.strongest(self._requests.live(), 'length', now)
         self._length.steer(goal, now, self._status, 0.0 if self._status else None)
         self._requests.answer(now)
+        self._schedule.at(self.poll, min(self.liveness.silent_at, self._length.due))
 
     def _end(self, served: list[Served[WinchStatus]], now: float) -> None:
         for one in served:
@@ -114,9 +121,6 @@ class Winch:
         if now >= self.liveness.silent_at:
             self.liveness.lose(now)
         self._end(self._length.poll(now), now)
-
-    def next_deadline(self) -> float:
-        return min(self.liveness.silent_at, self._length.due)
 
 
 class WinchClient(Payload):
@@ -131,7 +135,7 @@ class WinchClient(Payload):
 
     def __init__(self, commands: CommandSender) -> None:
         self.events: Listeners[WinchReport] = Listeners()
-        self._discovery = Discovery[Address, Winch]()
+        self._discovery = Discovery[Address, Winch](commands.schedule)
         self.winches: Mapping[Address, Winch] = self._discovery.devices
         self._hear = partial(self._discovery.hear, make=partial(Winch, commands=commands))
 
@@ -142,13 +146,7 @@ class WinchClient(Payload):
                 self.events.emit(WinchReport(source, message.line_length))
         elif (isinstance(message, Heartbeat) and message.type == mavlink.MAV_TYPE_WINCH
                 and (winch := self._hear(source, now, proved=False))):
-            winch.liveness.hear(now)
-
-    def poll(self, now: float) -> None:
-        self._discovery.poll(now)
-
-    def next_deadline(self) -> float:
-        return self._discovery.next_deadline()
+            winch.heard(now)
 
 
 # The simulated device

@@ -13,6 +13,7 @@ from typing import Any
 
 from illuminator_ros.mavlink.command_sender import format_seconds
 from illuminator_ros.mavlink.messages import Address, Message
+from illuminator_ros.mavlink.schedule import Schedule
 from illuminator_ros.payload.messages import Attitude, GlobalPositionInt, SystemTime
 from illuminator_ros.payload.rotation import Quaternion, Vector
 from illuminator_ros.rededge.conversions import mount_angles, MountFrame, Position
@@ -46,8 +47,9 @@ class Rig:
         self.clock = EPOCH - self.now
         self.simulated = False
         self.sent: list[Message] = []
+        self.schedule = Schedule()
         self.feeder = Feeder(replace(CameraSettings(), **settings), self.sent.append,
-                             lambda: CAMERA)
+                             lambda: CAMERA, self.schedule)
 
     def stamp(self, age: float = 0.0) -> Stamp:
         return Stamp(round((self.clock + self.now - age) * 1e9), age, self.simulated)
@@ -90,10 +92,10 @@ class Rig:
 
     def run(self, seconds: float) -> list[Message]:
         """Let time pass; return the messages that the feeder sends meanwhile."""
-        end, orientation = self.now + seconds, self.feeder.orientation
-        while (due := orientation.next_deadline()) <= end:
+        end = self.now + seconds
+        while (due := self.schedule.due) <= end:
             self.now = max(self.now, due)
-            orientation.poll(self.now)
+            self.schedule.run(self.now)
         self.now = end
         return self.take()
 

@@ -249,7 +249,7 @@ def console(device: SimulatedRedEdge, line: str) -> Callable[[], None]:
 @pytest.mark.parametrize(('line', 'effect'), [
     ('capture', lambda device: device.images[-1].shot == 'survey'),
     ('capture panel', lambda device: device.images[-1].trigger == 'console'),
-    ('interval 2', lambda device: device.next_deadline() == START + 2.0),
+    ('interval 2', lambda device: device.due == START + 2.0),
     ('own-gps none', lambda device: device.own_gps is None),
     ('own-gps -1,2.5,3', lambda device: device.own_gps == GeoPoint(-1.0, 2.5, 3.0)),
 ])
@@ -284,7 +284,7 @@ def test_settings_make_a_camera() -> None:
     device = SIMULATED.make(settings, Address(255, 100))
 
     assert (device.own_gps, device.properties.validity) == (None, 30.0)
-    assert device.next_deadline() == 2.0
+    assert device.due == 2.0
     assert SIMULATED.make({}, Address(255, 100)).own_gps is not None
 
 

@@ -12,6 +12,7 @@ from typing import Any
 from builtin_interfaces.msg import Time
 from geometry_msgs.msg import Quaternion, Vector3
 from illuminator_ros.mavlink.messages import Address
+from illuminator_ros.mavlink.schedule import Schedule
 from illuminator_ros.rededge.conversions import Position
 from illuminator_ros.rededge.feeder import Feeder
 from illuminator_ros.rededge.input_states import CameraSettings, Stamp
@@ -122,7 +123,8 @@ def test_messages_tell_what_they_do_not_know() -> None:
 
 
 def test_an_input_most_of_whose_messages_are_refused_is_a_warning_with_the_reason() -> None:
-    feeder = Feeder(CameraSettings(), lambda message: None, lambda: Address(1, 100))
+    feeder = Feeder(CameraSettings(), lambda message: None, lambda: Address(1, 100),
+                    Schedule())
     here = Position(0, 47.0, 8.0, 500.0)
     for refused in range(9):
         feeder.take_fix(here, Stamp(EPOCH, 0.0), 0.0)

@@ -23,7 +23,7 @@ class Console:
             SimulatedIlluminator(IlluminatorProperties(Address(1, number), name=name))
             for number, name in ((243, 'bow'), (244, ''))), 0.0)
         self.bow, self.other = (one.device for one in self.lights.components)
-        self.lights.poll(0.0)
+        self.lights.schedule.run(0.0)
         self.lights.outgoing.clear()
 
     def enter(self, line: str, now: float = 10.0) -> str:
@@ -115,5 +115,5 @@ def test_a_restart_without_an_interval_happens_once(console: Console, line: str)
     console.enter('on')
     console.enter(line)
     assert (console.bow.enabled, console.bow.uptime_ms(10.0)) == (False, 0)
-    console.lights.poll(60.0)
+    console.lights.schedule.run(60.0)
     assert console.bow.uptime_ms(60.0) == 50_000

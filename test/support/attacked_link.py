@@ -141,12 +141,12 @@ class AttackedBridge(AttackedLink):
         """Let time pass with the genuine light and the other frames in the inbox."""
         until = self.link.now + seconds
         while self.link.now < until:
-            self._light.poll(self.link.now)
+            self._light.schedule.run(self.link.now)
             self._flush()
-            self.link.run(min(self._light.next_deadline(), until) - self.link.now + 0.001)
+            self.link.run(min(self._light.schedule.due, until) - self.link.now + 0.001)
 
     def busy(self) -> None:
-        self._light.poll(self.link.now)
+        self._light.schedule.run(self.link.now)
         self._flush()
         self.link.receive()
         light = self._random.choice(list(self.controller.lights.values()))

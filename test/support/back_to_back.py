@@ -103,13 +103,6 @@ class Pair(Line):
         super().open()
         self.turn()
 
-    def turn(self) -> None:
-        """See :class:`Line`."""
-        super().turn()
-        wakes_at = self.controller.next_deadline()
-        for light in self.controller.lights.values():
-            assert wakes_at <= light.next_deadline(), 'a link would sleep'
-
     def settle(self, seconds: float = 3.5) -> Pair:
         """Let both sides discover each other, until the line is empty."""
         self.run(seconds)

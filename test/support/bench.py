@@ -19,6 +19,7 @@ from illuminator_ros.mavlink.messages import (
     CommandLong,
     Message,
 )
+from illuminator_ros.mavlink.schedule import Schedule
 from illuminator_ros.simulation.simulated import SimulatedComponent
 
 GROUND = Address(255, 190)
@@ -26,27 +27,22 @@ B = TypeVar('B', bound='Bench')
 M = TypeVar('M')
 
 
-class Polled(Protocol):
+class Scheduled(Protocol):
     """The part of an endpoint that a :class:`Bench` drives."""
 
     outgoing: deque[tuple[Address, Message]]
-
-    def poll(self, now: float) -> None:
-        """See :class:`~illuminator_ros.mavlink.component.Endpoint`."""
-
-    def next_deadline(self) -> float:
-        """See :class:`~illuminator_ros.mavlink.component.Endpoint`."""
+    schedule: Schedule
 
 
 class Bench:
     """
-    One endpoint, polled at its deadlines only, so that a missing deadline shows.
+    One endpoint, called when it wants to be, and never else.
 
     :ivar now: s.
     :ivar sent: each message that it has sent, with its time.
     """
 
-    def __init__(self, endpoint: Polled, now: float) -> None:
+    def __init__(self, endpoint: Scheduled, now: float) -> None:
         self.endpoint = endpoint
         self.now = now
         self.sent: list[tuple[float, Any]] = []
@@ -67,20 +63,20 @@ class Bench:
             self.sent.append((self.now, message))
             self.answer(source, message)
 
-    def next_deadline(self) -> float:
-        """Return when the endpoint is to be polled."""
-        return self.endpoint.next_deadline()
+    @property
+    def due(self) -> float:
+        """Return when :meth:`poll` is due."""
+        return self.endpoint.schedule.due
 
     def poll(self) -> None:
-        """Poll the endpoint if that is due."""
-        if self.now >= self.next_deadline():
-            self.endpoint.poll(self.now)
+        """Do what is due."""
+        self.endpoint.schedule.run(self.now)
         self.flush()
 
     def step(self, until: float = math.inf) -> bool:
         """Advance to the next event up to then; return whether there is one."""
         self.flush()
-        due = min(self.next_deadline(), self._later[0][0] if self._later else math.inf)
+        due = min(self.due, self._later[0][0] if self._later else math.inf)
         if due > until or due == math.inf:
             return False
         self.now = max(self.now, due)

@@ -11,8 +11,9 @@ from typing import Any
 
 from illuminator_ros.illuminator.messages import IlluminatorStatus, STATUS_ID
 from illuminator_ros.mavlink import messages as mav
-from illuminator_ros.mavlink.component import Endpoint, HeartbeatTimer
+from illuminator_ros.mavlink.component import Endpoint
 from illuminator_ros.mavlink.dialect import mavlink
+from illuminator_ros.mavlink.schedule import Schedule
 from illuminator_ros.payload.identity import Identity
 
 LIGHT = mav.Address(1, 243)
@@ -38,6 +39,7 @@ class FakeLight(Endpoint):
     :ivar brightness_is_switch: whether it is on where the brightness is above 0 (ArduSub).
     :ivar apply_after: s from the acknowledgement to the change.
     :ivar stream: s between statuses, 0 for none.
+    :ivar silent: whether it sends nothing.
     :ivar answers: the message ids that it sends on request.
     :ivar pushes: whether a change is followed by a status.
     :ivar targeted: whether acknowledgements carry their target.
@@ -55,33 +57,57 @@ class FakeLight(Endpoint):
     ) -> None:
         super().__init__()
         self.source = source
-        self.heartbeat = HeartbeatTimer(source, heartbeat_type or 0, self.outgoing)
+        self.heartbeat = mav.heartbeat(heartbeat_type or 0)
         self.beats = heartbeat_type is not None
         self.results: dict[int, Any] = dict(results or {})
         self.applies = True
         self.brightness_is_switch = False
         self.apply_after = 0.0
-        self.stream = stream
+        self._stream, self._silent = stream, False
         self.answers = {STATUS_ID, mav.INFORMATION_ID}
         self.pushes = False
         self.targeted = True
         self.boot: float | None = 0.0
         self.identity = Identity('maker', 'torch', '1.2', '3', 'T-1')
         self.fields = {**DEFAULT_STATUS, **fields}
-        self.silent = False
         self.shone: list[float] = []
-        self._status_due = 0.0
+        self._status_due, self._beat_due = 0.0, math.inf
         self._to_apply: list[tuple[float, Any]] = []
 
+    def use(self, schedule: Schedule) -> None:
+        """Use the schedule of the endpoint that this light is a part of."""
+        self.schedule = schedule
+        schedule.by(self.poll, 0.0)
+
+    @property
+    def silent(self) -> bool:
+        return self._silent
+
+    @silent.setter
+    def silent(self, value: bool) -> None:
+        self._silent = value
+        self.schedule.by(self.poll, -math.inf)
+
+    @property
+    def stream(self) -> float:
+        return self._stream
+
+    @stream.setter
+    def stream(self, value: float) -> None:
+        self._stream = value
+        self.schedule.by(self.poll, -math.inf)
+
     def link_opened(self, now: float) -> None:
-        self.heartbeat.due = now
+        self._beat_due = now
+        self.schedule.by(self.poll, now)
 
     def restart(self, now: float, **fields: Any) -> None:
         """Restart with the default settings, or others."""
         self.boot = now if self.boot is not None else None
         self.fields = {**DEFAULT_STATUS, **fields}
         self._to_apply.clear()
-        self._status_due = self.heartbeat.due = now
+        self._status_due = self._beat_due = now
+        self.schedule.by(self.poll, now)
 
     def delay_status(self, seconds: float) -> None:
         """Delay the statuses of the stream."""
@@ -112,8 +138,10 @@ class FakeLight(Endpoint):
         elif message.command == mavlink.MAV_CMD_SET_MESSAGE_INTERVAL:
             self.stream = message.param2 / 1e6
             self._status_due = now + self.stream
+            self._set_due()
         elif self.applies and self.apply_after:
             self._to_apply.append((now + self.apply_after, message))
+            self._set_due()
         elif self.applies:
             self._apply(message, now)
 
@@ -157,17 +185,16 @@ class FakeLight(Endpoint):
             if now >= due:
                 self._to_apply.remove((due, message))
                 self._apply(message, now)
-        if self.silent:
-            return
-        if self.beats:
-            self.heartbeat.poll(now)
-        if self.stream and now >= self._status_due:
+        if self.beats and not self.silent and now >= self._beat_due:
+            self._beat_due = now + 1.0
+            self.send(self.heartbeat)
+        if self.stream and not self.silent and now >= self._status_due:
             self._status_due = now + self.stream
             self.send(self.status(now))
+        self._set_due()
 
-    def next_deadline(self) -> float:
-        waiting = min((due for due, _ in self._to_apply), default=math.inf)
-        if self.silent:
-            return waiting
-        return min(waiting, self.heartbeat.due if self.beats else math.inf,
-                   self._status_due if self.stream else math.inf)
+    def _set_due(self) -> None:
+        due = [at for at, _ in self._to_apply]
+        if not self.silent:
+            due += [self._beat_due] * self.beats + [self._status_due] * bool(self.stream)
+        self.schedule.at(self.poll, min(due, default=math.inf))

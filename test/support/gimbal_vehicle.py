@@ -31,28 +31,24 @@ class Autopilot(Endpoint):
 
     def __init__(self) -> None:
         super().__init__()
-        self._heartbeat = HeartbeatTimer(AUTOPILOT, mavlink.MAV_TYPE_QUADROTOR, self.outgoing)
-        self._due = 0.0
+        self._heartbeat = HeartbeatTimer(AUTOPILOT, mavlink.MAV_TYPE_QUADROTOR, self.outgoing,
+                                         self.schedule)
 
     def link_opened(self, now: float) -> None:
-        self._heartbeat.due = now
+        self._heartbeat.send(now)
+        self.schedule.at(self._report, now)
 
     def receive(self, source: Address, message: Message, now: float) -> None:
         return
 
-    def poll(self, now: float) -> None:
-        self._heartbeat.poll(now)
-        if now >= self._due:
-            self._due = now + 0.1
-            latitude, longitude, altitude = HERE
-            for message in (
-                    Attitude(0, 0.0, 0.0, math.pi / 2, 0.0, 0.0, 0.0),
-                    GlobalPositionInt(0, round(latitude * 1e7), round(longitude * 1e7),
-                                      round(altitude * 1e3), round(altitude * 1e3), 0, 0, 0, 0)):
-                self.outgoing.append((AUTOPILOT, message))
-
-    def next_deadline(self) -> float:
-        return min(self._due, self._heartbeat.due)
+    def _report(self, now: float) -> None:
+        self.schedule.at(self._report, now + 0.1)
+        latitude, longitude, altitude = HERE
+        for message in (
+                Attitude(0, 0.0, 0.0, math.pi / 2, 0.0, 0.0, 0.0),
+                GlobalPositionInt(0, round(latitude * 1e7), round(longitude * 1e7),
+                                  round(altitude * 1e3), round(altitude * 1e3), 0, 0, 0, 0)):
+            self.outgoing.append((AUTOPILOT, message))
 
 
 class Vehicle(Endpoint):
@@ -82,11 +78,8 @@ class Vehicle(Endpoint):
 
     def poll(self, now: float) -> None:
         for one in self.endpoints:
-            one.poll(now)
+            one.schedule.run(now)
         self._route(now)
-
-    def next_deadline(self) -> float:
-        return min(one.next_deadline() for one in self.endpoints)
 
     def _route(self, now: float) -> None:
         while any(one.outgoing for one in self.endpoints):
@@ -99,6 +92,7 @@ class Vehicle(Endpoint):
                     for one in self.endpoints:
                         if one is not sender and type(message) in one.messages:
                             one.receive(source, message, now)
+        self.schedule.at(self.poll, min(one.schedule.due for one in self.endpoints))
 
 
 def managed_vehicle(

@@ -242,23 +242,20 @@ class GimbalEndpoint(Endpoint):
     def __init__(self, managers: Sequence[FakeManager]) -> None:
         super().__init__()
         self.managers = managers
-        self._tenth, self._due = 0, 0.0
+        self._tenth = 0
 
     def link_opened(self, now: float) -> None:
-        self._due = now
+        self.schedule.at(self._report, now)
 
     def receive(self, source: mav.Address, message: mav.Message, now: float) -> None:
         for manager in self.managers:
             self.outgoing += manager.take(source, message)
 
-    def poll(self, now: float) -> None:
-        if now >= self._due:
-            for manager in self.managers:
-                self.outgoing += manager.sent_each(self._tenth)
-            self._tenth, self._due = self._tenth + 1, now + 0.1
-
-    def next_deadline(self) -> float:
-        return self._due
+    def _report(self, now: float) -> None:
+        for manager in self.managers:
+            self.outgoing += manager.sent_each(self._tenth)
+        self._tenth += 1
+        self.schedule.at(self._report, now + 0.1)
 
 
 def served_gimbals(

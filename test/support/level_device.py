@@ -61,7 +61,7 @@ class LevelBench(Bench, ABC):
 
     def target(self, **options: Any) -> Target:
         """Return the device as the target of commands."""
-        return Target(DEVICE, self.commands, 'device', **{
+        return Target(DEVICE, self.commands, 'device', lambda now: self.act(), **{
             'status_id': STATUS_ID, 'status_name': 'STATUS', **options})
 
     # The sending side
@@ -74,17 +74,19 @@ class LevelBench(Bench, ABC):
     def act(self) -> None:
         """Do what is due."""
 
+    @property
     @abstractmethod
-    def due(self) -> float:
+    def act_due(self) -> float:
         """Return when :meth:`act` has something to do."""
 
-    def next_deadline(self) -> float:
+    @property
+    def due(self) -> float:
         """See :class:`Bench`."""
-        return min(self.commands.next_deadline(), self.due())
+        return min(super().due, self.act_due)
 
     def poll(self) -> None:
         """See :class:`Bench`."""
-        self.commands.poll(self.now)
+        self.commands.schedule.run(self.now)
         self.act()
         self.flush()
 

@@ -20,6 +20,7 @@ from illuminator_ros.mavlink.component import Endpoint, HeartbeatTimer
 from illuminator_ros.mavlink.link import Link
 from illuminator_ros.mavlink.link_state import LinkEvent, LinkSnapshot
 from illuminator_ros.mavlink.messages import Address, Message
+from illuminator_ros.mavlink.schedule import Schedule
 from illuminator_ros.mavlink.url import parse_url, Url
 from illuminator_ros.payload.device_events import DeviceConnected, DeviceDisconnected
 from illuminator_ros.payload.requests import Result
@@ -35,23 +36,44 @@ L = TypeVar('L', bound='EndpointLink[Any]')
 T = TypeVar('T')
 
 
+class _Turns(Schedule):
+    """A schedule that counts how often the link asks it."""
+
+    count = 0
+
+    @property
+    def due(self) -> float:
+        self.count += 1
+        return super().due
+
+
+class _Beats(HeartbeatTimer):
+    """Heartbeats that are counted."""
+
+    count = 0
+
+    def send(self, now: float) -> None:
+        self.count += 1
+        super().send(now)
+
+
 class Talker(Endpoint):
     """
     A peer that sends heartbeats and keeps received messages.
 
     :ivar heard: source and message, in order.
     :ivar announcements: when the link was opened or a new peer was heard, s.
-    :ivar turns: the number of waits of the link's thread.
+    :ivar turns: counts the waits of the link's thread, each twice.
     """
 
     messages = tuple(HANDLED.values())
 
     def __init__(self) -> None:
         super().__init__()
-        self.heartbeat = HeartbeatTimer(BRIDGE, 18, self.outgoing)
+        self.schedule = self.turns = _Turns()
+        self.heartbeat = _Beats(BRIDGE, 18, self.outgoing, self.schedule)
         self.heard: Log[tuple[Address, Any]] = Log()
         self.announcements: Log[float] = Log()
-        self.turns = 0
 
     def link_opened(self, now: float) -> None:
         self.heartbeat.send(now)
@@ -62,13 +84,6 @@ class Talker(Endpoint):
 
     def receive(self, source: Address, message: Message, now: float) -> None:
         self.heard.append((source, message))
-
-    def poll(self, now: float) -> None:
-        self.heartbeat.poll(now)
-
-    def next_deadline(self) -> float:
-        self.turns += 1
-        return self.heartbeat.due
 
     def wait_heard(self, count: int = 1) -> Address:
         """Wait for the count-th message, and return its source."""

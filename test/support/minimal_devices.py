@@ -74,6 +74,7 @@ class MinimalDevice(Endpoint):
     def after(self, seconds: float, action: Callable[[], object]) -> None:
         """Call a function after some time."""
         self._due.append((self.now + seconds, action))
+        self._set_due()
 
     def _repeat(self, interval: float, make: Callable[[], mav.Message]) -> None:
         self.send(make())
@@ -89,9 +90,10 @@ class MinimalDevice(Endpoint):
                           [one for one in self._due if one[0] > now])
         for _, action in due:
             action()
+        self._set_due()
 
-    def next_deadline(self) -> float:
-        return min((at for at, _ in self._due), default=math.inf)
+    def _set_due(self) -> None:
+        self.schedule.at(self.poll, min((at for at, _ in self._due), default=math.inf))
 
     def receive(self, source: Address, message: Any, now: float) -> None:
         self.now = now

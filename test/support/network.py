@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections import deque
 from collections.abc import Callable, Iterator, Sequence
+import math
 import selectors
 from typing import Any
 
@@ -121,6 +122,7 @@ class Router:
     ) -> None:
         self.endpoint = Listener(address)
         self.ports = ports
+        self._network = network
         faults = FaultLog(lambda: network.now)
         faults.log = network.fail  # type: ignore[method-assign]
         self.lines = Lines(
@@ -130,7 +132,7 @@ class Router:
             signing=signing or Signing(), mavlink_version=version, clock=lambda: network.now,
             wall_clock=lambda: 1.7e9)
         for line, port in zip(self.lines, ports, strict=True):
-            line._connect_at = float('inf')
+            self.endpoint.schedule.at(line._connect, math.inf)
             line.opened(port, network.now)
 
     def line(self, index: int) -> Line:
@@ -140,7 +142,7 @@ class Router:
     def send(self, *messages: Message) -> None:
         """Send messages of the router's own component."""
         self.endpoint.outgoing.extend((self.endpoint.address, one) for one in messages)
-        self.lines.flush()
+        self.lines.flush(self._network.now)
 
 
 class Leaf:

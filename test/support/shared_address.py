@@ -26,9 +26,11 @@ class SharedAddress(Endpoint):
         super().__init__()
         # The first light sends the heartbeats.
         self.outgoing = lights[0].outgoing
+        self.schedule = lights[0].schedule
         self.lights = lights
         for number, light in enumerate(lights):
             light.outgoing = self.outgoing
+            light.use(self.schedule)
             light.beats = light.beats and not number
             light.delay_status(number * offset)
 
@@ -43,10 +45,3 @@ class SharedAddress(Endpoint):
             sent = [self.outgoing.pop() for _ in range(len(self.outgoing) - before)]
             self.outgoing += [one for one in reversed(sent)
                               if not (number and isinstance(one[1], CommandAck))]
-
-    def poll(self, now: float) -> None:
-        for light in self.lights:
-            light.poll(now)
-
-    def next_deadline(self) -> float:
-        return min(light.next_deadline() for light in self.lights)

@@ -92,7 +92,7 @@ class SimulatedLink(Link):
                          wall_clock=lambda: 1.7e9 + self.now, signing=signing,
                          mavlink_version=mavlink_version, selector=_Selector(self))
         line = next(iter(self.lines))
-        line._connect_at = math.inf
+        endpoint.schedule.at(line._connect, math.inf)
         self.lines._sender._writer.sequences = _FromZero()
         self._faults.log = self.log_fault  # type: ignore[method-assign]
         self.socket = _Socket(take)

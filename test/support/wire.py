@@ -168,14 +168,15 @@ class Line:
 
     # Time
 
-    def next_deadline(self) -> float:
+    @property
+    def due(self) -> float:
         """Return when something happens next."""
-        return min(self.near.endpoint.next_deadline(), self.far.endpoint.next_deadline(),
+        return min(self.near.endpoint.schedule.due, self.far.endpoint.schedule.due,
                    self.near.wire.next_arrival(), self.far.wire.next_arrival())
 
     def step(self, until: float = math.inf) -> bool:
         """Advance to the next event, but to ``until`` at most; return whether there was one."""
-        due = self.next_deadline()
+        due = self.due
         if due > until:
             self.now = max(self.now, until)
             return False
@@ -189,8 +190,7 @@ class Line:
         """Do what a link's thread does in one turn, at both ends."""
         self._deliver()
         for end in (self.far, self.near):
-            if self.now >= end.endpoint.next_deadline():
-                end.endpoint.poll(self.now)
+            end.endpoint.schedule.run(self.now)
             end.flush(self.now)
         self._deliver()
 

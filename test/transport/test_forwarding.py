@@ -364,13 +364,13 @@ def test_a_silent_line_beside_a_live_one_gets_our_last_heartbeat_again() -> None
     pair = Pair()
     pair.router.send(ALIVE)
     pair.meet()
-    line = pair.router.line(1)
+    pair.router.line(1)
     pair.network.now += SILENCE
     pair.light.send(ALIVE)
     pair.ground.received.clear()
     for after, count in ((0.0, 1), (ANNOUNCE_INTERVAL - 0.01, 1), (0.01, 2)):
         pair.network.now += after
-        line.poll(pair.network.now)
+        pair.router.endpoint.schedule.run(pair.network.now)
         pair.network.settle()
         assert [frame_source(frame) for frame in pair.ground.received] == [OWN] * count
     assert pair.light.received == []
@@ -380,11 +380,13 @@ def test_silent_lines_together_announce_us_as_often_as_one() -> None:
     pair = Pair()
     announced: list[float] = []
     pair.router.endpoint.link_opened = announced.append  # type: ignore[assignment, method-assign]
-    for _ in range(100):
+    pair.network.now += ANNOUNCE_INTERVAL / 3
+    # From now on both lines are silent, at other times.
+    pair.light.send(ALIVE)
+    announced.clear()
+    for _ in range(200):
         pair.network.now += ANNOUNCE_INTERVAL / 10
-        for line in pair.router.lines:
-            line.poll(pair.network.now)
-            pair.network.now += ANNOUNCE_INTERVAL / 10
+        pair.router.endpoint.schedule.run(pair.network.now)
     assert len(announced) > 10
     assert min(after - before for before, after in itertools.pairwise(announced)) >= (
         ANNOUNCE_INTERVAL)

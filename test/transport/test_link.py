@@ -91,15 +91,13 @@ class Faulty(Talker):
     """
     Fails in the method of this name, a number of times.
 
-    :param deadline: of every poll, s; None for the heartbeat's.
     :ivar failures: the calls that failed.
     """
 
-    def __init__(self, method: str, times: float = 1, deadline: float | None = None) -> None:
+    def __init__(self, method: str, times: float = 1) -> None:
         super().__init__()
         self.failures: Log[str] = Log()
-        if deadline is not None:
-            self.next_deadline = lambda: deadline  # type: ignore[method-assign]
+        self.schedule.at(lambda now: self.poll(now), 0.0)
         genuine = getattr(self, method)
 
         def fail(*arguments: Any) -> Any:
@@ -109,6 +107,9 @@ class Faulty(Talker):
             return genuine(*arguments)
 
         setattr(self, method, fail)
+
+    def poll(self, now: float) -> None:
+        """Do what is due: nothing."""
 
 
 @pytest.fixture
@@ -124,7 +125,7 @@ def faults(monkeypatch: pytest.MonkeyPatch,
     return logged
 
 
-@pytest.mark.parametrize('method', ['link_opened', 'receive', 'poll', 'next_deadline'])
+@pytest.mark.parametrize('method', ['link_opened', 'receive', 'poll'])
 def test_fault_of_the_endpoint_is_logged_and_costs_no_other_frame(
         run: Run, other: OpenChannel, faults: Callable[[], list[str]], method: str) -> None:
     endpoint = Faulty(method)
@@ -170,11 +171,9 @@ def test_fault_at_a_loss_or_in_a_listener_does_not_keep_a_link_lost(
     assert set(faults()) == {failing}
 
 
-@pytest.mark.parametrize('method', ['poll', 'next_deadline'])
 def test_lasting_fault_pauses_the_thread_and_does_not_fill_the_log(
-        run: Run, caplog: pytest.LogCaptureFixture, monkeypatch: pytest.MonkeyPatch,
-        method: str) -> None:
-    endpoint = Faulty(method, math.inf, -math.inf)
+        run: Run, caplog: pytest.LogCaptureFixture, monkeypatch: pytest.MonkeyPatch) -> None:
+    endpoint = Faulty('poll', math.inf)
     monkeypatch.setattr(link_thread, 'FAULT_PAUSE', 0.001)
     monkeypatch.setattr(link_thread, 'FAULT_LOG_INTERVAL', 60.0)
     run(LiveLink(URL, endpoint))

@@ -42,6 +42,7 @@ class Busy(Talker):
         self.due = self.latest = 0.0
         self.done: list[int] = []
         self.link = SimulatedLink(self, lambda data, peer: None, now=0.0)
+        self.schedule.at(self.poll, self.due)
 
     def act(self, number: int) -> None:
         """Handle a message or a call."""
@@ -59,9 +60,7 @@ class Busy(Talker):
     def poll(self, now: float) -> None:
         self.latest = max(self.latest, now - self.due)
         self.due = now + PERIOD
-
-    def next_deadline(self) -> float:
-        return self.due
+        self.schedule.at(self.poll, self.due)
 
     def run(self) -> None:
         """Run turns until nothing waits."""

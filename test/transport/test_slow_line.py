@@ -74,7 +74,7 @@ class SlowLine:
         end, found = self.now + seconds, []
         while True:
             found += [(self.now, frame) for frame in self.read()]
-            due = self.channel.next_deadline()
+            due = self.channel.forward_due
             if due > end:
                 self.now = end
                 return found
@@ -157,7 +157,7 @@ def test_a_blocked_line_holds_a_bounded_number_of_bytes_and_sends_nothing_old_la
             line.now += 0.001
             line.forward(only(frame_of(COMMAND, number & 0xFF, Address(1 + number % 250, 1))))
         assert line.channel.is_waiting
-        assert line.channel.next_deadline() == float('inf')
+        assert line.channel.forward_due == float('inf')
         assert line.channel._forwarded.size <= MAX_QUEUED
         assert line.channel.dropped == 0
         waiting, held = len(line.channel._queue.unwritten()), line.channel._forwarded.size

@@ -153,7 +153,8 @@ class Channel(ABC):
         :raises ChannelLost: if the channel is closed.
         """
 
-    def next_deadline(self) -> float:
+    @property
+    def forward_due(self) -> float:
         """Return when :meth:`forward_more` is due, infinity if never."""
         return math.inf
 
@@ -291,7 +292,7 @@ class StreamChannel(Channel):
 
     def forward_more(self, now: float) -> None:
         """See :meth:`Channel.forward_more`."""
-        while not self._queue and self.next_deadline() <= now:
+        while not self._queue and self.forward_due <= now:
             frames: list[bytes] = []
             size = 0
             while (size < FORWARD_SIZE and self.free_at <= now + FORWARD_AHEAD
@@ -301,8 +302,9 @@ class StreamChannel(Channel):
                 self.free_at = max(now, self.free_at) + len(frame) / (FORWARD_SHARE * self.rate)
             self.send(frames, ())
 
-    def next_deadline(self) -> float:
-        """See :meth:`Channel.next_deadline`."""
+    @property
+    def forward_due(self) -> float:
+        """See :attr:`Channel.forward_due`."""
         return self.free_at - FORWARD_AHEAD if self._forwarded and not self._queue else math.inf
 
 

@@ -191,9 +191,10 @@ class TcpServer(Channel):
         """See :meth:`Channel.forward_more`."""
         self._each(tuple(self._clients), lambda client: client.forward_more(now))
 
-    def next_deadline(self) -> float:
-        """See :meth:`Channel.next_deadline`."""
-        return min((client.next_deadline() for client in self._clients.values()), default=math.inf)
+    @property
+    def forward_due(self) -> float:
+        """See :attr:`Channel.forward_due`."""
+        return min((client.forward_due for client in self._clients.values()), default=math.inf)
 
     def _each(self, peers: Sequence[Peer], call: Callable[[_Connection], None]) -> None:
         for peer in peers:
