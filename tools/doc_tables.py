@@ -14,26 +14,15 @@ import math
 from pathlib import Path
 import re
 import sys
-from typing import Any, TYPE_CHECKING
+from typing import TYPE_CHECKING
 import xml.etree.ElementTree as ET
 
-from illuminator_ros.checks.requirement import Requirement
 from illuminator_ros.cli.payloads import PAYLOADS
-from illuminator_ros.cli.simulator.console import COMMANDS as CONSOLE_COMMANDS
-from illuminator_ros.cli.simulator.console import OTHERS
-from illuminator_ros.gimbal import simulated_device, simulated_manager
-from illuminator_ros.gimbal.checks import device, manager
-from illuminator_ros.illuminator.checks.requirements import REQUIREMENTS
-from illuminator_ros.illuminator.simulated import COMMANDS as LIGHT_COMMANDS
-from illuminator_ros.illuminator.simulated import SIMULATED
-from illuminator_ros.illuminator.simulated_properties import FAULTS, PROFILES
+from illuminator_ros.gimbal import simulated_manager
+from illuminator_ros.illuminator.simulated_properties import PROFILES
 from illuminator_ros.mavlink.retries import POLICIES
-from illuminator_ros.rededge.checks import REQUIREMENTS as CAMERA_REQUIREMENTS
 from illuminator_ros.rededge.conversions import FIELDS
 from illuminator_ros.rededge.simulated import COLUMNS
-from illuminator_ros.rededge.simulated import SIMULATED as CAMERA
-from illuminator_ros.simulation.faults import FaultTable
-from illuminator_ros.simulation.simulated import SimulatedType
 
 if TYPE_CHECKING:
     from illuminator_ros.ros.node import Interface
@@ -44,30 +33,6 @@ DOC = ROOT / 'doc'
 Rows = Iterable[Sequence[str]]
 # The rows of each table, by page and heading.
 Tables = dict[tuple[str, str], Rows]
-
-
-def requirements(of: Sequence[Requirement[Any]], consent: str) -> Rows:
-    """Return the rows of requirements, with what they do to a device."""
-    notes = {(False, False): '', (True, False): 'changes', (True, True): consent}
-    return [[f'`{one.name}`', one.title, f'[{one.specification.title}], {one.section}',
-             notes[one.changes, one.needs_consent]] for one in of]
-
-
-def faults(of: FaultTable) -> list[list[str]]:
-    """Return the rows of faults, with what they do without a value."""
-    return [[f'`{fault.usage}`', fault.description, fault.default_text] for fault in of.values()]
-
-
-def settings(of: SimulatedType[Any]) -> list[list[str]]:
-    """Return the rows of the settings of a simulated device."""
-    return [[f'`{name}`', setting.metavar, setting.help]
-            for name, setting in of.all_settings.items()]
-
-
-def of_both(device: list[list[str]], manager: list[list[str]]) -> Rows:
-    """Return the rows of devices and managers; a row of only one of them ends with its name."""
-    return [*([*row, '' if row in manager else 'device'] for row in device),
-            *([*row, 'manager'] for row in manager if row not in device)]
 
 
 def launch_arguments(file: str) -> Rows:
@@ -83,11 +48,6 @@ def launch_arguments(file: str) -> Rows:
 def tool_tables() -> Tables:
     """Return the tables of the tools that need no ROS."""
     return {
-        ('conformance', 'requirement'): requirements(REQUIREMENTS, 'dazzles'),
-        ('conformance', 'requirement on a gimbal'): requirements(device.REQUIREMENTS, 'moves'),
-        ('conformance', 'requirement on a gimbal manager'): requirements(
-            manager.REQUIREMENTS, 'moves'),
-        ('conformance', 'requirement on a camera'): requirements(CAMERA_REQUIREMENTS, 'images'),
         ('rededge', 'message'): [
             [cls.msgname, f'`{name}`', field.source, field.unit,
              '' if field.scale is None else f'{field.scale:g}',
@@ -99,28 +59,11 @@ def tool_tables() -> Tables:
              '' if one.tries == math.inf else f'{one.tries:g}']
             for one in POLICIES],
         ('ros', 'argument of `bridge.launch.xml`'): launch_arguments('bridge.launch.xml'),
-        ('simulator', 'command'): [
-            *([f'`{one.usage}`', one.help] for one in LIGHT_COMMANDS),
-            *([f'`{one.usage}`', one.help] for one in CONSOLE_COMMANDS),
-            *([f'`{name}`', text] for name, text in OTHERS)],
-        ('simulator', 'setting'): settings(SIMULATED),
         ('simulator', 'profile'): [
             [f'`{name}`', profile.description] for name, profile in PROFILES.items()],
-        ('simulator', 'fault'): faults(FAULTS),
         ('simulator', 'profile of a manager'): [
             [f'`{name}`', profile.description]
             for name, profile in simulated_manager.PROFILES.items()],
-        ('simulator', 'command of a gimbal'): [
-            [f'`{one.usage}`', one.help] for one in simulated_device.COMMANDS],
-        ('simulator', 'setting of a gimbal'): of_both(*(
-            [row for row in settings(one) if row[0] != '`fault`']
-            for one in (simulated_device.SIMULATED, simulated_manager.SIMULATED))),
-        ('simulator', 'fault of a gimbal'): of_both(
-            faults(simulated_device.FAULTS), faults(simulated_manager.FAULTS)),
-        ('simulator', 'command of a camera'): [
-            [f'`{one.usage}`', one.help] for one in CAMERA.device.commands],
-        ('simulator', 'setting of a camera'): settings(CAMERA),
-        ('simulator', 'fault of a camera'): faults(CAMERA.device.faults),
         ('simulator', 'column'): [[f'`{name}`', text] for name, text in COLUMNS.items()],
     }
 

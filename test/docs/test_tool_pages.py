@@ -3,7 +3,6 @@
 
 """The pages of simulator, conformance and discover, compared with these programs; needs no ROS."""
 
-from collections.abc import Sequence
 import json
 from pathlib import Path
 import re
@@ -23,7 +22,6 @@ from illuminator_ros.illuminator.checks.requirements import REQUIREMENTS
 from illuminator_ros.illuminator.simulated import SIMULATED
 from illuminator_ros.mavlink.listener import Listener
 from illuminator_ros.mavlink.url import parse_url
-from illuminator_ros.rededge.checks import REQUIREMENTS as CAMERA_REQUIREMENTS
 from payloads.winch import WINCH
 import pytest
 from support.tables import table
@@ -31,16 +29,6 @@ from support.tables import table
 DOC = Path(__file__).parents[2] / 'doc'
 CONFORMANCE = (DOC / 'conformance.md').read_text()
 SIMULATOR = (DOC / 'simulator.md').read_text()
-
-
-@pytest.mark.parametrize('requirements', [
-    REQUIREMENTS, device.REQUIREMENTS, manager.REQUIREMENTS, CAMERA_REQUIREMENTS],
-    ids=['light', 'gimbal', 'manager', 'camera'])
-def test_the_specifications_of_the_requirements_have_links(
-    requirements: Sequence[Requirement[Any]],
-) -> None:
-    for specification in {one.specification for one in requirements}:
-        assert f'\n[{specification.title}]: {specification.url}\n' in CONFORMANCE
 
 
 def test_the_keys_of_a_json_report_are_listed_in_order_for_each_kind_of_device() -> None:

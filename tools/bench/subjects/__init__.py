@@ -10,5 +10,4 @@ SUBJECTS = {
     'noise': 'receiving', 'memory': 'process', 'startup': 'services', 'overhead': 'link',
     'forward': 'forwarding',
     'lights': 'link', 'nodes': 'process', 'reconnection': 'link', 'loss': 'link',
-    'floods': 'floods', 'rededge': 'rededge', 'limits': 'services',
-    'browsers': 'browsers'}
+    'floods': 'floods', 'rededge': 'rededge', 'limits': 'services'}

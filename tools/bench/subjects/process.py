@@ -16,10 +16,8 @@ from support.ports import free_port
 from ..rig import Bench, bridge, Client, cpu_share, peer, resident, simulator, udp, wait_until
 from ..rows import at_most, Figures, quantiles, Row, times
 
-# s for which a light sends statuses before the memory is measured, and the soak.
-SERVED, SOAK = 3.0, 15.0
-# MB; the second is the growth that the allocator causes.
-LIMIT, GROWTH = 20.0, 1.0
+# s for which a light sends statuses before the memory is measured; MB.
+SERVED, LIMIT = 3.0, 20.0
 
 
 def memory(bench: Bench) -> Iterator[Row]:
@@ -41,23 +39,6 @@ def memory(bench: Bench) -> Iterator[Row]:
     ours, theirs = (statistics.median(values) for values in zip(*took, strict=True))
     yield Row('resident memory', 'MB', {'': ours}, {'node with one SetBool service': {'': theirs}},
               [at_most(ours - theirs, LIMIT, 'MB above the peer')])
-    yield growth(bench)
-
-
-def growth(bench: Bench) -> Row:
-    """Call ``~/enable`` of a light at 10 Hz for some time; the first quarter is the warm-up."""
-    seconds, port = bench.amount(SOAK, 0.4), free_port()
-    with (simulator(port, '--status-interval', '0.1'), bridge(udp(port)) as program,
-          Client(bench) as client):
-        client.meet('/illuminator/enable')
-        used = []
-        for _ in range(40):
-            client.call('/illuminator/enable')
-            used.append(resident(program.pid))
-            time.sleep(seconds / 40)
-    grown = used[-1] - used[10]
-    return Row(f'memory gained in {seconds:g} s at 10 Hz, after the first quarter', 'MB',
-               {'': grown}, targets=[at_most(grown, GROWTH, 'MB')])
 
 
 # Participants that discover the nodes, one after the other. Half of them miss the first
