@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
+from illuminator_ros.mavlink.device_kind import DeviceKind
 from illuminator_ros.mavlink.url import (
     AutoUrl,
     Broadcast,
@@ -157,6 +158,16 @@ def test_error_quotes_the_url_and_its_wrong_part(text: str, part: str, reason: s
     assert len(said) < len(str(caught.value))
     assert part in said
     assert reason in said
+
+
+def test_a_search_takes_the_kinds_of_the_payloads_that_the_program_knows() -> None:
+    known = DeviceKind('deck winch', 42), DeviceKind('MicaSense camera', 0, option='camera')
+
+    for option, kind in (('deck_winch', 'deck winch'), ('camera', 'MicaSense camera')):
+        url = parse_url(f'serial://auto?kind={option}', known=known)
+        assert url == AutoUrl(devices=(frozenset({kind}),), known=known)
+    with pytest.raises(UrlError, match='is not one of deck_winch, camera, autopilot'):
+        parse_url('serial://auto?kind=light', known=known)
 
 
 def test_examples_of_the_error_message_are_right_and_addresses_read_as_they_are_written() -> None:

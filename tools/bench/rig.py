@@ -22,14 +22,13 @@ from rclpy.qos import DurabilityPolicy, QoSProfile
 from std_srvs.srv import SetBool
 from support.processes import ended, Program, start_interpreter
 from support.spun import SpunNode
+from support.waiting import eventually, PATIENCE
 
 from .rows import Figures, quantiles
 
 Amount = TypeVar('Amount')
 
 PEERS = Path(__file__).with_name('peers')
-# s; the longest wait for an event.
-PATIENCE = 60.0
 # The QoS of the state topics.
 STATE = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 # Each client of a service receives the answers to all clients, and rclpy's queue of 10 loses some.
@@ -86,19 +85,6 @@ def ready(program: Program, text: str) -> Iterator[Program]:
     with ended(program):
         program.wait_for(text, PATIENCE)
         yield program
-
-
-def wait_until(condition: Callable[[], Any], what: str, patience: float = PATIENCE) -> None:
-    """
-    Wait for a condition.
-
-    :raises RuntimeError: if it does not hold in time.
-    """
-    until = time.monotonic() + patience
-    while not condition():
-        if time.monotonic() > until:
-            raise RuntimeError(f'not in time: {what}')
-        time.sleep(0.002)
 
 
 def alternate(
@@ -178,7 +164,7 @@ class Client(SpunNode):
             _, answer = self.call(service, patience=0.5)
             return answer is not None and (answer.success or not success)
 
-        wait_until(answers, f'{service} answers')
+        eventually(answers, f'{service} answers')
 
     def subscribe(
         self, type_: type[Any], topic: str, take: Callable[[Any], None], qos: QoSProfile = STATE,
@@ -202,7 +188,7 @@ def cpu_share(pid: int, seconds: float) -> float:
 
 def settle(pid: int) -> None:
     """Wait until a process is idle."""
-    wait_until(lambda: cpu_share(pid, 0.03) < 3, 'a program is idle')
+    eventually(lambda: cpu_share(pid, 0.03) < 3, 'a program is idle')
 
 
 def resident(pid: int) -> float:

@@ -14,8 +14,9 @@ import time
 from std_srvs.srv import SetBool
 from support.ports import free_port
 from support.processes import Program, start_interpreter
+from support.waiting import eventually, PATIENCE
 
-from ..rig import Bench, Client, PATIENCE, ready, simulator, udp, wait_until
+from ..rig import Bench, Client, ready, simulator, udp
 from ..rows import at_most, quantiles, Row
 
 # s for which an endpoint is flooded before the turns are read, and between two OFF meanwhile.
@@ -82,7 +83,7 @@ class Flooded:
     def _endpoints(self, client: Client) -> list[Endpoint]:
         """Return the services and subscribed topics of the node, with each kind of request."""
         graph, name = client.node, (self._node, '/')
-        wait_until(lambda: name in graph.get_node_names_and_namespaces() and len(
+        eventually(lambda: name in graph.get_node_names_and_namespaces() and len(
             graph.get_service_names_and_types_by_node(*name)) > MIN_SERVICES, 'services are known')
         services = [(one, types[0]) for one, types in sorted(
             graph.get_service_names_and_types_by_node(*name))]
@@ -95,7 +96,7 @@ class Flooded:
     def _turn(self, bridge: Program) -> float:
         before = len(_values(bridge, 'turn'))
         time.sleep(FLOODED)
-        wait_until(lambda: len(_values(bridge, 'turn')) > before + 1, 'turns are printed')
+        eventually(lambda: len(_values(bridge, 'turn')) > before + 1, 'turns are printed')
         # The first one may be of the time before the flood.
         return max(one[-1] for one in _values(bridge, 'turn')[before + 1:])
 
@@ -171,7 +172,7 @@ def _next(program: Program, word: str) -> Callable[[], float]:
     before = len(_values(program, word))
 
     def wait() -> float:
-        wait_until(lambda: len(_values(program, word)) > before, word)
+        eventually(lambda: len(_values(program, word)) > before, word)
         return _values(program, word)[before][-1]
 
     return wait

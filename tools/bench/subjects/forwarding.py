@@ -17,19 +17,9 @@ import threading
 import time
 
 from support.processes import Program
+from support.waiting import eventually, PATIENCE
 
-from ..rig import (
-    alternate,
-    Bench,
-    bridge,
-    cpu,
-    cpu_share,
-    interleaved,
-    PATIENCE,
-    peer,
-    settle,
-    wait_until,
-)
+from ..rig import alternate, Bench, bridge, cpu, cpu_share, interleaved, peer, settle
 from ..rows import at_most, Row, times
 from ..traffic import frames, Line
 
@@ -136,7 +126,7 @@ def delay(
         frame, began = lines[name].next_of(prepared), time.monotonic()
         before = sink.count
         lines[name].feed(prepared, 0, 1)
-        wait_until(lambda: sink.count > before, f'{name} forwards')
+        eventually(lambda: sink.count > before, f'{name} forwards')
         return sink.arrived[frame] - began
 
     found = alternate({OURS: lambda: [path(OURS)], BARE: lambda: [path(BARE)]},

@@ -21,9 +21,10 @@ from illuminator_ros.gimbal import messages as gimbal
 from illuminator_ros.mavlink import messages as mav
 from illuminator_ros.mavlink.dialect import mavlink
 from support.ports import free_port
+from support.waiting import eventually
 
 from ..devices import Side
-from ..rig import alternate, Bench, bridge, peer, udp, wait_until
+from ..rig import alternate, Bench, bridge, peer, udp
 from ..rows import Row, times
 
 MANAGER, DEVICE, PLAYER = mav.Address(1, 193), mav.Address(1, 154), mav.Address(255, 100)
@@ -48,7 +49,7 @@ def managed() -> Iterator[tuple[int, Side, Side]]:
     with (Side(port, mavlink.MAV_TYPE_GIMBAL, DEVICE) as device,
           Side(port, mavlink.MAV_TYPE_GCS, PLAYER) as player,
           bridge(udp(port), 'gimbal_manager', payloads='[gimbal_manager]')):
-        wait_until(has_control, 'a player has control')
+        eventually(has_control, 'a player has control')
         yield port, device, player
 
 

@@ -26,9 +26,10 @@ from support.lossy_line import COMMANDS, CONFIRMED, Run
 from support.ports import free_port
 from support.ptys import PtyDevice
 from support.simulated_link import SimulatedLink
+from support.waiting import eventually, PATIENCE
 from support.wire import Faults
 
-from ..rig import Bench, bridge, interleaved, PATIENCE, udp, wait_until
+from ..rig import Bench, bridge, interleaved, udp
 from ..rows import at_most, quantiles, Row, times
 
 # s; the requests to a light that was just discovered are not counted.
@@ -83,7 +84,7 @@ def serial(absences: tuple[float, ...], lasting: float) -> Iterator[float]:
                 time.sleep(absence)
                 device.plug_in()
                 began = time.monotonic()
-                wait_until(lambda: device.read(0.001), 'the serial port is opened again')
+                eventually(lambda: device.read(0.001), 'the serial port is opened again')
                 yield time.monotonic() - began
         device.pull_out()
 

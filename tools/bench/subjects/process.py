@@ -12,8 +12,9 @@ import statistics
 import time
 
 from support.ports import free_port
+from support.waiting import eventually
 
-from ..rig import Bench, bridge, Client, cpu_share, peer, resident, simulator, udp, wait_until
+from ..rig import Bench, bridge, Client, cpu_share, peer, resident, simulator, udp
 from ..rows import at_most, Figures, quantiles, Row, times
 
 # s for which a light sends statuses before the memory is measured; MB.
@@ -55,7 +56,7 @@ def seen(bench: Bench, names: list[str]) -> float:
     with Client(bench) as client:
         began = time.monotonic()
         clients = [client.client(f'/{name}/enable') for name in names]
-        wait_until(lambda: all(one.service_is_ready() for one in clients), 'all nodes are seen')
+        eventually(lambda: all(one.service_is_ready() for one in clients), 'all nodes are seen')
         return time.monotonic() - began
 
 

@@ -18,8 +18,9 @@ from diagnostic_msgs.msg import DiagnosticArray
 from illuminator_ros.mavlink.frame import Decoder
 from pymavlink.dialects.v20 import ardupilotmega
 from rclpy.qos import QoSProfile
+from support.waiting import PATIENCE
 
-from ..rig import Bench, bridge, Client, cpu, cpu_share, interleaved, PATIENCE, peer, settle
+from ..rig import Bench, bridge, Client, cpu, cpu_share, interleaved, peer, settle
 from ..rows import at_most, Row, times
 from ..traffic import COMMON, frames, Line
 

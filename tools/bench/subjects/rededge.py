@@ -24,8 +24,9 @@ from sensor_msgs.msg import Imu, NavSatFix, NavSatStatus
 from std_msgs.msg import Header
 from support.processes import start_interpreter
 from support.strict_mavlink_1 import OVERHEAD, strict_frames
+from support.waiting import eventually
 
-from ..rig import Bench, Client, cpu, peer, ready, wait_until
+from ..rig import Bench, Client, cpu, peer, ready
 from ..rows import at_most, quantiles, Row, times
 
 # bytes/s
@@ -115,7 +116,7 @@ def publish(
     node = client.node
     fixes = node.create_publisher(NavSatFix, '/fix', 10)
     imus = node.create_publisher(Imu, '/imu', 10)
-    wait_until(lambda: min(fixes.get_subscription_count(), imus.get_subscription_count())
+    eventually(lambda: min(fixes.get_subscription_count(), imus.get_subscription_count())
                >= len(pids), 'the topics have subscribers')
     # A node sends no attitude for 2 s after its start.
     time.sleep(2.0)

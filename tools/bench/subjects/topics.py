@@ -23,9 +23,10 @@ from illuminator_ros.payload.messages import GimbalDeviceAttitudeStatus
 from std_msgs.msg import Bool, Float64
 from support.fake_light import LIGHT, status_message
 from support.ports import free_port
+from support.waiting import eventually
 
 from ..devices import Side
-from ..rig import alternate, Bench, bridge, Client, peer, udp, wait_until
+from ..rig import alternate, Bench, bridge, Client, peer, udp
 from ..rows import Row, times
 
 # s between two messages; longer than the path of one.
@@ -62,7 +63,7 @@ def over(bench: Bench, topic: str, type_: type[Any], place: str) -> Row:
             return light.send(status_message(int(time.monotonic() * 1000)))
 
         def collected() -> list[tuple[float, Any]]:
-            wait_until(lambda: len(arrived) >= block, 'all messages arrive')
+            eventually(lambda: len(arrived) >= block, 'all messages arrive')
             taken = arrived[:]
             arrived.clear()
             return taken
@@ -93,7 +94,7 @@ def over(bench: Bench, topic: str, type_: type[Any], place: str) -> Row:
             client.subscribe(of_topic, name, lambda message: arrived.append(
                 (time.monotonic(), message.data)))
             # The first ones may get lost.
-            wait_until(functools.partial(reaches, send), f'messages on {name}')
+            eventually(functools.partial(reaches, send), f'messages on {name}')
             arrived.clear()
         found = alternate({'ours': ours, 'bare': bare}, *bench.amount((8, 2), (1, 1)))
     return Row(
@@ -158,7 +159,7 @@ def gimbal(bench: Bench) -> Iterator[Row]:
             'subscriber': lambda: path(
                 'subscriber', lambda: [*struct.unpack('<3f', bare.recv(2048))])}
         for name, action in actions.items():
-            wait_until(action, f'rates of {name} arrive')
+            eventually(action, f'rates of {name} arrive')
         block = bench.amount(50, 3)
         found = alternate({name: lambda action=action: [  # type: ignore[misc]
             action() for _ in range(block)] for name, action in actions.items()},
