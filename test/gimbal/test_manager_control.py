@@ -59,11 +59,25 @@ def after(policy: Policy, holder: Address | None, event: str, *, overrules: bool
     return NAMES[one.holder(Role.PRIMARY)]
 
 
-def test_each_pair_of_holder_and_event_ends_as_the_page_says() -> None:
-    assert table(PAGE.read_text(), 'in control before') == [
-        [name, event, *(after(policy, holder, event) for policy in Policy),
-         after(Policy.HOLD, holder, event, overrules=True)]
-        for name, holder in HOLDERS.items() for event in EVENTS]
+def test_a_player_takes_control_from_each_holder_as_the_page_says() -> None:
+    assert table(PAGE.read_text(), 'a player takes control from') == [
+        [name, *(after(policy, holder, 'takes control') for policy in Policy),
+         after(Policy.HOLD, holder, 'takes control', overrules=True)]
+        for name, holder in HOLDERS.items()]
+
+
+@pytest.mark.parametrize(('policy', 'overrules'), [
+    *((policy, False) for policy in Policy), (Policy.HOLD, True)])
+@pytest.mark.parametrize('holder', HOLDERS.values(), ids=HOLDERS)
+def test_control_is_given_away_as_it_is_taken_and_only_its_holder_releases_it(
+        holder: Address | None, policy: Policy, overrules: bool) -> None:
+    takes, gives, clears, releases, nothing = (
+        after(policy, holder, event, overrules=overrules) for event in EVENTS)
+
+    assert (gives, clears) == (
+        ('DENIED', 'DENIED') if takes == 'DENIED' else ('the other', 'none'))
+    assert (releases, nothing) == (
+        'none' if holder == PLAYER else NAMES[holder], NAMES[holder])
 
 
 def test_the_diagram_of_the_page_has_each_change_of_control() -> None:
