@@ -41,7 +41,7 @@ unit: environment
 	@$(PYTHON_IN_VENV) -m pytest -p support.no_ros test/mavlink test/transport test/payload \
 		test/illuminator test/rededge test/gimbal test/payloads test/simulator \
 		test/conformance test/cli test/test_bounds.py test/docs/test_links.py test/docs/test_tool_pages.py \
-		test/docs/test_payload_pages.py test/docs/test_tables.py test/docs/test_messages.py \
+		test/docs/test_payload_pages.py test/docs/test_tables.py \
 		test/docs/test_example_pages.py
 
 check: environment

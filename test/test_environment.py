@@ -113,25 +113,6 @@ def test_nothing_is_installed_while_the_declared_packages_are_there(project: Pro
     assert project.calls().startswith('uv: pip install')
 
 
-def test_kilted_has_an_environment_of_its_own(project: Project) -> None:
-    project.run('demo')
-    project.calls()
-
-    assert project.run('demo', 'kilted')[0] == 0
-    assert f'--python {project.folder}/.venv-kilted/bin/python' in (calls := project.calls())
-    assert calls.endswith('--group kilted')
-
-
-@pytest.mark.parametrize(('options', 'used'), [('--group', True), ('--extra', False)],
-                         ids=['new', 'old'])
-def test_uv_on_the_path_is_used_if_it_knows_groups(
-        project: Project, options: str, used: bool) -> None:
-    project.program('bin/uv', UV, options=options)
-
-    assert project.run()[0] == 0
-    assert ('-m pip install' not in project.calls()) == used
-
-
 @pytest.mark.parametrize(('fault', 'message'), [
     ('echo "No space left on device (os error 28)"; exit 1',
      'the disk is full; the demonstration needs 0.5 GB, the tests 1.5'),
@@ -178,22 +159,6 @@ def test_venv_made_without_ros_is_made_anew_when_ros_is_sourced(project: Project
     project.run()
 
     assert 'made without ROS, which is sourced now' in project.run(ROS_DISTRO='jazzy')[1]
-
-
-def test_venv_of_another_python_is_kept_and_installed_into(project: Project) -> None:
-    project.program('.venv/bin/python', PYTHON, version='11')
-
-    assert project.run()[0] == 0
-    assert '-m venv' not in (calls := project.calls())
-    assert '11: -m pip install' in calls
-
-
-def test_venv_is_made_anew_if_python_asks_for_another_version(project: Project) -> None:
-    project.run()
-    project.program('bin/python3.13', PYTHON, version='13')
-
-    assert 'PYTHON asks for another' in project.run(PYTHON='python3.13')[1]
-    assert '13: -m venv' in project.calls()
 
 
 @pytest.mark.parametrize('shim', ['exit 127', 'echo "$0 3.9"'], ids=['does not run', 'too old'])

@@ -11,9 +11,7 @@ import shutil
 import subprocess
 import sys
 
-from catkin_pkg.changelog import get_changelog_from_path
 from catkin_pkg.package import parse_package
-from catkin_pkg.package_version import update_changelog_sections, update_versions
 from illuminator_ros.cli.entry_point import OLDEST
 from illuminator_ros.mavlink.transport.serial import OLDEST_PYSERIAL
 import pytest
@@ -80,12 +78,6 @@ def copy(tmp_path: Path) -> Path:
 
 def test_version_is_the_same_everywhere() -> None:
     assert len(set(versions(ROOT))) == 1
-
-
-def test_release_sets_the_version_everywhere(copy: Path) -> None:
-    update_versions({str(copy): parse_package(str(copy))}, '12.3.4')
-
-    assert versions(copy) == ['12.3.4'] * 3
 
 
 class Declared:
@@ -204,14 +196,3 @@ def test_bridge_and_monitor_of_the_wheel_name_the_package_that_is_missing(clean:
         assert program.wait() == 1
         assert missing in program.log
         assert 'Traceback' not in program.log
-
-
-def test_a_release_names_the_version_in_the_changelog_as_bloom_wants_it(copy: Path) -> None:
-    changelog = copy / 'CHANGELOG.rst'
-    update_changelog_sections(
-        {PACKAGE: (str(changelog), get_changelog_from_path(str(copy)), 'Forthcoming')}, '12.3.4')
-
-    [(version, _, entries)] = get_changelog_from_path(str(copy)).foreach_version()
-    assert version == '12.3.4'
-    assert len([*entries[0]]) > 30
-    assert copy.joinpath(parse_package(str(copy)).licenses[0].file).is_file()

@@ -28,17 +28,3 @@ def test_subject_yields_rows_with_its_peers_and_whether_each_target_was_met() ->
         assert targets == 'at most 0 frames missing: met'
     assert ('good frames recovered from noise: at most 0 frames missing: met in 2 of 2 (0 to 0)'
             in result.stdout)
-
-
-def test_floods_are_measured_inside_the_bridge() -> None:
-    result = run('--quick', 'floods')
-    assert result.returncode == 0, result.stderr
-    rows = [line for line in result.stdout.splitlines() if line.startswith('| ')]
-    assert [row.split(', ')[0].strip('| ') for row in rows] == [
-        "longest turn of the link's thread", '`~/enable` false taken to its OFF on the wire',
-        'SIGTERM to the last OFF on the wire']
-
-
-def test_unknown_subject_is_a_usage_error() -> None:
-    result = run('nothing')
-    assert (result.returncode, "'nothing'" in result.stderr) == (2, True)

@@ -54,10 +54,3 @@ def test_the_map_lists_every_page_once() -> None:
 
     assert sorted(pages) == sorted(
         page.name for page in (ROOT / 'doc').glob('*.md') if page.name != 'README.md')
-
-
-def test_the_readme_has_at_most_130_short_lines() -> None:
-    lines = README.read_text().splitlines()
-
-    assert len(lines) <= 130
-    assert max(map(len, lines)) <= LONGEST

@@ -7,12 +7,10 @@ from collections.abc import Sequence
 import re
 
 from illuminator_ros.cli.bridge import Executable, usage
-from illuminator_ros.cli.payloads import PAYLOADS
 from illuminator_ros.gimbal.ros.gimbals import GIMBAL_PARAMETERS
 from illuminator_ros.gimbal.ros.manager_node import MANAGER_PARAMETERS
 from illuminator_ros.illuminator.ros.parameters import DEVICE_PARAMETERS, LIGHT_PARAMETERS
 from illuminator_ros.rededge.ros import camera_node as camera
-from illuminator_ros.ros import monitor_view
 from illuminator_ros.ros.conversions import GEOID_SEPARATION
 from illuminator_ros.ros.parameters import LINK_PARAMETERS as SHARED_PARAMETERS
 from illuminator_ros.ros.parameters import ParameterSpec
@@ -73,14 +71,3 @@ def test_the_readme_has_each_executable_which_is_also_a_module() -> None:
                    for name in re.findall(r'\w+', names)}
 
     assert {row[0].strip('`') for row in table(README, 'executable')} == modules == executables
-
-
-def test_the_monitor_page_has_the_states_and_topics_of_the_code() -> None:
-    views = [one.load('view') for one in PAYLOADS.values() if one.view]
-
-    assert [[kind, topics] for kind, topics, _ in table(MONITOR, 'kind')] == [
-        [view.kind, ', '.join(f'`{topic}`' for topic in view.signature)] for view in views]
-    assert [word for cells in table(MONITOR, 'state') for word in re.findall('`(.+?)`', cells[0])
-            ] == [*dict.fromkeys(word for view in sorted(views, key=lambda view: len(view.states),
-                                                         reverse=True) for word in view.states),
-                  *monitor_view.STATES]

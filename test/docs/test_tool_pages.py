@@ -12,7 +12,6 @@ from typing import Any
 from illuminator_ros.checks.report import as_json, RunReport
 from illuminator_ros.checks.requirement import CheckResult, CheckVerdict, Requirement
 from illuminator_ros.cli.conformance.run import parse
-from illuminator_ros.cli.discover import report as discovered
 from illuminator_ros.cli.discover import run as discover
 from illuminator_ros.cli.payloads import PAYLOADS
 from illuminator_ros.cli.simulator.components import scenario
@@ -20,8 +19,6 @@ from illuminator_ros.cli.simulator.options import parser, payload_types
 from illuminator_ros.gimbal.checks import device, manager
 from illuminator_ros.illuminator.checks.requirements import REQUIREMENTS
 from illuminator_ros.illuminator.simulated import SIMULATED
-from illuminator_ros.mavlink.listener import Listener
-from illuminator_ros.mavlink.url import parse_url
 from payloads.winch import WINCH
 import pytest
 from support.tables import table
@@ -71,12 +68,6 @@ def test_a_command_in_a_block_of_code_has_arguments_that_the_program_takes(
         parse(arguments, KINDS)
 
 
-def test_commands_of_all_these_programs_are_found() -> None:
-    assert len(COMMANDS) > 20
-    assert {program for _, program, _ in COMMANDS} == {
-        'simulator', 'conformance', 'discover'}
-
-
 def test_the_kinds_of_devices_are_listed_with_their_options() -> None:
     kinds = {name: one.load('simulated') for name, one in PAYLOADS.items()}
 
@@ -109,33 +100,3 @@ def test_each_rule_of_gimbals_is_listed_with_its_requirements_and_has_a_test_or_
 
     assert {*listed} == tested | {*checked}
     assert {rule: names for rule, names in listed.items() if names} == checked
-
-
-def test_each_requirement_on_a_light_is_once_in_the_page_for_makers() -> None:
-    page = (DOC / 'light.md').read_text()
-    named = re.findall('`(.+?)`', ' '.join(row[3] for row in table(page, 'a light')))
-
-    assert sorted([*named, 'checksums']) == sorted(one.name for one in REQUIREMENTS)
-
-
-def test_the_report_of_discover_on_the_page_is_as_the_program_prints_it() -> None:
-    page = (DOC / 'links.md').read_text()
-    url = 'serial:///dev/serial/by-id/usb-FTDI_FT232R_USB_UART_A50285BI-if00-port0:57600'
-    heard = [
-        {'address': address, 'kinds': kinds, 'mavlink_versions': [2], 'signed': False,
-         'frames_per_s': rate, 'served': kinds == ['light']}
-        for address, kinds, rate in (
-            ('1/1', ['autopilot', 'ArduPilot'], 52.4), ('1/243', ['light'], 6.0))]
-    report = {'port': url, 'url': url, 'trouble': '', 'components': heard,
-              'run': [f'ros2 run illuminator_ros bridge {url}'], 'try': []}
-    silent = discovered.report(Listener(
-        parse_url('udpin://0.0.0.0:14590'), 'udpin://0.0.0.0:14590', lambda: 0.0))
-
-    for one in (report, silent):
-        assert '\n'.join(['', *discovered.lines(one), '']) in page
-    keys = [re.findall('`(.+?)`', cell) for cell, _ in table(
-        page, 'key of `--json`, for each port')]
-    assert [key for row in keys for key in row] == [*silent] == [*report]
-    [of_component] = [text for cell, text in table(page, 'key of `--json`, for each port')
-                      if cell == '`components`']
-    assert re.findall('`(.+?)`', of_component) == [*heard[0]]

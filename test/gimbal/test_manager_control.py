@@ -16,7 +16,7 @@ from illuminator_ros.gimbal.manager_control import (
 from illuminator_ros.mavlink.messages import Address, heartbeat
 from illuminator_ros.payload.arbitration import Cause, Policy
 import pytest
-from support.tables import table, transitions
+from support.tables import table
 
 PAGE = Path(__file__).parents[2] / 'doc' / 'gimbal_manager.md'
 PLAYER, LOWER, HIGHER, OVERRULING = (Address(255, id_) for id_ in (10, 20, 30, 40))
@@ -78,16 +78,6 @@ def test_control_is_given_away_as_it_is_taken_and_only_its_holder_releases_it(
         ('DENIED', 'DENIED') if takes == 'DENIED' else ('the other', 'none'))
     assert (releases, nothing) == (
         'none' if holder == PLAYER else NAMES[holder], NAMES[holder])
-
-
-def test_the_diagram_of_the_page_has_each_change_of_control() -> None:
-    changes = {change for holder in HOLDERS.values() for params in EVENTS.values()
-               for change in held(Policy.TAKEOVER, holder).configure(PLAYER, params, 1.0)}
-    changes |= set(held(Policy.HOLD, PLAYER).poll(LEASE))
-
-    assert set(transitions(PAGE.read_text(), 'FREE', 'CLAIM')) == {
-        ('HELD' if one.before else 'FREE', one.cause.name, 'HELD' if one.after else 'FREE')
-        for one in changes}
 
 
 @pytest.mark.parametrize('policy', Policy)

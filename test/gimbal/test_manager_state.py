@@ -7,7 +7,6 @@ from __future__ import annotations
 
 from collections.abc import Callable
 import math
-from pathlib import Path
 
 from illuminator_ros.gimbal.manager import RequestRefused
 from illuminator_ros.gimbal.manager_state import (
@@ -39,19 +38,12 @@ from support.gimbal_manager import (
     pitch_yaw,
     request,
 )
-from support.tables import transitions
 
-PAGE = Path(__file__).parents[2] / 'doc' / 'gimbal_manager.md'
 OTHER = Address(1, 191)
 
 
 def status(device_id: int = DEVICE.component) -> GimbalManagerStatus:
     return GimbalManagerStatus(0, 0, device_id, 0, 0, 0, 0)
-
-
-def test_the_diagram_of_the_page_has_the_transitions_of_the_table() -> None:
-    assert sorted(transitions(PAGE.read_text(), 'NO_DEVICE', 'DEVICE_HEARD')) == sorted(
-        (state.name, by.name, then.name) for (state, by), then in TRANSITIONS.items())
 
 
 def reached(state: ManagerState) -> ManagerRig:

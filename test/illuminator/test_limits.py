@@ -168,3 +168,18 @@ def test_a_limit_above_what_the_light_can_do_is_reported_and_the_light_does_not_
     assert pair.snapshot.limit_exceeded.impossible == (
         'min_strobe_period 0.34 s is above the longest period of the light, 0.2 s')
     assert [command.param3 for command in pair.commands(CONFIGURE)] == [0.0]
+
+
+def test_a_limit_that_is_removed_ends_the_warning_and_changes_no_light() -> None:
+    light, pair = limited(brightness=50.0)
+    light.applies, light.fields['brightness'] = False, 80.0
+    pair.run(10.0)
+    assert pair.snapshot.limit_exceeded.excess
+
+    changed_at = pair.now
+    pair.controller.change_settings(LightSettings(), pair.now)
+    pair.run(10.0)
+
+    assert not pair.snapshot.limit_exceeded.excess
+    assert pair.commands(CONFIGURE, since=changed_at) == []
+    assert light.fields['brightness'] == 80.0

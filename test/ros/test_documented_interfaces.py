@@ -241,23 +241,6 @@ def test_policy_permits_the_operator_all_that_the_node_offers_but_its_internals(
         service for service in offered.services if service.rpartition('/')[2] not in INTERNAL}
 
 
-def test_policy_permits_the_operator_what_every_node_has(ros: Ros) -> None:
-    mine = interface(ros, 'tester', ['/tester/get_type_description'])
-
-    assert permitted('illuminator', 'operator', 'service', 'reply') == sorted(
-        name.replace('/tester/', '/operator/') for name in mine.services)
-    assert set(mine.publishers) <= set(permitted('illuminator', 'operator', 'topic', 'publish'))
-
-
-def test_policy_permits_a_source_its_own_names_only() -> None:
-    names = [name for rule in (('topic', 'publish'), ('service', 'request'))
-             for name in permitted('illuminator', 'mission', *rule)]
-
-    assert {name for name in names if name.startswith('/illuminator/')} == {
-        f'/illuminator/autonomy/{name}'
-        for name in ('cmd/brightness', 'cmd/enable', 'enable', 'release')}
-
-
 @pytest.mark.parametrize('file', ['sources', 'gimbal_sources'])
 def test_example_of_sources_has_parameters_that_the_bridge_accepts(
     own_ros: Ros, file: str,

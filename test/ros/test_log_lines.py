@@ -4,23 +4,19 @@
 """The log of a light's life: each fact once, and no flood; parameters follow meanwhile."""
 
 from collections.abc import Callable
-import socket
 from typing import Any
 
 from illuminator_ros.mavlink.messages import ComponentInformationBasic, heartbeat
-from illuminator_ros.ros.throttled_log import BURST, PERIOD
 import pytest
 from rcl_interfaces.msg import LoggerLevel
 from rcl_interfaces.srv import SetLoggerLevels
 from std_msgs.msg import Bool
 from std_srvs.srv import Trigger
 from support.fake_light import status_message
-from support.frames import heartbeat_frame
 from support.light import Address, CONFIGURE, ON_OFF, ServedLight
-from support.processes import ended
-from support.ros import Parameters, Ros, running_bridge, start_bridge
+from support.ros import Parameters, Ros, running_bridge
 from support.slow import CLOCK, pass_time_until, time_passes
-from support.waiting import eventually, stopwatch
+from support.waiting import eventually
 
 AUTOPILOT = 2
 FLOOD = 2000
@@ -165,27 +161,6 @@ def test_flood_of_frames_is_not_a_flood_of_lines(
         eventually(lambda: len(bridge.lines) > before)
 
         assert len(bridge.lines) - before < 40
-
-
-def test_tcp_server_that_closes_each_connection_after_a_frame_causes_no_flood_of_lines(
-    own_ros: Ros, port: int,
-) -> None:
-    with socket.create_server(('127.0.0.1', 0)) as server:
-        url = f'tcp://127.0.0.1:{server.getsockname()[1]}'
-        elapsed = stopwatch()
-        with ended(start_bridge(own_ros.domain, port, connection_url=url)) as bridge:
-            for number in range(30):
-                connection, _ = server.accept()
-                with connection:
-                    # With unread data close() would reset the connection.
-                    assert connection.recv(1000)
-                    connection.sendall(heartbeat_frame(sequence=number))
-                    connection.shutdown(socket.SHUT_WR)
-
-            # The limit counts real time.
-            periods = 1 + int(elapsed() / PERIOD)
-            assert 0 < bridge.count('link lost') <= periods * (BURST + 1)
-            assert len(bridge.lines) < periods * 40
 
 
 def test_a_fraction_as_limit_and_an_unusual_baud_rate_are_warned_of(

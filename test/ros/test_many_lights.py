@@ -93,18 +93,6 @@ def test_nodes_show_set_and_switch_their_own_lights(ros: Ros, lights: Group) -> 
     assert [name for name, light in lights.items() if light.commands(ON_OFF)] == ['/belly']
 
 
-def test_parameter_events_of_each_light_name_its_node(ros: Ros, lights: Group) -> None:
-    events = {node: Parameters(ros, node).events() for node in NODES}
-    for number, node in enumerate(NODES):
-        assert Parameters(ros, node).set(brightness=40.0 + number)[0].successful
-    for number, node in enumerate(NODES):
-        # The first status may have caused an event with 100 %, too.
-        event = events[node].wait(lambda event: any(
-            one.name == 'brightness' and one.value.double_value < 100.0
-            for one in event.changed_parameters))
-        assert [one.value.double_value for one in event.changed_parameters] == [40.0 + number]
-
-
 @pytest.mark.parametrize('node', ['/illuminator', '/belly'])
 def test_lost_light_keeps_its_node_and_is_served_again_when_it_returns(
     ros: Ros, group: tuple[Program, Group], lights: Group, node: str,

@@ -5,15 +5,13 @@
 
 from collections.abc import Callable, Iterator, Sequence
 import contextlib
-import time
-from typing import Any, cast
+from typing import Any
 
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 from illuminator_ros.cli.monitor import ros_graph
 from illuminator_ros.cli.payloads import PAYLOADS
 from illuminator_ros.gimbal.ros.gimbal_node import PUBLICATIONS as GIMBAL_TOPICS
 from illuminator_ros.illuminator.ros.event_publisher import PUBLICATIONS
-from illuminator_ros.illuminator.ros.monitor_view import VIEW as LIGHT
 from illuminator_ros.ros.graph import type_name
 from illuminator_ros.ros.monitor_view import Device, View
 from payloads.winch import WINCH
@@ -202,17 +200,6 @@ def test_a_name_of_two_nodes_is_counted_twice(own_ros: Ros, monitor: Watching) -
     bridges.pop().destroy_node()
 
 
-def test_trend_gets_one_value_in_each_interval(own_ros: Ros, monitor: Watching) -> None:
-    FakeBridge(own_ros, '/one')
-    device = monitor.wait(lambda device: device.state == 'ON', '/one')
-    before = len(device.trend)
-
-    for _ in range(ros_graph.TREND_POLLS):
-        monitor.graph.poll()
-
-    assert len(device.trend) == before + 1
-
-
 def test_hostile_graph_neither_stops_nor_fills_the_monitor(
     own_ros: Ros, monitor: Watching, monkeypatch: pytest.MonkeyPatch,
 ) -> None:
@@ -266,25 +253,3 @@ def test_light_is_a_node_that_publishes_all_its_signature_topics_with_their_type
 
     assert [*ros_graph.devices_among(listed, VIEWS, lambda topic: int(topic in publishers))
             ] == found
-
-
-def test_hundred_lights_at_10_hz_take_less_than_a_third_of_a_core(
-    own_ros: Ros, monitor: Watching, monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    topics = [f'/l{number}/{topic}' for number in range(100) for topic in LIGHT.topics]
-    publishers = [own_ros.node.create_publisher(
-        LIGHT.topics[name.rpartition('/')[2]].type, name,
-        STATE if LIGHT.topics[name.rpartition('/')[2]].is_state else STREAM) for name in topics]
-    eventually(lambda: len(monitor.names) == 100)
-    # Each value changes each time, which is the worst case.
-    messages = [cast(Any, one.msg_type)() for one in publishers]
-    spent = 0.0
-    for _ in range(20):
-        for one, message in zip(publishers, messages, strict=True):
-            one.publish(message)
-        before = time.thread_time()
-        monitor.graph.poll()
-        spent += time.thread_time() - before
-
-    # 0.25 s lie between two polls.
-    assert spent / 20 < 0.25 * 0.3

@@ -11,7 +11,7 @@ from illuminator_ros.ros.parameters import LINK_PARAMETERS
 import pytest
 from rcl_interfaces.msg import ParameterType
 from rcl_interfaces.srv import DescribeParameters, GetParameters, GetParameterTypes
-from support.light import ServedLight
+from support.light import CONFIGURE, params, ServedLight
 from support.ros import Parameters, Ros, running_bridge
 
 DEVICE = ('mode', 'brightness', 'strobe_period', 'strobe_duty_cycle')
@@ -39,16 +39,6 @@ def test_parameters_of_the_light_are_described_and_not_listed_before_its_first_s
     assert not set(DEVICE) & set(alone.names())
     assert [one.type for one in alone.describe(*DEVICE)] == [STRING, DOUBLE, DOUBLE, DOUBLE]
     assert alone.get('connection_url', 'component_id') == ['memory://none', 193]
-
-
-def test_parameters_of_the_light_have_its_values_and_the_described_types(
-    light: ServedLight, parameters: Parameters,
-) -> None:
-    light.report(mode=1, brightness=70.0, strobe_period=1.5, strobe_duty_cycle=30.0)
-
-    parameters.wait(mode='internal_control', brightness=70.0, strobe_period=1.5,
-                    strobe_duty_cycle=30.0)
-    assert parameters.types(*DEVICE) == [STRING, DOUBLE, DOUBLE, DOUBLE]
 
 
 @pytest.mark.parametrize(('service', 'type_', 'field'), [
@@ -106,3 +96,20 @@ def test_link_parameters_are_typed_and_described(parameters: Parameters) -> None
         assert not result.successful
         assert 'read-only' in result.reason
     assert parameters.get(*LINK) == before
+
+
+@pytest.mark.parametrize(('given', 'sent'), [
+    ({'brightness': 60.5}, (2.0, 60.5, 2.0, 10.0)),
+    ({'mode': 'internal_control', 'brightness': 1, 'strobe_period': 3.5,
+      'strobe_duty_cycle': 50}, (1.0, 1.0, 3.5, 50.0))])
+def test_overrides_are_sent_with_the_first_connection_in_one_command(
+    own_ros: Ros, port: int, given: dict[str, Any], sent: tuple[float, ...],
+) -> None:
+    own: dict[str, Any] = {
+        'mode': 2, 'brightness': 90.0, 'strobe_period': 2.0, 'strobe_duty_cycle': 10.0}
+    with (running_bridge(own_ros.domain, port, **given) as bridge,
+          ServedLight(port, **own) as light):
+        bridge.wait_for('light 1/243 configured: ')
+
+        assert [params(command) for command in light.commands(CONFIGURE)] == [sent]
+        Parameters(own_ros).wait(brightness=sent[1], strobe_period=sent[2])

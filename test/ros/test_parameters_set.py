@@ -10,7 +10,6 @@ import pytest
 from rcl_interfaces.msg import Parameter, ParameterType, ParameterValue
 from rcl_interfaces.srv import SetParameters, SetParametersAtomically
 from support.light import CONFIGURE, params, ServedLight
-from support.processes import Program
 from support.ros import Parameters, Ros
 from support.slow import CLOCK
 
@@ -56,6 +55,8 @@ def test_four_parameters_in_one_call_are_one_command_and_one_event(
                             '0 (no strobe) or 0.05 to 10 s'),
     ('brightness', None, 'brightness cannot be deleted'),
     ('frame_id', 'other', 'frame_id is read-only: restart the node with -p frame_id:=VALUE'),
+    ('max_brightness', 'bright', "max_brightness: 'bright' is not a number"),
+    ('source_timeout', 5.0, 'source_timeout: is given, but sources is empty'),
     ('banana', 1.0, 'banana is not a parameter of this node'),
     ('brightnes', 1.0, "brightnes is not a parameter of this node; did you mean 'brightness'?"),
 ])
@@ -98,16 +99,6 @@ def test_request_of_an_unknown_type_or_with_repeated_names_or_empty_is_answered(
     assert light.fake.fields['brightness'] == 20.0
     assert parameters.set() == []
     assert parameters.set_atomically().successful
-
-
-def test_strobe_of_a_light_whose_duty_cycle_is_zero_is_set_to_half_with_a_line(
-    parameters: Parameters, bridge: Program,
-) -> None:
-    assert parameters.set(strobe_period=1)[0].successful
-    assert parameters.get('strobe_period', 'strobe_duty_cycle') == [1.0, 50.0]
-    assert parameters.types('strobe_period') == parameters.types('brightness')
-    bridge.wait_for('light 1/243: strobe_duty_cycle was 0 %, at which the light does not '
-                    'strobe, and was set to 50 %')
 
 
 def test_refusal_by_the_light_is_reported_by_name_and_changes_nothing(

@@ -9,7 +9,6 @@ from collections.abc import Callable, Iterator
 import contextlib
 import itertools
 import math
-from pathlib import Path
 import random
 import threading
 from typing import Any
@@ -26,7 +25,7 @@ from std_msgs.msg import Bool, Header, UInt32
 from std_srvs.srv import Trigger
 from support.fake_camera import FakeCamera, running_camera
 from support.frames import heartbeat_frame
-from support.processes import ended, Program, python, run, slow_python, start_interpreter
+from support.processes import ended, Program, python, slow_python
 from support.ros import Parameters, Ros, STREAM
 from support.slow import pass_time_until
 from support.waiting import eventually
@@ -212,11 +211,6 @@ def test_the_velocity_may_come_with_a_covariance_or_from_odometry_re_15(
         eventually(is_sent)
 
 
-def test_first_image_does_not_wait_for_an_import(own_ros: Ros) -> None:
-    with running_camera() as camera, running_node(own_ros, camera, start_interpreter) as node:
-        assert '/numpy/' in Path(f'/proc/{node.pid}/maps').read_text()
-
-
 def test_fixed_mount_is_set_at_run_time_and_gives_way_to_the_topic_re_23_re_27(
         own_ros: Ros) -> None:
     with running_camera() as camera, running_node(own_ros, camera, mount_roll=5):
@@ -352,24 +346,3 @@ def test_reason_why_no_camera_is_heard_is_in_the_log(own_ros: Ros) -> None:
                            env={'ROS_DOMAIN_ID': str(own_ros.domain)})) as node:
         node.wait_for('link open')
         pass_time_until(lambda: node.count('no camera connected: none heard yet on'), step=2.0)
-
-
-def test_requests_say_why_the_link_is_not_open(own_ros: Ros, port: int) -> None:
-    with ended(python(MODULE, f'tcp://127.0.0.1:{port}',
-                      env={'ROS_DOMAIN_ID': str(own_ros.domain)})) as node:
-        node.wait_for('not open')
-        closed = (f'tcp://127.0.0.1:{port} is not open: cannot connect to 127.0.0.1:{port}: '
-                  'Connection refused')
-        for service, reason in (('ping', closed), ('capture', f'no camera connected: {closed}'),
-                                ('capture_panel', f'no camera connected: {closed}')):
-            answer = own_ros.call(Trigger, f'/rededge/{service}', Trigger.Request())
-            assert (answer.success, answer.message) == (False, reason)
-
-
-def test_help_names_the_device_and_its_own_defaults() -> None:
-    shown = ' '.join(run(MODULE, '--help').stdout.split())
-    assert 'usage: rededge ' in shown
-    assert 'node /rededge for a MicaSense camera (RedEdge, RedEdge-MX, RedEdge-P, Altum)' in shown
-    for text in ('connection_url udpin://127.0.0.1:14592', 'mavlink_version 1 ',
-                 'component_id 191 ', 'mount_yaw yaw of a fixed camera'):
-        assert text in shown

@@ -11,7 +11,7 @@ import re
 import socket
 import threading
 
-from illuminator_ros.mavlink.dialect import entry_names, mavlink
+from illuminator_ros.mavlink.dialect import mavlink
 from illuminator_ros.ros.deferred_service import DeferredService, Respond, Take
 from illuminator_ros.ros.node import SERVICE_QOS
 from illuminator_ros.ros.throttled_log import NodeLog
@@ -21,7 +21,7 @@ from rclpy.node import Node
 from std_msgs.msg import Float32, Float64
 from std_srvs.srv import Trigger
 from support.embedded import embedded_bridge
-from support.light import eventually, ON_OFF, ServedLight
+from support.light import ON_OFF, ServedLight
 from support.processes import Program
 from support.recording import Call
 from support.ros import Parameters, Ros, running_bridge
@@ -106,31 +106,6 @@ def test_requests_fail_at_once_and_say_why_while_no_light_was_ever_heard(
             'check that the device is on, and that it, or a router, sends to this address or '
             'line; on a serial line, that TX and RX are not swapped'}
         assert Parameters(own_ros).get('brightness') == [None]
-
-
-def test_light_that_is_heard_and_answers_nothing_is_the_reason(own_ros: Ros, port: int) -> None:
-    # The line to the light is broken, and the light sends no status unasked.
-    with (running_bridge(own_ros.domain, port),
-          ServedLight(port, stream=0.0, results=dict.fromkeys(
-              entry_names('MAV_CMD')))):
-        eventually(lambda: 'none heard yet' not in own_ros.enable().message)
-
-        assert no_light_messages(own_ros) == {
-            'no light connected: 1/243 heard, without an answer or an ILLUMINATOR_STATUS so far: '
-            'check the line to it, and whether it requires signed messages'}
-
-
-def test_requests_fail_at_once_and_say_why_while_the_light_is_lost(
-    own_ros: Ros, port: int,
-) -> None:
-    with running_bridge(own_ros.domain, port) as bridge, ServedLight(port) as light:
-        Parameters(own_ros).wait(brightness=100.0)
-        light.fake.silent = True
-        pass_time_until(lambda: bridge.count('lost'))
-
-        for message in no_light_messages(own_ros):
-            assert message.startswith('light 1/243 is lost: no heartbeat for ')
-        assert Parameters(own_ros).get('brightness') == [100.0]
 
 
 def test_requests_fail_at_once_and_say_why_while_the_link_is_not_open(

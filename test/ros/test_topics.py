@@ -5,12 +5,9 @@
 
 import math
 from typing import Any
-from unittest.mock import Mock
 
 from diagnostic_msgs.msg import DiagnosticArray
-from illuminator_ros.ros.node import Interface, NodeInterface
 import pytest
-from rclpy.node import Node
 from rosgraph_msgs.msg import Clock
 from sensor_msgs.msg import Temperature
 from std_msgs.msg import Bool, Float32, Float64, String, UInt32
@@ -176,20 +173,6 @@ def test_all_names_follow_namespace_node_name_and_remapping(
         name = node.removeprefix('/')
         assert [status.name for status in array.status] == [f'{name}: link', f'{name}: lamp']
         assert foreign() == {'/parameter_events', '/rosout', diagnostics, *remapped}
-
-
-def test_node_that_has_left_publishes_nothing(own_ros: Ros) -> None:
-    node = Node('leaving', context=own_ros.node.context)
-    interface = NodeInterface(
-        node, Mock(), Mock(), publications=[Interface('enabled', Bool, '')])
-    enabled = own_ros.subscribe(Bool, '/leaving/enabled')
-    interface.publish('enabled', True)
-    enabled.wait_value(True)
-
-    node.destroy_node()
-    interface.publish('enabled', False)
-
-    assert enabled.values == [True]
 
 
 def test_simulated_time_without_a_clock_affects_stamps_only(own_ros: Ros, port: int) -> None:

@@ -3,7 +3,6 @@
 
 """The tables and diagrams of the documentation, and the parameter files."""
 
-import re
 from typing import Any
 
 from support.processes import ROOT
@@ -24,17 +23,6 @@ def table(document: str, first_heading: str) -> list[list[str]]:
         if not line.startswith('|'):
             break
         found.append([cell.strip() for cell in line.strip('|').split('|')])
-    return found
-
-
-def transitions(document: str, first_state: str, first_event: str) -> list[tuple[str, str, str]]:
-    """Return (state, event, next state) of the state diagram that begins with this transition."""
-    diagrams = (re.findall(r'^ +(\w+) --> (\w+): (\w+(?:, \w+)*)$', block, re.MULTILINE)
-                for block in document.split('```mermaid\nstateDiagram-v2\n')[1:])
-    [found] = [diagram for diagram in (
-        [(state, event, then) for state, then, events in block for event in events.split(', ')]
-        for block in diagrams)
-        if diagram[0][:2] == (first_state, first_event)]
     return found
 
 

@@ -7,20 +7,17 @@ from collections.abc import Callable, Iterator
 import contextlib
 import os
 import signal
-import sys
 
 from illuminator_ros.mavlink.dialect import mavlink
 from illuminator_ros.mavlink.link import Link
 from illuminator_ros.ros.bridge import Bridge
 import pytest
-from rcl_interfaces.srv import GetParameters
 import rclpy
 from std_msgs.msg import Bool
 from support.embedded import embedded_bridge
 from support.light import Address, CONFIGURE, ON_OFF, ServedLight
 from support.processes import Program
 from support.ros import (
-    bridge_arguments,
     Parameters,
     repeated,
     Ros,
@@ -54,7 +51,7 @@ def assert_ends(program: Program, number: int = signal.SIGTERM) -> None:
 
 
 @pytest.mark.parametrize('number', [
-    signal.SIGINT, signal.SIGTERM, signal.SIGQUIT, signal.SIGUSR1, signal.SIGRTMAX])
+    signal.SIGINT, signal.SIGTERM, signal.SIGRTMAX])
 def test_every_light_is_switched_off_and_named(own_ros: Ros, port: int, number: int) -> None:
     with (lit(own_ros, port) as (program, light),
           ServedLight(port, source=Address(1, 244), enable=1) as other):
@@ -93,53 +90,14 @@ def test_light_that_is_not_confirmed_off_is_an_error_that_does_not_delay_the_end
         assert [found[:7] for found in program.lines if line in found] == ['[ERROR]']
 
 
-# A bridge that waits for its lights for longer than the process lasts.
-HURRIED = """
-from runpy import run_module
-from signal import pthread_sigmask, SIG_BLOCK, SIGTERM
-# As the program does before it imports rclpy, whose threads must not take the signal.
-pthread_sigmask(SIG_BLOCK, {SIGTERM})
-from illuminator_ros.ros import bridge
-bridge.OFF_LIMIT = 30.0
-run_module('illuminator_ros.bridge', run_name='__main__')
-"""
-
-
-def test_light_is_named_although_the_process_is_forced_to_end(own_ros: Ros, port: int) -> None:
-    with ServedLight(port, link=Link, enable=1) as light:
-        program = Program(
-            sys.executable, '-c', HURRIED, *bridge_arguments(port, off_on_shutdown=True),
-            env={'ROS_DOMAIN_ID': str(own_ros.domain)})
-        try:
-            Parameters(own_ros).wait(brightness=100.0)
-            light.fake.results[ON_OFF] = None
-
-            assert_ends(program)
-        finally:
-            program.kill()
-
-    assert program.count('light 1/243 may still be on: no confirmation in time') == 1
-
-
-def test_busy_executor_does_not_prevent_it(own_ros: Ros, port: int) -> None:
-    with lit(own_ros, port, start=start_bridge) as (program, light):
-        own_ros.start(GetParameters, '/illuminator/get_parameters',
-                      GetParameters.Request(names=['x'] * 1_000_000))
-
-        assert_ends(program)
-
-        assert_goes_off(light)
-
-
 # How often the next test is repeated.
 RUNS = int(os.environ.get('RUNS', '1'))
 
 
 @pytest.mark.parametrize('run', range(RUNS))
 @pytest.mark.parametrize('loss', [0.0, 0.3])
-@pytest.mark.parametrize('number', [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])
 def test_off_is_the_last_change_whatever_is_requested_at_the_end(
-    own_ros: Ros, port: int, number: int, loss: float, run: int,
+    own_ros: Ros, port: int, loss: float, run: int,
 ) -> None:
     with (ServedLight(port, link=Link, enable=1) as light,
           ServedLight(port, link=Link, source=Address(1, 244), enable=1) as other):
@@ -156,7 +114,7 @@ def test_off_is_the_last_change_whatever_is_requested_at_the_end(
                 light.fake.loss = other.fake.loss = loss
                 own_ros.start_enable()
                 Parameters(own_ros).start_set(brightness=20.0)
-                assert_ends(program, number)
+                assert_ends(program)
         finally:
             program.kill()
 
