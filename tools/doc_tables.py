@@ -54,7 +54,7 @@ def tool_tables() -> Tables:
              f'{field.low:.10g} to {field.high:.10g}',
              '' if field.unknown is None else str(field.unknown)]
             for cls, fields in FIELDS.items() for name, field in fields.items()],
-        ('links', 'tried again'): [
+        ('design', 'tried again'): [
             [one.subject, f'{one.first:g}', f'{one.longest:g}',
              '' if one.tries == math.inf else f'{one.tries:g}']
             for one in POLICIES],
