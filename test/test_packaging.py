@@ -31,9 +31,9 @@ KEYS = {'fastcrc': 'python3-pymavlink-pip', 'hypothesis': 'python3-hypothesis',
         'catkin_pkg': 'python3-catkin-pkg-modules'}
 
 pytestmark = pytest.mark.timeout(300)
-# Modules of the extra "monitor", without a rosdep key.
+# Modules of the extra "monitor", without a rosdep key; argcomplete comes with ros2cli.
 # rich comes with textual, aiohttp with textual-serve.
-OPTIONAL = {'textual', 'rich', 'textual_serve', 'aiohttp'}
+OPTIONAL = {'textual', 'rich', 'textual_serve', 'aiohttp', 'argcomplete'}
 # Further ones without a key. Tests skip if one is absent.
 PEERS = {'cyclonedds', 'mavsdk', *OPTIONAL}
 

@@ -18,6 +18,7 @@ import uuid
 import rclpy
 from rclpy.node import Node
 
+from . import completion
 from .. import entry_point
 from ..arguments import option, Parser
 from ..monitor.ros_graph import devices_among, Graph, GraphDevice
@@ -72,8 +73,13 @@ def setting(text: str) -> tuple[str, str]:
 def parser() -> argparse.ArgumentParser:
     """Return the parser of the command line."""
     made = Parser('set', DESCRIPTION, EPILOG)
-    made.add_argument('device', metavar='NODE', help='name of its node, such as /illuminator')
-    made.add_argument('settings', nargs='+', type=option(setting), metavar='NAME=VALUE')
+    device = made.add_argument(
+        'device', metavar='NODE', help='name of its node, such as /illuminator')
+    values = made.add_argument(
+        'settings', nargs='+', type=option(setting), metavar='NAME=VALUE')
+    # Attributes that argcomplete reads.
+    device.completer = completion.names  # type: ignore[attr-defined]
+    values.completer = completion.settings  # type: ignore[attr-defined]
     seconds = option(number(0, 3600))
     made.add_argument('--wait', type=seconds, default=3.0, metavar='S',
                       help='longest search for the node, s (default: %(default)g)')
@@ -93,7 +99,8 @@ def complain(reason: str) -> None:
 def run(args: list[str] | None, termination: Termination) -> int:
     """Run the program; see the text of ``--help``."""
     arguments = sys.argv[1:] if args is None else args
-    options = parser().parse_args(entry_point.own_arguments('set', arguments))
+    completion.complete(made := parser())
+    options = made.parse_args(entry_point.own_arguments('set', arguments))
     entry_point.start_ros('set', arguments)
     with entry_point.refusing(entry_point.CANNOT_CREATE):
         node = Node(f'illuminator_set_{uuid.uuid4().hex[:8]}', enable_rosout=False,
