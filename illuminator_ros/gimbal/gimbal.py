@@ -259,7 +259,7 @@ class Gimbal:
             self._end_one(served.request, served.result, now)
         if not self._commands.refusal and self.setpoints.may_turn:
             for one in self._commanded.releases:
-                if -math.inf < one.due <= now and not one.is_under_way:
+                if -math.inf < one.due <= now and not one.is_served:
                     self._end_one(one, Result(
                         False, f'{self.setpoints.lack_of_stop}, {STOP_LIMIT:g} s after a rate of '
                         'zero: control is kept, and the zero is sent again'), now)

@@ -149,7 +149,7 @@ class GimbalRequests:
     @property
     def due(self) -> float:
         """Return when :meth:`poll` or :meth:`step` has something to do, s."""
-        waits = [one.due for one in self.control.live() if not one.is_under_way]
+        waits = [one.due for one in self.control.live() if not one.is_served]
         return min([*waits, *(one.due for one in self._properties.values())])
 
 

@@ -68,21 +68,21 @@ def decide(live: list[Request], shown: Shown, limits: SafetyLimits, now: float) 
     switch = Goal.strongest(live, 'enabled', now)
     if all('enabled' in one.values for one in live):
         return Goals(switch)
-    hidden: tuple[str, ...] = ()
+    left_out: tuple[str, ...] = ()
     if switch is not None and not switch.values and shown.brightness_is_switch is not False:
         # Only a call may send a configuration that might undo an OFF.
-        hidden = FIELDS
+        left_out = FIELDS
     elif shown.is_dark:
-        hidden = ('brightness',)
+        left_out = ('brightness',)
     # The strongest last; what a call asks for is stronger than a setpoint.
     ranked = sorted(live, key=lambda one: (-one.why, one.is_call, one.since))
     wanted = [(one, values) for one in ranked if (values := {
         name: value for name, value in one.values.items()
-        if name in FIELDS and (one.is_call or name not in hidden)})]
+        if name in FIELDS and (one.is_call or name not in left_out)})]
     # Rules that are not due yet go along with what is.
     if not any(now >= one.due for one, _ in wanted):
         return Goals(switch)
-    return _configuration(wanted, shown, limits, now, may_light_up='brightness' not in hidden
+    return _configuration(wanted, shown, limits, now, may_light_up='brightness' not in left_out
                           )._replace(switch=switch)
 
 

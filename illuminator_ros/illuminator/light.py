@@ -53,10 +53,9 @@ from collections.abc import Callable
 import math
 
 from . import events
-from .commands import SWITCHES
 from .decide import CONFIGURE_LIMIT, describe
 from .light_control import LightControl
-from .light_queries import LightQueries, STATUS
+from .light_queries import LightQueries, STATUS_NAME
 from .messages import STATUS_ID
 from .model import Changes, Status
 from .rules import Rules
@@ -73,8 +72,6 @@ from ..payload.device_events import DeviceConnected, DeviceDisconnected, DeviceH
 from ..payload.identity import Identity
 from ..payload.liveness import Liveness
 from ..payload.requests import Done, Request, Requests, Result, Why
-
-OFF = SWITCHES[False]
 
 
 class Light:
@@ -95,18 +92,19 @@ class Light:
         self.liveness = Liveness(settings.heartbeat_timeout)
         self._commands = commands
         self._emit = emit
-        target = Target(address, commands, 'light', self.poll, STATUS_ID, STATUS)
+        target = Target(address, commands, 'light', self.poll, STATUS_ID, STATUS_NAME)
         self.twin = twin = Twin(target, emit)
         self._requests = requests = Requests(
             f'light {address}', settings.sources, describe,
             lambda change, now: emit(DeviceHeld(address, change)))
         self._rules = rules = Rules(target, requests, twin, settings, emit)
-        self.users = UserRequests(target, self.liveness, requests, twin, rules, emit)
         self._control = LightControl(target, requests, twin, rules, emit)
+        self.users = UserRequests(
+            target, self.liveness, requests, twin, rules, self._control.switch, emit)
         self._queries = LightQueries(
             target, self.liveness, settings.status_interval, settings.heartbeat_timeout)
         # Whether a status without news changes nothing.
-        self._is_calm = False
+        self._is_settled = False
 
     def change_settings(self, settings: LightSettings, now: float) -> None:
         """
@@ -121,7 +119,7 @@ class Light:
         if settings.limits != before.limits:
             rules.change_limits(now)
             self._control.cancel_configuration(now)
-            rules.keep_limits(now, is_busy=self._control.is_configuring)
+            rules.keep_limits(now, is_busy=self._control.configuration.is_busy)
         if settings.off_after_silence != before.off_after_silence:
             rules.forget_silenced(now)
             rules.silence = Silence(settings.off_after_silence, now)
@@ -147,7 +145,7 @@ class Light:
         """Receive an ILLUMINATOR_STATUS; a late status is ignored."""
         self.heard(now)
         twin, control, before = self.twin, self._control, self.twin.order.newest_at
-        has_news = not (self._is_calm and status.repeats(twin.status))
+        has_news = not (self._is_settled and status.repeats(twin.status))
         order = twin.order.take(status, now, control.expects)
         if order is Order.LATE:
             return
@@ -165,7 +163,7 @@ class Light:
         self._queries.take_status(now)
         if has_news or order is Order.RESTARTED:
             self._step(now)
-            self._is_calm = control.is_settled(now)
+            self._is_settled = control.is_settled(now)
         # Last, so that a caller has its answer before topics show the change.
         self._emit(events.StatusReceived(self.address, status, now, twin.temperature))
 
@@ -234,7 +232,7 @@ class Light:
             rules.failure or twin.failure.text, rules.limits.exceeded, queries.identity,
             queries.identity_is_settled(now), twin.changing.are_changing,
             self.unreachable(now), self._requests.shown_holder, self._requests.claims.since,
-            self._silence_due(now), queries.serials.shared(now))
+            self._control.silence_due(now), queries.serials.shared(now))
 
     # Requests
 
@@ -301,8 +299,7 @@ class Light:
         if closed := self._commands.refusal:
             new.done(Result(False, closed, superseded=True), now)
             return
-        if self.users.make(new, now, off_is_under_way=self._control.switch.is_under_way(OFF)):
-            self._control.switch.note_sent(OFF, now)
+        self.users.make(new, now)
         self._step(now)
 
     def require(self, values: Changes, now: float) -> None:
@@ -352,21 +349,16 @@ class Light:
 
     # Time
 
-    def _silence_due(self, now: float) -> float:
-        if not self._rules.may_put:
-            return math.inf
-        return self._rules.silence_due(may_be_on=self._control.may_go_off(now))
-
     def _step(self, now: float) -> None:
         """Send what is wanted now, and answer those whose requests have ended."""
-        self._is_calm = False
+        self._is_settled = False
         self.users.expire(now)
         if self.connected:
             self._control.step(now)
         self._requests.answer(now)
         self._commands.schedule.at(self.poll, min(
-            self._silence_due(now) if self.connected else math.inf,
-            self._requests.next_due(now), self._control.command_due, self._queries.due,
+            self._control.due(now) if self.connected else math.inf,
+            self._requests.next_due(now), self._queries.due,
             self.twin.changing.until, self.liveness.silent_at))
 
     def poll(self, now: float) -> None:

@@ -13,19 +13,13 @@ from .commands import Configure, SWITCHES
 from .decide import decide, Goals
 from .model import FIELDS, Status
 from .rules import Rules
-from .twin import Cause, Failure, IMPLIED_TIME, Twin
+from .twin import Failure, IMPLIED_TIME, OwnCommands, Twin
 from .user_requests import not_reported
 from ..payload.attempt import Change, Served, Target
-from ..payload.device_property import Property
+from ..payload.device_property import plan_of, Property
 from ..payload.requests import Goal, Request, Requests, Result, WEAK, Why
 
 ON, OFF = SWITCHES[True], SWITCHES[False]
-
-
-def plan_switch(goal: Goal) -> tuple[Change[Status], Mapping[Request, Change[Status]]]:
-    """Return the command of a goal of the switch."""
-    change = SWITCHES[bool(goal.values)]
-    return change, dict.fromkeys(goal.serves, change)
 
 
 def _waits(one: Request, goal: Goal, name: str) -> bool:
@@ -53,7 +47,7 @@ class LightControl:
     nothing.
 
     :param emit: takes the events.
-    :ivar switch: the switch of the light.
+    :ivar switch: the switch of the light, and ``configuration``, its other fields.
     """
 
     def __init__(
@@ -65,8 +59,9 @@ class LightControl:
         self._twin = twin
         self._rules = rules
         self._emit = emit
-        self.switch: Property[Status] = Property(target, plan_switch)
-        self._configuration: Property[Status] = Property(target, plan_configuration)
+        self.switch: Property[Status] = Property(
+            target, plan_of(lambda goal: SWITCHES[bool(goal.values)]))
+        self.configuration: Property[Status] = Property(target, plan_configuration)
         # Takes the results of the OFF at the end of the process.
         self._report: Callable[[Result, float], None] | None = None
 
@@ -74,8 +69,7 @@ class LightControl:
 
     def step(self, now: float) -> None:
         """Decide what the light should be, send it, and go on with what is under way."""
-        if self._rules.may_put:
-            self._rules.put_due(now, may_be_on=self.may_go_off(now))
+        self._rules.put_due(now, may_go_off=self.may_go_off(now))
         live = self._requests.live()
         if not live and not self.is_busy:
             return
@@ -87,7 +81,7 @@ class LightControl:
             self._end_configuration(now)
             goals = self._decide(self._requests.live(), now)
         # First the configuration, so that an ON finds it.
-        if self._steer(self._configuration, goals.configuration, now):
+        if self._steer(self.configuration, goals.configuration, now):
             self._rules.sent(now)
         if self._steer(self.switch, goals.switch, now) and self._report is None:
             self._tell_automatic('')
@@ -117,8 +111,8 @@ class LightControl:
             if (one.why is Why.REQUEST and 'enabled' not in one.values
                     and (one.is_call or one.since < now)):
                 self._requests.end(one, Result(False, text, superseded=True), now)
-        self._withdrawn(self._configuration.withdraw(text, now), now)
-        self.switch.fence_until(self._configuration.fence)
+        self._withdrawn(self.configuration.withdraw(text, now), now)
+        self.switch.fence_until(self.configuration.fence_ends_at)
 
     def _steer(self, part: Property[Status], goal: Goal | None, now: float) -> bool:
         """Have a goal under way; return whether a command was begun."""
@@ -151,30 +145,31 @@ class LightControl:
 
     def cancel(self, text: str, now: float) -> None:
         """Send nothing any more of what is under way: the light is lost, or the process ends."""
-        for part in self.switch, self._configuration:
+        for part in self.switch, self.configuration:
             self._withdrawn(part.withdraw(text, now), now)
 
     def cancel_configuration(self, now: float) -> None:
         """Send no configuration again that is beyond the limits, or that a limit has asked for."""
-        attempt = self._configuration.attempt
+        attempt = self.configuration.attempt
         if attempt is None:
             return
         goal, limits = attempt.goal.values, self._rules.settings.limits
         if (limits.clipped(goal, self._twin.strobe_range) != goal
                 or not any(one.why is Why.REQUEST for one in attempt.goal.serves)):
-            self._withdrawn(self._configuration.withdraw('a limit was changed', now), now)
+            self._withdrawn(self.configuration.withdraw('a limit was changed', now), now)
 
     def switch_off_finally(self, now: float, report: Callable[[Result, float], None]) -> None:
         """Report the results of the OFF at the end of the process."""
         self._report, self._rules.wants_off = report, True
-        report(Result(False, 'sent, not confirmed' if now < self.switch.fence else ''), now)
+        is_fenced = now < self.switch.fence_ends_at
+        report(Result(False, 'sent, not confirmed' if is_fenced else ''), now)
 
     # Known facts
 
     @property
     def is_busy(self) -> bool:
         """Whether a command is under way."""
-        return self.switch.attempt is not None or self._configuration.attempt is not None
+        return self.switch.is_busy or self.configuration.is_busy
 
     def is_settled(self, now: float) -> bool:
         """Return whether a status that shows nothing new has no effect."""
@@ -182,13 +177,8 @@ class LightControl:
         return (not self.is_busy and not self._requests.live() and twin.is_told
                 and not twin.changing.are_changing
                 and self.switch.unconfirmed(now) is None
-                and self._configuration.unconfirmed(now) is None
+                and self.configuration.unconfirmed(now) is None
                 and not (twin.failure.text or self._rules.limits.exceeded.excess))
-
-    @property
-    def is_configuring(self) -> bool:
-        """Whether a configuration is under way."""
-        return self._configuration.attempt is not None
 
     def may_go_off(self, now: float) -> bool:
         """Return whether the light is on, or may go on by an ON, and no OFF is under way."""
@@ -201,12 +191,12 @@ class LightControl:
     def _may_be_switched_on(self, now: float) -> bool:
         switch, enabled = self.switch, self._twin.enabled
         return bool(enabled or self.switch.is_under_way(ON) or switch.unconfirmed(now) == ON
-                    and (enabled is None or now < switch.fence))
+                    and (enabled is None or now < switch.fence_ends_at))
 
     def _may_light_up(self, now: float) -> bool:
         """Return whether a configuration of ours may have switched the light on."""
         return bool(self._twin.brightness_is_switch) and (
-            self.is_configuring or now <= self._configuration.sent_at + IMPLIED_TIME)
+            self.configuration.is_busy or now <= self.configuration.sent_at + IMPLIED_TIME)
 
     def _is_late(self, now: float) -> bool:
         """Return whether a command of ours that ended unconfirmed asked for the present state."""
@@ -225,26 +215,26 @@ class LightControl:
 
     def expects(self, status: Status) -> bool:
         """Return whether a status shows what a command under way changes."""
-        return self.switch.expects(status) or self._configuration.expects(status)
+        return self.switch.expects(status) or self.configuration.expects(status)
 
     def may_cause(self, now: float) -> bool:
         """Return whether a command of ours may have caused what a status shows."""
-        switch, configuration = self.switch, self._configuration
-        return switch.attempt is not None or configuration.attempt is not None or (
+        switch, configuration = self.switch, self.configuration
+        return self.is_busy or (
             now <= max(switch.sent_at, configuration.sent_at) + IMPLIED_TIME)
 
     def reported(self, status: Status, now: float) -> None:
         """Take a status that is not older than those before."""
-        twin, switch, configuration = self._twin, self.switch, self._configuration
+        twin, switch, configuration = self._twin, self.switch, self.configuration
         gap, late = twin.gap or 0.0, configuration.unconfirmed(now)
         sent_at = max(switch.sent_at, -math.inf if late else configuration.sent_at)
-        cause = Cause(self.is_configuring, late, sent_at + IMPLIED_TIME)
+        ours = OwnCommands(self.configuration.is_busy, late, sent_at + IMPLIED_TIME)
         before, was_off_by_heat = twin.enabled, twin.is_off_by_heat
         twin.take(status)
         origin = (events.LATE_EFFECT if self._is_late(now) else
                   events.A_REQUEST if self._may_light_up(now) else events.OTHER_SENDER)
-        is_calm = switch.attempt is None and not twin.changing.are_changing
-        if twin.enabled and is_calm and not was_off_by_heat and (
+        is_idle = not switch.is_busy and not twin.changing.are_changing
+        if twin.enabled and is_idle and not was_off_by_heat and (
                 before is None or not before and origin == events.OTHER_SENDER):
             # Another sender has switched it on, or it was on when it was found.
             self._rules.note_request(now)
@@ -253,32 +243,32 @@ class LightControl:
                 twin.enabled is not before or not twin.is_told):
             twin.tell(origin if twin.may_tell else '')
         self._serve(configuration, configuration.reported(status, gap, now), now)
-        self._compare(status, cause, now)
+        self._compare(status, ours, now)
 
-    def _compare(self, status: Status, cause: Cause, now: float) -> None:
+    def _compare(self, status: Status, ours: OwnCommands, now: float) -> None:
         """Compare a status with what was agreed, with the rules, and with the limits."""
         twin, rules, was_agreed = self._twin, self._rules, self._twin.agreed is not None
         weak = rules.weak
-        if weak and was_agreed and not cause.is_busy:
+        if weak and was_agreed and not ours.is_busy:
             rules.drop_shown(status)
-        twin.compare(rules.waiting if weak else (), cause)
+        twin.compare(rules.waiting if weak else (), ours)
         if weak and not was_agreed and twin.agreed is not None:
             for one in weak:
                 one.due = min(one.due, now)
-        rules.keep_limits(now, is_busy=self.is_configuring)
+        rules.keep_limits(now, is_busy=self.configuration.is_busy)
 
     def restarted(self, status: Status, now: float) -> None:
         """Take the first status after a restart, which confirms nothing."""
-        attempt, wanted = self._configuration.attempt, self._twin.agreed
+        attempt, wanted = self.configuration.attempt, self._twin.agreed
         if attempt is not None:
             # A set ends before the fence of the restart, and its values must not be lost with it.
             wanted = attempt.goal.values
         self._rules.restarted({} if wanted is None else {
             name: getattr(wanted, name) for name in FIELDS if name != 'mode' or wanted.mode}, now)
-        for part in self.switch, self._configuration:
+        for part in self.switch, self.configuration:
             part.restarted(now)
         self._twin.restarted(status)
-        self._compare(status, Cause(is_busy=attempt is not None), now)
+        self._compare(status, OwnCommands(is_busy=attempt is not None), now)
 
     # Results
 
@@ -336,11 +326,13 @@ class LightControl:
 
     def poll(self, now: float) -> None:
         """Go on with the commands that are due."""
-        for part in self.switch, self._configuration:
+        for part in self.switch, self.configuration:
             self._serve(part, part.poll(now), now)
 
-    @property
-    def command_due(self) -> float:
-        """Return when a command is due, s."""
-        return min((one.attempt.due for one in (self.switch, self._configuration)
-                    if one.attempt is not None), default=math.inf)
+    def silence_due(self, now: float) -> float:
+        """Return when ``off_after_silence`` switches the light off, infinity for never."""
+        return self._rules.silence_due if self.may_go_off(now) else math.inf
+
+    def due(self, now: float) -> float:
+        """Return when a command, or the OFF of a silence, is due, s."""
+        return min(self.switch.due, self.configuration.due, self.silence_due(now))

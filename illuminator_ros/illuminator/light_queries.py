@@ -30,7 +30,7 @@ from ..payload.requests import Done, Result
 STATUS_TIMEOUT = 2.5
 # s from the first request until the identity counts as unknown.
 SETTLING_TIME = 2.0
-STATUS, IDENTITY = IlluminatorStatus.msgname, ComponentInformationBasic.msgname
+STATUS_NAME, IDENTITY_NAME = IlluminatorStatus.msgname, ComponentInformationBasic.msgname
 
 
 class MessageQuery:
@@ -200,7 +200,7 @@ class LightQueries:
 
         It is a success when a status has come: not every light has an identity.
         """
-        queries = {STATUS: self._status, IDENTITY: self._identity}
+        queries = {STATUS_NAME: self._status, IDENTITY_NAME: self._identity}
         outcomes: dict[str, str] = {}
 
         def answered(name: str, failure: str, at: float) -> None:
@@ -208,7 +208,7 @@ class LightQueries:
             if len(outcomes) == len(queries):
                 parts = [f'{one}: {outcomes[one] or "received"}' for one in queries]
                 refusal = self._target.commands.refusal
-                done(Result(not (refusal or outcomes[STATUS]), refusal or (
+                done(Result(not (refusal or outcomes[STATUS_NAME]), refusal or (
                     f'{", ".join(parts)} ({format_seconds(at - now)})')), at)
 
         for name, query in queries.items():

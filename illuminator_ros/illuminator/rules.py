@@ -61,24 +61,19 @@ class Rules:
         self.silence.requested_at = now
 
     @property
-    def may_put(self) -> bool:
-        """Whether an OFF may be due."""
-        return bool(self.silence.limit) or self.wants_off is not None
+    def silence_due(self) -> float:
+        """Return when ``off_after_silence`` switches off a light that may be on, s."""
+        return max(self.silence.ends_at, self._off_due)
 
-    def silence_due(self, *, may_be_on: bool) -> float:
+    def put_due(self, now: float, *, may_go_off: bool) -> None:
         """
-        Return when ``off_after_silence`` switches the light off, infinity for never.
+        Put the OFFs that are due; the light must be connected.
 
-        :param may_be_on: whether it is or may go on, and no OFF is under way.
+        :param may_go_off: whether it is or may go on, and no OFF is under way.
         """
-        is_due = may_be_on and self.silence.limit
-        return max(self.silence.ends_at, self._off_due) if is_due else math.inf
-
-    def put_due(self, now: float, *, may_be_on: bool) -> None:
-        """Put the OFFs that are due; the light must be connected."""
         if not self._requests.are_calling:
             self.silence.calling_since = -math.inf
-        if now >= self.silence_due(may_be_on=may_be_on):
+        if may_go_off and now >= self.silence_due:
             self._put_off(Why.SILENCE, 'off_after_silence '
                           f'({format_seconds(self.silence.limit)})', now)
         if self.wants_off is not None and (self._twin.enabled or self.wants_off):
@@ -208,7 +203,7 @@ class Rules:
             if one.values.keys() <= set(names):
                 self._requests.end(one, result, now)
             else:
-                one.is_under_way = False
+                one.is_served = False
                 self._requests.drop(one, names)
             self._report(True, result.message)
         elif result.permanent:
@@ -225,7 +220,7 @@ class Rules:
             self._report(False, f'{text}; it will be sent again', is_final=False)
         one.failure = text
         one.tried += 1
-        one.is_under_way = False
+        one.is_served = False
         one.due = now + REQUIRED.wait(one.tried)
 
     def _report(self, success: bool, message: str, *, is_final: bool = True) -> None:

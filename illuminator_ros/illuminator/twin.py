@@ -30,7 +30,7 @@ from ..payload.attempt import Change, Target
 IMPLIED_TIME = 2.0
 
 
-class Cause(NamedTuple):
+class OwnCommands(NamedTuple):
     """
     The commands of ours that may have caused what a status shows.
 
@@ -186,14 +186,14 @@ class Twin:
 
     # The configuration
 
-    def compare(self, waiting: Collection[str], cause: Cause) -> None:
+    def compare(self, waiting: Collection[str], ours: OwnCommands) -> None:
         """
         Follow what no command under way has changed.
 
         :param waiting: fields that will be restored.
         """
         status, reported = self.order.newest, self.reported
-        if status is None or reported is None or cause.is_busy:
+        if status is None or reported is None or ours.is_busy:
             return
         _, goal, instead = self.failure
         # It was applied late, or another sender has replaced it.
@@ -203,11 +203,11 @@ class Twin:
         if self.agreed is None:
             self._adopt(reported, events.ChangeCause.FIRST_STATUS)
         elif not self.changing.are_changing and reported != self.agreed:
-            self._follow(self.agreed, status, reported, waiting, cause)
+            self._follow(self.agreed, status, reported, waiting, ours)
 
     def _follow(
         self, agreed: Configuration, status: Status, reported: Configuration,
-        waiting: Collection[str], cause: Cause,
+        waiting: Collection[str], ours: OwnCommands,
     ) -> None:
         flags = status.error_flags
         names = [name for name in unexpected_differences(agreed, reported, flags, step=False)
@@ -219,9 +219,9 @@ class Twin:
         kind = events.ChangeCause.ROUNDING
         if far:
             kind = events.ChangeCause.LIGHT
-            if cause.late is not None and cause.late.shown_by(status):
+            if ours.late is not None and ours.late.shown_by(status):
                 kind = events.ChangeCause.LATE_EFFECT
-            elif self.order.newest_at <= cause.until:
+            elif self.order.newest_at <= ours.until:
                 kind = events.ChangeCause.REQUEST
         self._adopt(replace(agreed, **{name: getattr(reported, name) for name in names}), kind)
 

@@ -9,12 +9,13 @@ from collections.abc import Callable, Iterable
 
 from . import events
 from .commands import SWITCHES
-from .model import checked, FIELDS, InvalidValue
+from .model import checked, FIELDS, InvalidValue, Status
 from .rules import Rules
 from .twin import Twin
 from ..mavlink.command_sender import Command
 from ..payload.arbitration import Cause, HolderChanged
 from ..payload.attempt import Target
+from ..payload.device_property import Property
 from ..payload.liveness import Liveness
 from ..payload.requests import Done, REPEAT_TIME, Request, Requests, Result
 
@@ -31,7 +32,7 @@ class UserRequests:
 
     def __init__(
         self, target: Target, liveness: Liveness, requests: Requests, twin: Twin, rules: Rules,
-        emit: Callable[[events.LightEvent], None],
+        switch: Property[Status], emit: Callable[[events.LightEvent], None],
     ) -> None:
         self.were_made = False
         self._target = target
@@ -39,39 +40,37 @@ class UserRequests:
         self._requests = requests
         self._twin = twin
         self._rules = rules
+        self._switch = switch
         self._emit = emit
 
-    def make(self, new: Request, now: float, *, off_is_under_way: bool) -> bool:
-        """
-        Make a request, or answer why it is refused.
-
-        :return: whether an OFF was sent to a light that is not heard.
-        """
+    def make(self, new: Request, now: float) -> None:
+        """Make a request, or answer why it is refused."""
         requests = self._requests
         self.expire(now)
         self.were_made = True
         is_off, is_held = new.values.get('enabled') is False, bool(requests.refusal(new.source))
         if not is_off and (late := self._target.commands.lateness(now)):
             requests.reply(new, Result(False, late))
-            return False
+            return
         if new.is_wish:
             self._rules.note_request(now)
         if not self._liveness.connected:
-            return self._refuse_lost(new, now, is_off=is_off, is_held=is_held)
-        if not is_held and self._is_repetition(new, now):
+            self._refuse_lost(new, now, is_off=is_off, is_held=is_held)
+        elif not is_held and self._is_repetition(new, now):
             requests.claim(new.source, now)
             requests.reply(new, Result(False, 'repeated', superseded=True))
-        elif is_held or self._is_right(new, off_is_under_way=off_is_under_way):
+        elif is_held or self._is_right(new):
             if new.is_call and not is_held and not requests.are_calling:
                 self._rules.silence.calling_since = now
             requests.put(new, now)
-        return False
 
-    def _refuse_lost(self, new: Request, now: float, *, is_off: bool, is_held: bool) -> bool:
+    def _refuse_lost(self, new: Request, now: float, *, is_off: bool, is_held: bool) -> None:
         """Refuse a request to a light that is lost: only an OFF has an effect later."""
         requests, liveness = self._requests, self._liveness
         # It may hear though it is not heard.
         is_sent = is_off and not is_held and self.send_unheard_off()
+        if is_sent:
+            self._switch.note_sent(OFF, now)
         refusal = requests.refusal(new.source) or liveness.loss(
             f'light {self._target.address}', now)
         requests.reply(new, Result(
@@ -81,7 +80,6 @@ class UserRequests:
             requests.put(new, now)
         elif is_off and not is_held:
             requests.forget({'enabled': None}, new.source)
-        return is_sent
 
     def send_unheard_off(self) -> bool:
         """Send an OFF once, without an attempt; return whether the link is open for it."""
@@ -105,23 +103,23 @@ class UserRequests:
         is_settled = self._twin.shows(name, value) and new.values != {'enabled': False}
         return is_settled or now < old.since + REPEAT_TIME
 
-    def _is_right(self, new: Request, *, off_is_under_way: bool) -> bool:
+    def _is_right(self, new: Request) -> bool:
         """Check the values of a request, and answer one that the light must not get."""
         try:
             if 'enabled' not in new.values:
-                self._check(new, off_is_under_way=off_is_under_way)
+                self._check(new)
         except InvalidValue as error:
             self._requests.reply(new, Result(False, str(error), permanent=True))
             return False
         return True
 
-    def _check(self, new: Request, *, off_is_under_way: bool) -> None:
+    def _check(self, new: Request) -> None:
         twin = self._twin
         new.values = {name: checked(name, value, twin.strobe_range)
                       for name, value in new.values.items()}
         for one in new.values.items():
             self._rules.settings.limits.check(*one)
-        if (off_is_under_way and new.is_call and twin.brightness_is_switch is None
+        if (self._switch.is_under_way(OFF) and new.is_call and twin.brightness_is_switch is None
                 and 'brightness' not in new.values):
             raise InvalidValue('an OFF is under way, which the brightness in this command '
                                'may undo; repeat it')

@@ -245,7 +245,7 @@ class Attempt(Generic[S]):
     def serve(self, parts: Mapping[Request, Change[S]]) -> None:
         """Serve requests that were made before the command was sent."""
         for one, change in parts.items():
-            one.is_under_way = True
+            one.is_served = True
             self._parts[one] = change
 
     # The command
@@ -321,7 +321,7 @@ class Attempt(Generic[S]):
         """Send it no more; its requests stay open."""
         self._target.commands.cancel(self._transmission, now)
         for one in self._parts:
-            one.is_under_way = False
+            one.is_served = False
 
     # The acknowledgement
 

@@ -21,6 +21,19 @@ MAX_VALUES = 128
 Plan = Callable[[Goal], tuple[Change[S], Mapping[Request, Change[S]]]]
 
 
+def plan_of(make: Callable[[Goal], Change[S]]) -> Plan[S]:
+    """
+    Return a plan in which each request asks for the whole command.
+
+    :param make: returns the command of a goal.
+    """
+    def plan(goal: Goal) -> tuple[Change[S], Mapping[Request, Change[S]]]:
+        change = make(goal)
+        return change, dict.fromkeys(goal.serves, change)
+
+    return plan
+
+
 class Property(Generic[S]):
     """
     Moves one property of a device to what is wanted. No I/O; times are s.
@@ -30,12 +43,13 @@ class Property(Generic[S]):
 
     :param plan: makes the command of a goal.
     :ivar attempt: the command that is under way, None if there is none.
-    :ivar fence: until then the frames of a command that ended unconfirmed may be under way, s.
+    :ivar fence_ends_at: until then, s, frames of a command that ended unconfirmed may be under
+        way.
     """
 
     def __init__(self, target: Target, plan: Plan[S]) -> None:
         self.attempt: Attempt[S] | None = None
-        self.fence = -math.inf
+        self.fence_ends_at = -math.inf
         self._target = target
         self._plan = plan
         # The frames of the last command that were not acknowledged.
@@ -82,7 +96,7 @@ class Property(Generic[S]):
         change, parts = self._plan(goal)
         if self._under_way:
             self._under_way = {value: end for value, end in self._under_way.items() if now < end}
-        fence = Fence(self.fence, self._frames if now < self.fence else 0,
+        fence = Fence(self.fence_ends_at, self._frames if now < self.fence_ends_at else 0,
                       self._is_proved(change, goal, now, newest))
         self.attempt = Attempt(self._target, change, goal, parts, now, fence=fence, gap=gap)
 
@@ -115,9 +129,9 @@ class Property(Generic[S]):
         return [Served(one, attempt.change, Result(False, text, superseded=True))
                 for one in served]
 
-    def fence_until(self, fence: float) -> None:
+    def fence_until(self, time: float) -> None:
         """Count nothing before a time: other commands that may set the property are under way."""
-        self.fence = max(self.fence, fence)
+        self.fence_ends_at = max(self.fence_ends_at, time)
 
     def note_sent(self, change: Change[S], now: float) -> None:
         """Note that a change was sent without an attempt that awaits its effect."""
@@ -131,7 +145,7 @@ class Property(Generic[S]):
 
         :param gap: since the one before.
         """
-        if (self._unconfirmed is not None and now >= self.fence
+        if (self._unconfirmed is not None and now >= self.fence_ends_at
                 and self._unconfirmed.shown_by(status)):
             self._unconfirmed = None
         if self.attempt is None:
@@ -173,10 +187,15 @@ class Property(Generic[S]):
         # The effect of a command that was withdrawn may come later.
         if result.superseded or self._frames:
             self.fence_until(attempt.last_sent + FENCE)
-        if now < self.fence and len(self._under_way) < MAX_VALUES:
-            self._under_way[attempt.change.value] = self.fence
+        if now < self.fence_ends_at and len(self._under_way) < MAX_VALUES:
+            self._under_way[attempt.change.value] = self.fence_ends_at
 
     # Known facts
+
+    @property
+    def is_busy(self) -> bool:
+        """Whether a command is under way."""
+        return self.attempt is not None
 
     @property
     def sent_at(self) -> float:

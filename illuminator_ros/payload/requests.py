@@ -90,7 +90,7 @@ class Request:
     :param due: s; it is not sent before.
     :ivar is_open: whether it is still to be reached. What a status has shown is not sent again if
         another sender changes it; a hand-over opens it again.
-    :ivar is_under_way: whether an attempt serves it, which ends it.
+    :ivar is_served: whether an attempt serves it, which ends it.
     :ivar may_be_repeated: whether an equal message of its source is a repetition.
     :ivar tried: how often a rule has failed, and ``failure`` why it failed last.
     """
@@ -105,7 +105,7 @@ class Request:
     until: float = math.inf
     due: float = -math.inf
     is_open: bool = True
-    is_under_way: bool = False
+    is_served: bool = False
     may_be_repeated: bool = True
     tried: int = 0
     failure: str = ''
@@ -120,6 +120,15 @@ class Request:
         if self.is_wish and old.is_call and 'enabled' not in self.values:
             return False
         return any(old.values.get(name, value) != value for name, value in self.values.items())
+
+    def ends(self, old: Request) -> bool:
+        """Return whether making it ends an older request; a newer wish replaces the older one."""
+        if not old.is_open or old.why not in ENDS.get(self.why, ()) or not self.contradicts(old):
+            return False
+        # A call that fails leaves nothing behind, so the OFF of a release stays until it succeeds.
+        is_call_and_release = (old.is_call and self.why is Why.RELEASE
+                               or self.is_call and old.why is Why.RELEASE)
+        return not is_call_and_release and not (old.is_wish and self.is_wish)
 
 
 class Goal(NamedTuple):
@@ -269,11 +278,7 @@ class Requests:
         for old in [*self.standing]:
             if is_request and old.why is Why.REQUEST and old.source != new.source:
                 self._take_from(old, f'held by {new.source}', now)
-            elif (old.is_open and old.why in ENDS.get(new.why, ()) and new.contradicts(old)
-                  # A call that fails leaves nothing behind, and a rule that it outranks stays.
-                  and not (old.is_call and new.why is Why.RELEASE)
-                  and not (new.is_call and old.why is Why.RELEASE)
-                  and not (old.is_wish and new.is_wish)):
+            elif new.ends(old):
                 self.end(old, Result(False, text, superseded=True), now)
         if new.values.get('enabled') is False:
             # An OFF ends an ON that is remembered, though it may fail.
@@ -317,10 +322,10 @@ class Requests:
             names = old.values.keys() & new.values.keys()
             if not names or old.since > new.since:
                 continue
-            if old.is_under_way:
+            if old.is_served:
                 # Its attempt ends it. Other fields stay wanted.
                 self.standing.remove(old)
-                old = replace(old, done=no_reply, is_under_way=False)
+                old = replace(old, done=no_reply, is_served=False)
                 self.standing.append(old)
             self.drop(old, names, text)
         self.standing.append(new)
@@ -340,7 +345,7 @@ class Requests:
 
     def end(self, one: Request, result: Result, now: float) -> None:
         """End a request: the only way out. A call that has succeeded claims the device."""
-        is_known, one.is_open, one.is_under_way = one in self.standing, False, False
+        is_known, one.is_open, one.is_served = one in self.standing, False, False
         if is_known and not (one.is_wish and self.claims.is_claimed_by(one.source)):
             self.standing.remove(one)
         if result.success and one.why is Why.REQUEST:
@@ -401,21 +406,21 @@ class Requests:
         change = self.claims.release(source, now)
         if calls and was_commander and change is None:
             change = HolderChanged(source, self.claims.holder, Cause.RELEASE)
-        return self._expired(change, before, now)
+        return self._end_unclaimed(change, before, now)
 
     def expire(self, now: float) -> HolderChanged[str] | None:
         """End the claims of silent sources; return the change of the holder."""
         if not self.are_ranked or now < self.claims.due:
             return None
         before = self._claimed()
-        return self._expired(self.claims.poll(now), before, now)
+        return self._end_unclaimed(self.claims.poll(now), before, now)
 
     def _claimed(self) -> set[str]:
         """Return the sources with wishes that have claimed the device."""
         return {one.source for one in self.standing
                 if one.is_wish and self.claims.is_claimed_by(one.source)}
 
-    def _expired(
+    def _end_unclaimed(
         self, change: HolderChanged[str] | None, before: set[str], now: float,
     ) -> HolderChanged[str] | None:
         """

@@ -24,7 +24,7 @@ from illuminator_ros.mavlink.device_kind import DeviceKind
 from illuminator_ros.mavlink.dialect import mavlink
 from illuminator_ros.mavlink.messages import Address, AnyCommand, Heartbeat, Message
 from illuminator_ros.payload.attempt import Change, Sending, Served, Target
-from illuminator_ros.payload.device_property import Property
+from illuminator_ros.payload.device_property import plan_of, Property
 from illuminator_ros.payload.discovery import Discovery
 from illuminator_ros.payload.listeners import Listeners
 from illuminator_ros.payload.liveness import Liveness
@@ -70,7 +70,7 @@ class Winch:
         self._status: WinchStatus | None = None
         self._length: Property[WinchStatus] = Property(
             Target(address, commands, 'winch', self.poll, WinchStatus.id, WinchStatus.msgname),
-            self._plan)
+            plan_of(self._change))
 
     @property
     def lost_at(self) -> float:
@@ -100,10 +100,9 @@ class Winch:
                                        is_call=True), now)
             self._step(now)
 
-    def _plan(self, goal: Goal) -> tuple[Change[WinchStatus], dict[Request, Change[WinchStatus]]]:
+    def _change(self, goal: Goal) -> Change[WinchStatus]:
         out = self._status.line_length if self._status else 0.0
-        change = release(goal.values, out + goal.values)
-        return change, dict.fromkeys(goal.serves, change)
+        return release(goal.values, out + goal.values)
 
     def _step(self, now: float) -> None:
         """Send what is wanted, and answer those whose requests have ended."""
