@@ -140,23 +140,6 @@ def test_a_light_that_reports_the_period_of_its_sync_signal_gets_one_within_its_
     assert sent(pair)[-1][:3] == pytest.approx((2, 40, sent_period))
 
 
-def test_a_setpoint_is_sent_though_the_parameters_do_not_follow_a_changing_light(
-    fake: FakeLight, faked: Pair,
-) -> None:
-    for number in range(6):
-        fake.fields['brightness'] = 80.0 if number % 2 else 20.0
-        faked.run(1.0)
-    agreed = confirmed(faked).brightness
-    fake.fields['brightness'] = 100.0 - agreed
-    faked.run(1.0)
-    assert faked.snapshot.states_are_changing
-    assert confirmed(faked).brightness == agreed
-    faked.light.set_brightness(agreed, faked.now)
-    faked.run(1.0)
-
-    assert fake.fields['brightness'] == agreed
-
-
 def test_before_the_first_status_only_a_complete_set_is_sent() -> None:
     pair = Pair(mute()).settle()
     assert pair.snapshot.configuration is None
@@ -212,33 +195,6 @@ def test_a_change_by_another_sender_is_followed_with_one_event_and_no_command(
     assert confirmed(strobe) == replace(confirmed(strobe), **change)
 
 
-def test_the_next_command_builds_on_a_change_by_another_sender(
-    fake: FakeLight, strobe: Pair,
-) -> None:
-    fake.fields['strobe_period'] = 2.0
-    strobe.run(1.0)
-    strobe.configure(brightness=30)
-    assert sent(strobe)[-1] == (1, 30, 2, 50)
-
-
-def test_a_first_status_that_is_implausible_confirms_nothing(fake: FakeLight) -> None:
-    fake.fields['brightness'] = float('nan')
-    pair = Pair(fake).settle()
-    assert pair.snapshot.configuration is None
-    fake.fields['brightness'] = 10.0
-    pair.run(1.0)
-    assert confirmed(pair).brightness == 10.0
-
-
-@pytest.mark.parametrize('value', [60.1, 33.3, 0.1, 99.9])
-def test_float32_rounding_is_not_a_change(faked: Pair, value: float) -> None:
-    faked.configure(brightness=value, strobe_duty_cycle=value)
-    faked.run(10.0)
-    assert [cause for cause, _ in faked.recorder.changes] == [
-        ChangeCause.FIRST_STATUS, ChangeCause.REQUEST]
-    assert confirmed(faked).brightness == value
-
-
 def test_under_external_sync_only_the_mode_is_followed(fake: FakeLight, strobe: Pair) -> None:
     before = confirmed(strobe)
     fake.fields |= {'mode': 2, 'brightness': 10.0, 'strobe_period': 0.0}
@@ -269,14 +225,6 @@ def test_a_change_by_a_failed_command_or_during_it_is_followed_after_it(
     fake.fields |= change
     strobe.run(2.0)
     assert strobe.recorder.changes[1:] == [(cause, change)]
-
-
-def test_small_steps_add_up_to_a_change(fake: FakeLight, strobe: Pair) -> None:
-    for _ in range(5):
-        fake.fields['brightness'] -= 0.4
-        strobe.run(1.0)
-    assert confirmed(strobe).brightness == 78.0
-    assert [cause for cause, _ in strobe.recorder.changes].count(ChangeCause.LIGHT) == 2
 
 
 def test_a_discrepancy_ends_when_another_sender_changes_the_light(
@@ -335,25 +283,6 @@ def test_one_command_is_in_flight_at_any_rate_and_the_newest_setpoint_wins(
     assert pair.recorder.failed_setpoints == []
 
 
-def test_the_parameter_follows_a_stream_that_is_faster_than_its_confirmation(
-    fake: FakeLight,
-) -> None:
-    pair = Pair(fake, there=Faults(latency=0.1)).settle()
-    publish(pair, *(10.0 + value / 2 for value in range(100)), rate=50)
-    followed = [change['brightness'] for cause, change in pair.recorder.changes[1:]
-                if cause is ChangeCause.REQUEST]
-    assert len(followed) >= 5
-    assert followed == sorted(followed)
-
-
-def test_a_setpoint_is_sent_once_with_the_other_fields_as_confirmed(pair: Pair) -> None:
-    pair.configure(strobe_period=2)
-    publish(pair, *[40.0] * 100, rate=100)
-    pair.run(1.0)
-    assert sent(pair)[1:] == [(1, 40, 2, 50)]
-    assert confirmed(pair).brightness == 40.0
-
-
 @pytest.mark.parametrize(('values', 'light', 'then', 'last'), [
     # The light takes 30 and cannot report it: it may be at 30 or at 100.
     ([30.0], {'results': {CONFIGURE: None}, 'stream': 0.0, 'answers': set(),
@@ -376,56 +305,6 @@ def test_a_setpoint_is_sent_again_where_the_light_may_have_another_value(
     publish(faked, last)
     faked.run(1.0)
     assert fake.fields['brightness'] == last
-
-
-def test_setpoints_that_come_while_one_is_under_way_are_replaced_by_the_newest(
-    fake: FakeLight, faked: Pair,
-) -> None:
-    fake.apply_after = 0.2
-    publish(faked, 40.0, 50.0, 40.0)
-    faked.run(2.0)
-    assert sent(faked) == [(1, 40, 0, 0)] * 2
-    assert confirmed(faked).brightness == 40.0
-
-
-def test_the_last_setpoint_is_verified(fake: FakeLight, faked: Pair) -> None:
-    fake.applies = False
-    publish(faked, 30.0, 40.0)
-    faked.run(2.0)
-    _, message = faked.recorder.failed_setpoints
-    assert 'brightness 40 % not confirmed: MAV_RESULT_ACCEPTED, but' in message
-
-
-def test_a_stream_goes_on_after_a_failure(fake: FakeLight, faked: Pair) -> None:
-    fake.results[CONFIGURE] = [mavlink.MAV_RESULT_FAILED, ACCEPTED]
-    publish(faked, 30.0, 40.0)
-    faked.run(0.5)
-    assert faked.recorder.failed_setpoints[0].startswith('refused: MAV_RESULT_FAILED')
-    assert fake.fields['brightness'] == 40.0
-
-
-def test_a_setpoint_before_the_first_status_fails_with_the_reason() -> None:
-    pair = Pair(mute()).settle()
-    publish(pair, 40.0)
-    assert 'has not reported its configuration yet' in pair.recorder.failed_setpoints[0]
-    pair.run(1.0)
-    assert sent(pair) == []
-
-
-def test_a_setpoint_waits_for_a_set_and_does_not_end_it(fake: FakeLight, faked: Pair) -> None:
-    fake.apply_after = 0.3
-    answer = faked.ask_configure(mode='external_sync')
-    publish(faked, 40.0)
-    assert faked.wait_for(answer).success
-    faked.run(1.0)
-    assert (confirmed(faked).mode, confirmed(faked).brightness) == (Mode.EXTERNAL_SYNC, 40.0)
-
-
-def test_a_stream_does_not_keep_overrides_from_being_sent(fake: FakeLight, faked: Pair) -> None:
-    fake.results[CONFIGURE] = [None, None, None, ACCEPTED]
-    faked.light.require({'strobe_period': 2.0}, faked.now)
-    publish(faked, *[value % 100 / 1.0 for value in range(400)], rate=50)
-    assert fake.fields['strobe_period'] == 2.0
 
 
 # Overrides
@@ -536,53 +415,6 @@ def test_overrides_that_a_light_accepts_and_does_not_show_are_sent_at_growing_in
     assert confirmed(pair).brightness == 80.0
 
 
-def test_an_override_that_the_status_cannot_show_is_sent_until_it_is_acknowledged(
-    fake: FakeLight,
-) -> None:
-    fake.fields['mode'] = 2
-    fake.results[CONFIGURE] = None
-    pair = overriding(fake, brightness=30.0).settle(10.0)
-    assert successes(pair) == [False]
-    fake.results[CONFIGURE] = ACCEPTED
-    pair.run(20.0)
-    assert successes(pair) == [False, True]
-
-
-def test_an_off_does_not_replace_overrides_that_wait(fake: FakeLight) -> None:
-    fake.results[CONFIGURE] = None
-    pair = overriding(fake, brightness=30.0).settle()
-    assert pair.enable(False).success
-    fake.results[CONFIGURE] = ACCEPTED
-    pair.run(5.0)
-    assert fake.fields['brightness'] == 30.0
-
-
-def test_another_sender_is_followed_while_overrides_get_no_answer(fake: FakeLight) -> None:
-    fake.results[CONFIGURE] = None
-    pair = overriding(fake, brightness=30.0).settle(5.0)
-    fake.fields['strobe_period'] = 2.0
-    pair.run(5.0)
-    assert confirmed(pair).strobe_period == 2.0
-    fake.results[CONFIGURE] = ACCEPTED
-    pair.run(5.0)
-    assert (fake.fields['brightness'], fake.fields['strobe_period']) == (30.0, 2.0)
-
-
-def test_a_field_that_was_set_meanwhile_is_not_overridden(fake: FakeLight) -> None:
-    fake.results[CONFIGURE] = None
-    pair = overriding(fake, brightness=30.0, strobe_period=2.0).settle(1.5)
-    fake.results[CONFIGURE] = ACCEPTED
-    assert pair.configure(brightness=70).success
-    pair.run(10.0)
-    assert (fake.fields['brightness'], fake.fields['strobe_period']) == (70.0, 2.0)
-
-
-def test_complete_overrides_reach_a_light_that_sends_no_status() -> None:
-    pair = overriding(mute(), mode=Mode.EXTERNAL_SYNC, brightness=30.0, strobe_period=0.0,
-                      strobe_duty_cycle=0.0).settle(20.0)
-    assert sent(pair) == [(2, 30, 0, 0)]
-
-
 def test_overrides_that_wait_for_a_status_are_reported_once(fake: FakeLight) -> None:
     fake.fields['strobe_duty_cycle'] = float('nan')
     pair = overriding(fake, brightness=60.0).settle(30.0)
@@ -593,18 +425,6 @@ def test_overrides_that_wait_for_a_status_are_reported_once(fake: FakeLight) -> 
     fake.fields['strobe_duty_cycle'] = 0.0
     pair.run(3.0)
     assert fake.fields['brightness'] == 60.0
-
-
-def test_overrides_that_wait_for_another_try_are_sent_as_soon_as_the_light_is_heard_again(
-    fake: FakeLight,
-) -> None:
-    fake.results[CONFIGURE] = None
-    pair = overriding(fake, brightness=30.0).settle(60.0)
-    fake.results.clear()
-    pair.close()
-    pair.open()
-    pair.run(0.1)
-    assert fake.fields['brightness'] == 30.0
 
 
 # Restarts
@@ -652,51 +472,6 @@ def test_after_a_restart_a_light_that_is_dimmed_by_heat_is_sent_its_configuratio
     assert sent(agreed, since=at) == [(1, 30, 2, 40)]
 
 
-def test_a_second_restart_while_the_configuration_is_restored_is_noticed(
-    fake: FakeLight, agreed: Pair,
-) -> None:
-    fake.apply_after = 0.3
-    for seconds in (0.1, 10.0):
-        fake.restart(agreed.now)
-        agreed.run(seconds)
-    assert (fake.fields['brightness'], fake.fields['strobe_period']) == (30.0, 2.0)
-
-
-def test_a_field_set_while_the_configuration_is_restored_keeps_its_value(
-    fake: FakeLight, agreed: Pair,
-) -> None:
-    fake.results[CONFIGURE] = [None] * 8 + [ACCEPTED]
-    fake.restart(agreed.now)
-    agreed.run(1.2)
-    agreed.configure(brightness=70)
-    agreed.run(20.0)
-    assert agreed.configure(brightness=70).success
-    agreed.run(10.0)
-    assert (fake.fields['brightness'], fake.fields['strobe_period']) == (70.0, 2.0)
-
-
-@pytest.mark.parametrize('is_stream', [False, True])
-def test_setting_all_values_to_be_restored_ends_the_restoration(
-    fake: FakeLight, is_stream: bool,
-) -> None:
-    pair = Pair(fake).settle()
-    assert pair.configure(brightness=30).success
-    fake.results[CONFIGURE] = None
-    fake.restart(pair.now)
-    pair.run(5.0)
-    fake.results[CONFIGURE] = ACCEPTED
-    pair.run_until(lambda: not pair.light.snapshot(pair.now).discrepancy)
-    assert pair.configure(**{name: value for name, value in ALL.items()
-                             if not is_stream or name != 'brightness'}).success
-    if is_stream:
-        publish(pair, 70.0)
-        pair.run_until(lambda: confirmed(pair).brightness == 70.0)
-    # Another sender dims the light before the next status; the parameter must follow.
-    fake.fields['brightness'] = 20.0
-    pair.run(5.0)
-    assert confirmed(pair).brightness == 20.0
-
-
 def test_a_light_that_refuses_the_restored_configuration_is_followed(
     fake: FakeLight, agreed: Pair,
 ) -> None:
@@ -719,13 +494,3 @@ def test_values_within_the_limits_that_a_restart_makes_obsolete_leave_no_discrep
     fake.restart(pair.now, brightness=20.0)
     pair.run(2.0)
     assert pair.snapshot.discrepancy == ''
-
-
-def test_a_light_that_restarts_is_followed_where_restoring_is_switched_off(
-    fake: FakeLight,
-) -> None:
-    pair = overriding(fake, LightSettings(restore_configuration=False), brightness=30.0).settle()
-    fake.restart(pair.now)
-    pair.run(10.0)
-    assert len(sent(pair)) == 1
-    assert pair.recorder.changes[-1] == (ChangeCause.LIGHT, {'brightness': 100.0})

@@ -24,12 +24,12 @@ from illuminator_ros.illuminator.simulated_properties import (
     IlluminatorProperties,
 )
 from illuminator_ros.mavlink.dialect import mavlink
-from illuminator_ros.mavlink.messages import Address, CommandAck
+from illuminator_ros.mavlink.messages import Address
 from illuminator_ros.payload.command_sources import SourceSettings
 from illuminator_ros.payload.device_events import DeviceHeld
 from illuminator_ros.payload.requests import Result
 import pytest
-from support.back_to_back import BRIDGE, Pair
+from support.back_to_back import Pair
 from support.fake_light import FakeLight
 from support.random_users import RandomUsers
 from support.wire import Faults
@@ -139,35 +139,6 @@ def ending(light: FakeLight) -> Ending:
     return Ending(Pair(light).settle())
 
 
-@pytest.mark.parametrize('off', [True, False])
-def test_a_closed_bridge_sends_no_change_but_off_where_that_is_asked_for(
-    ending: Ending, off: bool,
-) -> None:
-    pair = ending.pair
-    under_way = [pair.ask_enable(True), pair.ask_configure(brightness=20.0), pair.ask_refresh()]
-    ending.begin(off=off)
-    later = [pair.ask_enable(True), pair.ask_enable(False), pair.ask_configure(brightness=30.0),
-             pair.ask_refresh()]
-    pair.light.set_brightness(40.0, pair.now)
-    pair.light.require({'brightness': 50.0}, pair.now)
-    pair.run(LIMIT)
-
-    assert {answer.result.message for answer in under_way + later} == {ENDING}
-    assert set(ending.changes()) == ({(ON_OFF, 0.0)} if off else set())
-    assert pair.recorder.failed_setpoints == []
-
-
-def test_the_off_at_the_end_is_sent_at_once_though_the_light_has_just_shown_off(
-    ending: Ending,
-) -> None:
-    pair = ending.pair
-    assert pair.enable(False).success
-    pair.ask_enable(True)
-    ending.begin()
-
-    assert ending.changes() == [(ON_OFF, 0.0)]
-
-
 @pytest.mark.parametrize('is_switch', [False, True])
 def test_an_on_that_the_off_overtakes_on_the_way_is_followed_by_another_off(
     ending: Ending, light: FakeLight, is_switch: bool,
@@ -191,20 +162,6 @@ def test_an_on_that_the_off_overtakes_on_the_way_is_followed_by_another_off(
     pair.run_until(lambda: ending.reports[light.source].success, within=LIMIT)
 
     assert light.fields['enable'] == 0
-
-
-def test_an_off_is_repeated_so_often_that_some_of_its_frames_may_be_lost(
-    ending: Ending, light: FakeLight,
-) -> None:
-    wire = ending.pair.near.wire
-    wire.faults, faultless = replace(wire.faults, drop=1.0), wire.faults
-    ending.begin()
-    ending.pair.run(0.35)
-    wire.faults = faultless
-    ending.pair.run(0.15)
-
-    assert light.fields['enable'] == 0
-    assert ending.reports[light.source].success
 
 
 def test_an_end_without_an_on_under_way_is_as_short_as_the_round_trip(
@@ -270,22 +227,6 @@ def test_a_light_that_is_found_or_heard_again_during_the_end_is_switched_off() -
     assert all(ending.reports[one.address].success for one in (found, heard))
 
 
-def test_a_light_that_hears_but_is_not_heard_is_switched_off_and_reported_as_lost(
-    ending: Ending, light: FakeLight,
-) -> None:
-    wire = ending.pair.far.wire
-    wire.faults = replace(wire.faults, drop=1.0)
-    ending.pair.run(4.0)
-    ending.begin()
-    ending.pair.run(LIMIT)
-
-    assert light.fields['enable'] == 0
-    # The bridge waits: a serial line takes 8 ms for an OFF, and what waits at its end is dropped.
-    report = ending.reports[light.source]
-    assert (report.success, report.permanent, report.message.partition(':')[0]) == (
-        False, False, 'light 1/243 is lost')
-
-
 @pytest.mark.parametrize(('enabled', 'ask', 'may_be_left_on'), [
     (1, None, True), (0, None, False), (0, True, True), (0, False, False)])
 def test_a_light_that_is_on_or_gets_an_on_may_be_left_on_without_an_off(
@@ -317,25 +258,6 @@ def test_a_light_that_does_not_show_off_gets_it_until_the_end_and_is_reported_wi
 
     assert ending.reports[light.source] == Result(False, reason)
     assert len(ending.changes()) >= 3
-
-
-@pytest.mark.parametrize('result', [
-    mavlink.MAV_RESULT_DENIED, mavlink.MAV_RESULT_FAILED, mavlink.MAV_RESULT_ACCEPTED])
-def test_a_light_that_shows_off_stays_reported_whatever_the_late_acknowledgement_is(
-    ending: Ending, light: FakeLight, result: int,
-) -> None:
-    light.results[ON_OFF] = None
-    ending.begin()
-    light.fields['enable'] = 0
-    # Without an acknowledgement a status counts after three tries.
-    ending.pair.run(0.1)
-    assert not ending.reports[light.source].success
-    ending.pair.run(0.2)
-    assert ending.reports[light.source].success
-    light.send(CommandAck(ON_OFF, result, 0, 0, *BRIDGE))
-    ending.pair.run(0.3)
-
-    assert ending.reports[light.source].success
 
 
 def test_a_status_that_may_be_older_than_the_off_is_followed_by_a_request_for_another(

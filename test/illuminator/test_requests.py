@@ -11,13 +11,10 @@ import re
 from typing import Any
 
 from illuminator_ros.illuminator.client import enable_all
-from illuminator_ros.illuminator.events import LATE_EFFECT, LightSwitched
 from illuminator_ros.illuminator.messages import STATUS_ID
 from illuminator_ros.illuminator.simulated_properties import IlluminatorProperties
 from illuminator_ros.mavlink import messages as mav
 from illuminator_ros.mavlink.dialect import mavlink
-from illuminator_ros.mavlink.retries import UNCONFIRMED
-from illuminator_ros.payload.attempt import FENCE, PROGRESS_LIMIT
 from illuminator_ros.payload.identity import Identity
 from illuminator_ros.payload.requests import Result
 import pytest
@@ -91,28 +88,6 @@ def test_the_answer_to_a_switch_says_what_the_light_did(
     assert answer.seconds <= 2.8
 
 
-def test_switches_that_follow_each_other_within_a_millisecond_are_confirmed_at_once() -> None:
-    fake = FakeLight(stream=0.3)
-    change(fake, pushes=True)
-    pair = Pair(fake, there=Faults(latency=0.0001)).settle()
-    for on in (True, False) * 20:
-        answer = pair.ask_enable(on)
-        assert pair.wait_for(answer).success
-        assert answer.seconds < 0.001
-
-
-def test_progress_is_waited_for_up_to_a_limit(fake: FakeLight, faked: Pair) -> None:
-    fake.results[ON_OFF] = None
-    answer = faked.ask_enable(True)
-    while not answer.results and faked.now < answer.asked_at + 60.0:
-        fake.send(mav.CommandAck(ON_OFF, IN_PROGRESS, 50, 0, *BRIDGE))
-        faked.run(1.0)
-    assert not answer.result.success
-    assert 'MAV_RESULT_IN_PROGRESS at 50 %' in answer.result.message
-    assert answer.seconds == pytest.approx(PROGRESS_LIMIT)
-    assert len(faked.commands(ON_OFF)) == 1
-
-
 @pytest.mark.parametrize(('is_closed', 'reason'), [
     (False, 'no heartbeat for 10.00 s'), (True, 'the link is not open: closed')])
 def test_requests_to_a_lost_light_fail_at_once_with_the_reason(
@@ -136,21 +111,6 @@ def test_requests_to_a_lost_light_fail_at_once_with_the_reason(
     assert [one.param1 for one in faked.commands()[sent:]] == [0.0] * (not is_closed)
 
 
-def test_an_off_that_was_sent_to_a_lost_light_is_no_switch_of_another_sender(
-    fake: FakeLight, faked: Pair,
-) -> None:
-    assert faked.enable(True).success
-    fake.silent = True
-    faked.run(10.0)
-    faked.ask_enable(False)
-    fake.silent = False
-    fake.fields['enable'] = 0
-    faked.run(3.0)
-
-    assert [one.origin for one in faked.recorder.others
-            if isinstance(one, LightSwitched)][1:] == [LATE_EFFECT]
-
-
 def test_after_a_stop_of_the_process_a_request_that_may_be_old_is_refused_but_not_an_off(
     fake: FakeLight, faked: Pair,
 ) -> None:
@@ -168,34 +128,6 @@ def test_after_a_stop_of_the_process_a_request_that_may_be_old_is_refused_but_no
 
 # Several requests
 
-def test_an_off_that_replaces_an_on_is_sent_at_once_and_confirmed_after_the_fence(
-    fake: FakeLight, faked: Pair,
-) -> None:
-    fake.results[ON_OFF] = [None, ACCEPTED]
-    on, off = faked.ask_enable(True), faked.ask_enable(False)
-    assert on.result.message == 'superseded by off'
-    assert [bool(m.param1) for m in faked.commands(ON_OFF)] == [True, False]
-    assert faked.wait_for(off).success
-    assert FENCE <= off.seconds < FENCE + 0.01
-    # The tries within the fence are repeated each 250 ms.
-    tries = round(FENCE / UNCONFIRMED.first) + 1
-    assert (timing(off.result.message)[0], len(faked.commands(ON_OFF))) == (tries, 1 + tries)
-
-
-def test_sets_of_different_fields_share_a_command_and_are_answered_by_their_own_values(
-    fake: FakeLight, faked: Pair,
-) -> None:
-    fake.apply_after = 0.1
-    first, second = faked.ask_configure(brightness=50), faked.ask_configure(strobe_period=1)
-    assert not first.results
-    for answer, text in ((first, 'brightness 50 %, confirmed by'),
-                         (second, 'strobe_period 1 s, strobe_duty_cycle 50 %, confirmed by')):
-        result = faked.wait_for(answer)
-        assert result.success
-        assert result.message.startswith(text)
-    assert [(m.param2, m.param3) for m in faked.commands(CONFIGURE)][:2] == [(50, 0), (50, 1)]
-
-
 def test_a_set_succeeds_by_its_own_value_though_the_light_keeps_another_field(
     fake: FakeLight, faked: Pair,
 ) -> None:
@@ -209,112 +141,6 @@ def test_a_set_succeeds_by_its_own_value_though_the_light_keeps_another_field(
     assert faked.snapshot.discrepancy
 
 
-def test_a_set_ends_an_earlier_one_that_wants_another_value_of_one_of_its_fields(
-    fake: FakeLight, faked: Pair,
-) -> None:
-    fake.apply_after = 0.1
-    first = faked.ask_configure(brightness=50, strobe_duty_cycle=20)
-    second = faked.ask_configure(brightness=60)
-    assert first.result.message == 'superseded by brightness 60 %'
-    assert faked.wait_for(second).success
-    assert fake.fields['brightness'] == 60.0
-
-
-def test_a_program_that_sets_each_second_is_not_locked_out_by_a_set_that_failed(
-    fake: FakeLight, faked: Pair,
-) -> None:
-    fake.results[CONFIGURE] = [None] * 3 + [ACCEPTED]
-    results = []
-    for brightness in (60, 60, 60, 40, 60):
-        answer = faked.ask_configure(brightness=brightness)
-        results.append(faked.wait_for(answer).success)
-        faked.run(1.0 - answer.seconds)
-    assert results == [False, True, True, True, True]
-
-
-@pytest.mark.parametrize(('later', 'tries'), [(0.1, 'same'), (0.5, 'own')])
-def test_an_equal_set_without_time_for_another_command_gets_the_result_of_the_one_before(
-    fake: FakeLight, faked: Pair, later: float, tries: str,
-) -> None:
-    fake.applies = False
-    first = faked.ask_configure(brightness=50)
-    faked.run(later)
-    second = faked.ask_configure(brightness=50)
-    faked.wait_for(second)
-
-    assert (second.ended_at == first.ended_at) is (tries == 'same')
-
-
-def test_a_stream_of_brightness_is_followed_again_after_a_lost_acknowledgement(
-    fake: FakeLight, faked: Pair,
-) -> None:
-    fake.results[CONFIGURE] = [None, mavlink.MAV_RESULT_ACCEPTED]
-    for number in range(500):
-        if number == 400:
-            begun = faked.now
-        faked.light.set_brightness(10.0 + number % 80, faked.now)
-        faked.turn()
-        faked.run(0.02)
-
-    assert len([at for at, _ in faked.commands_at(CONFIGURE) if at >= begun]) >= 95
-
-
-def test_an_on_of_a_stream_that_waits_is_not_sent_after_a_later_off(
-    fake: FakeLight, faked: Pair,
-) -> None:
-    fake.applies = False
-    answers = [faked.ask_enable(True, is_stream=True) for _ in range(2)]
-    faked.run(0.2)
-    fake.applies = True
-    asked_at = faked.now
-    assert faked.enable(False).success
-    faked.run(10.0)
-    assert not any(m.param1 for m in faked.commands(ON_OFF, since=asked_at))
-    assert [answer.result.superseded for answer in answers] == [True, True]
-
-
-@pytest.mark.parametrize('apart', [0.05, 0.5])
-def test_offs_in_a_row_succeed_though_the_light_takes_its_time(
-    fake: FakeLight, faked: Pair, apart: float,
-) -> None:
-    change(fake, apply_after=0.6, fields={'enable': 1})
-    answers = []
-    for _ in range(4):
-        answers.append(faked.ask_enable(False, is_stream=True))
-        faked.run(apart)
-    faked.run(5.0)
-    assert all(one.result.success or one.result.superseded for one in answers)
-
-
-def test_switches_and_configurations_do_not_wait_for_each_other(
-    fake: FakeLight, faked: Pair,
-) -> None:
-    for kind in (ON_OFF, CONFIGURE):
-        fake.results = {kind: None}
-        answers = {ON_OFF: faked.ask_enable(True), CONFIGURE: faked.ask_configure(brightness=50)}
-        slow = answers.pop(kind)
-        assert all(faked.wait_for(quick).success for quick in answers.values())
-        assert not slow.results
-        faked.run(5.0)
-
-
-def test_requests_fail_with_the_link_and_are_not_sent_later(fake: FakeLight, faked: Pair) -> None:
-    fake.results |= {ON_OFF: None, CONFIGURE: None}
-    answers = [faked.ask_enable(True) for _ in range(5)]
-    answers += [faked.ask_configure(brightness=value) for value in (10, 20, 30)]
-    faked.run(0.1)
-    faked.close()
-    faked.run(0.01)
-    assert {answer.result.message.partition(' (')[0] for answer in answers[:5]} == {
-        'light 1/243 is lost: the link is not open: closed'}
-    assert not any(answer.result.success for answer in answers)
-    faked.run(5.0)
-    at = faked.now
-    faked.open()
-    faked.run(5.0)
-    assert faked.commands(ON_OFF, CONFIGURE, since=at) == []
-
-
 def test_many_lights_are_served_at_once_and_a_dead_one_delays_no_other() -> None:
     addresses = [mav.Address(1, component) for component in range(100, 130)]
     pair = Pair([IlluminatorProperties(address=address) for address in addresses],
@@ -324,27 +150,6 @@ def test_many_lights_are_served_at_once_and_a_dead_one_delays_no_other() -> None
     pair.run(0.25)
     assert [answer.result.success for answer in alive] == [True] * 29
     assert not pair.wait_for(dead).success
-
-
-@pytest.mark.parametrize('kind', [ON_OFF, CONFIGURE])
-def test_an_answer_may_start_the_next_request(pair: Pair, kind: int) -> None:
-    log: list[bool] = []
-
-    def ask(now: float) -> None:
-        if kind == ON_OFF:
-            pair.light.enable(len(log) % 2 == 0, now, done)
-        else:
-            pair.light.configure({'brightness': 10 * len(log)}, now, done)
-
-    def done(result: Result, now: float) -> None:
-        log.append(result.success)
-        if len(log) < 6:
-            ask(now)
-
-    ask(pair.now)
-    pair.turn()
-    pair.run(2.0)
-    assert log == [True] * 6
 
 
 def test_an_answer_that_raises_does_not_hold_up_other_requests(pair: Pair) -> None:
@@ -479,30 +284,6 @@ def test_the_refusal_of_an_identity_does_not_end_the_request_for_a_status() -> N
         'COMPONENT_INFORMATION_BASIC: refused: MAV_RESULT_UNSUPPORTED')
 
 
-def test_the_refusal_of_a_status_that_a_command_requests_does_not_end_the_one_for_an_identity(
-) -> None:
-    light = Requested()
-    pair = Pair(light).settle()
-    change(light, loses=[mav.INFORMATION_ID], refuses=STATUS_ID)
-    refresh = pair.ask_refresh()
-    # By then a status of the stream has ended the other request.
-    pair.run(0.2)
-    assert pair.enable(True).success
-    assert 'COMPONENT_INFORMATION_BASIC: received' in pair.wait_for(refresh).message
-
-
-def test_a_refresh_of_a_light_that_is_lost_and_heard_again_ends(
-    fake: FakeLight, faked: Pair,
-) -> None:
-    change(fake, **NO_STATUS, silent=True)
-    faked.run(1.0)
-    answer = faked.ask_refresh()
-    faked.run_until(lambda: not faked.light.connected)
-    fake.silent = False
-    faked.run(2 * REFRESH_LIMIT)
-    assert not answer.result.success
-
-
 # All lights at once
 
 @pytest.fixture
@@ -558,9 +339,3 @@ def test_an_off_of_all_lights_reaches_each_at_once_though_one_has_not_answered_t
     three.run(0.1)
     assert not first.results
     assert {one.target_component for one in three.commands(ON_OFF, since=pressed_at)} >= {244, 245}
-
-
-def test_a_request_to_all_that_is_replaced_says_so(three: Pair) -> None:
-    replaced = ask_all(three, True)
-    ask_all(three, False)
-    assert replaced.result.superseded

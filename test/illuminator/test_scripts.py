@@ -410,7 +410,7 @@ ROWS: dict[str, Row] = {
         'strobes 1, 3', 'off, default', None, 'superseded by off', DONE, 'an OFF is under way',
         enable=1, **SWITCH),
     # Limits that change.
-    'a lower limit dims at once': row('mark, limit 40, 1', 'off', '40', brightness=40.0),
+    'a lower limit dims before a status': row('mark, limit 40, 0.1', 'off', '40', brightness=40.0),
     'a limit that is taken away is not sent again': row(
         'is CONFIGURE lost, limit 40, 1.2, mark, limit 100, is CONFIGURE obeyed, 10', 'off', '',
         brightness=50.0),
