@@ -1,13 +1,13 @@
 # Copyright 2026 The illuminator_ros developers
 # SPDX-License-Identifier: Apache-2.0
 
-"""Control of a gimbal, and the changes that need a command."""
+"""Control of a gimbal, the moves that it is asked for, and the changes that need a command."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 import math
-from typing import NamedTuple
+from typing import NamedTuple, TypeAlias
 
 from .axes import LEVEL
 from .messages import GimbalManagerStatus, NO_COMPONENT, REMOVE_SENDER, UNCHANGED
@@ -16,7 +16,8 @@ from ..mavlink.dialect import flag_names, mavlink
 from ..mavlink.messages import Address
 from ..payload.attempt import Change
 from ..payload.messages import GeoPoint, GimbalDeviceAttitudeStatus
-from ..payload.mount_attitude import YawFrame
+from ..payload.mount_attitude import STILL, YawFrame
+from ..payload.rotation import Quaternion, Vector
 
 
 @dataclass(frozen=True)
@@ -75,6 +76,11 @@ def configure(us: Address, device_id: int, *, take: bool) -> Change[GimbalManage
         actual=lambda status: str(Control.of(status)))
 
 
+def describe_flags(flags: int) -> str:
+    """Return the flags of a device by name."""
+    return ', '.join(flag_names('GIMBAL_DEVICE_FLAGS', flags)) or 'no flags'
+
+
 class Flag(NamedTuple):
     """
     One flag of the gimbal, set or cleared; the status of the device shows it.
@@ -95,6 +101,15 @@ class Flag(NamedTuple):
         """Whether it alone sets the attitude."""
         return self.flag != mavlink.GIMBAL_DEVICE_FLAGS_YAW_LOCK
 
+    @property
+    def frame(self) -> YawFrame:
+        """Return the frame that yaw has by it; the flags of a pose clear the yaw lock."""
+        return YawFrame.EARTH if self.is_set and not self.is_pose else YawFrame.VEHICLE
+
+    def is_shown(self, status: GimbalDeviceAttitudeStatus) -> bool:
+        """Return whether a status shows it."""
+        return bool(status.flags & self.flag) is self.is_set
+
     def change(self, device_id: int) -> Change[GimbalDeviceAttitudeStatus]:
         """
         Return the change by a flag of a pose.
@@ -106,9 +121,7 @@ class Flag(NamedTuple):
             mavlink.MAV_CMD_DO_GIMBAL_MANAGER_PITCHYAW,
             (*(math.nan,) * 4, setpoint_flags(YawFrame.VEHICLE) | self.flag, 0, device_id),
             self.goal,
-            shown_by=lambda status: bool(status.flags & self.flag),
-            actual=lambda status: ', '.join(
-                flag_names('GIMBAL_DEVICE_FLAGS', status.flags)) or 'no flags')
+            shown_by=self.is_shown, actual=lambda status: describe_flags(status.flags))
 
 
 NEUTRAL = Flag('turn to neutral', 'neutral position', mavlink.GIMBAL_DEVICE_FLAGS_NEUTRAL,
@@ -120,6 +133,31 @@ YAW_LOCKS = {
                mavlink.GIMBAL_DEVICE_CAP_FLAGS_HAS_YAW_LOCK),
     False: Flag('unlock yaw', 'yaw follows the vehicle', mavlink.GIMBAL_DEVICE_FLAGS_YAW_LOCK,
                 0, is_set=False)}
+
+
+@dataclass(frozen=True)
+class Attitude:
+    """
+    An attitude that a message sets.
+
+    :param rotation: with norm 1, from the FLU axes of the gimbal as in
+        :class:`~..payload.mount_attitude.MountAttitude`.
+    """
+
+    rotation: Quaternion
+    frame: YawFrame
+
+
+@dataclass(frozen=True)
+class Rates:
+    """Rates of roll, pitch and yaw in ROS, rad/s, that a message sets."""
+
+    rates: Vector = STILL
+
+
+# A pose, a place, None for no place, and setpoints.
+Move: TypeAlias = Flag | GeoPoint | Attitude | Rates | None
+SETPOINTS = (Attitude, Rates)
 
 
 def point(device_id: int, place: GeoPoint | None) -> Change[None]:

@@ -1,7 +1,36 @@
 # Copyright 2026 The illuminator_ros developers
 # SPDX-License-Identifier: Apache-2.0
 
-"""One gimbal: requests and setpoints of this component, and its control of the gimbal."""
+r"""
+One gimbal, and how a request to it becomes a message and is stopped again.
+
+It has the parts of a light (:mod:`~..illuminator.light`), with two tables of requests::
+
+    move, yaw lock -> requests \
+                                newest -> Property -> commands: control, a pose, a place
+    control        -> control  /      \-> SetpointStream -> messages: setpoints, a zero
+    status, acknowledgement, deadline -> Requests.end, SetpointStream.followed
+
+**Wanted.** A :data:`~.commands.Move` is one field: a pose, a place or none, an attitude, or rates.
+A newer move ends the older one, whatever served it; only a place of a topic waits for the place
+that is under way. An attitude stays open until another request ends it, a rate until its time-out.
+The yaw lock is a field of its own, since setpoints may go on while it is awaited; it ends the move
+and stops the gimbal. All sources need control, so its table has no sources. When the hold of a
+source ends, its requests end: the next holder sends its own.
+
+**Followed.** No status shows a setpoint or a place. :class:`~.setpoint_stream.SetpointStream`
+keeps the move that the gimbal follows as far as is known. A refused move leaves it as it is; a
+place without an answer may be followed.
+
+**Sent.** :meth:`Gimbal._step` runs after each request, status and deadline. A rate that is no
+longer wanted gets a zero, before the command that replaces it. Then
+:class:`~.rate_stop.RateStop` sends the zero until an attitude shows that the gimbal stands:
+nothing else would end a rate whose zero was lost. It waits while a command is under way that may
+turn the gimbal, and ends with the success of such a command, with a new rate, or with control.
+
+**Not solved well.** Two programs that share a source replace the moves of each other. A place that
+was superseded may still be executed, after the request that replaced it.
+"""
 
 from __future__ import annotations
 
@@ -13,46 +42,41 @@ from typing import Any
 from . import events
 from . import messages as gimbal
 from .axes import known_ranges
-from .commands import Flag, setpoint_flags
+from .commands import Attitude, describe_flags, Flag, Move, point, Rates, SETPOINTS
+from .gimbal_commands import CONTROL, GimbalCommands, POSE
 from .gimbal_reports import GimbalReports
-from .gimbal_requests import (
-    CONTROL,
-    describe,
-    GimbalRequests,
-    PLACE,
-    POSE,
-    REQUEST_LIMIT,
-    YAW_LOCK,
-    YawLock,
-)
-from .repetition import Repetition
-from .setpoint_stream import SetpointStream, SuspendedBy
-from ..mavlink.command_sender import CommandSender
+from .setpoint_stream import MOVE, SetpointStream, YAW_LOCK
+from ..mavlink.command_sender import CommandSender, format_seconds
 from ..mavlink.dialect import mavlink
 from ..mavlink.messages import Address
 from ..payload.attempt import Served
 from ..payload.command_sources import DEFAULT, SourceSettings
 from ..payload.device_events import DeviceHeld
 from ..payload.messages import GeoPoint, GimbalDeviceAttitudeStatus
-from ..payload.mount_attitude import STILL, Wxyz, YawFrame
-from ..payload.requests import Done, Request, Requests, Result, Why
+from ..payload.mount_attitude import YawFrame
+from ..payload.requests import Done, Goal, REPEAT_TIME, Request, Requests, Result, Values, Why
 from ..payload.rotation import Quaternion, Vector
 
-# s for which a release of control waits until an attitude shows that the gimbal stands; and at the
-# end of the process, which has less than a second.
-STOP_LIMIT, STOP_LIMIT_AT_END = 5.0, 0.45
+# s; the limits of requests for a pose, a place or control, and for the yaw lock. A release of
+# control waits as long until an attitude shows that the gimbal stands, and at the end of the
+# process, which has less than a second, for the last time.
+REQUEST_LIMIT, LOCK_LIMIT, STOP_LIMIT_AT_END = 5.0, 2.0, 0.45
+# s by which a status may be late: one that shows the lock sooner may be older than the request.
+STATUS_DELAY = 0.2
 # rad; the largest difference of a reported attitude that shows the sent attitude.
 SHOWN_ANGLE = 0.02
+# The result of a setpoint, which is not acknowledged.
+SENT = Result(True, 'sent')
 
 
-SUSPENDED_BY = {POSE: SuspendedBy.POSE, PLACE: SuspendedBy.PLACE}
-
-
-def wish(field: str, value: Any) -> str:
-    """Return what a request asks for, for people."""
+def describe(values: Values) -> str:
+    """Describe the values of a request, for people."""
+    (field, value), = values.items()
     if field == CONTROL:
         return 'take control' if value else 'release control'
-    return describe({field: value}) if field == PLACE else str(value.wish)
+    if isinstance(value, SETPOINTS):
+        return 'a setpoint'
+    return value.wish if isinstance(value, Flag) else point(0, value).goal
 
 
 @dataclass(frozen=True)
@@ -84,7 +108,8 @@ class Gimbal:
     :param manager: has announced it.
     :param emit: takes its events.
     :ivar was_commanded: whether a user has ever sent it a request or a setpoint.
-    :ivar requests: for poses, places and the yaw lock, and the claims of their sources.
+    :ivar requests: for a move and for the yaw lock, and the claims of their sources.
+    :ivar control: the requests for control, which have no source: all sources need it.
     :ivar setpoints: of this component.
     :ivar reports: of its managers and its device; :meth:`update` follows each change of them.
     """
@@ -99,15 +124,14 @@ class Gimbal:
         self.requests = Requests(
             f'gimbal {key}', settings.sources, describe,
             lambda change, now: emit(DeviceHeld(key, change)))
+        self.control = Requests(f'gimbal {key}', None, describe)
         self._commands = commands
         self._settings = settings
         self._emit = emit
-        self._commanded = GimbalRequests(key, manager, commands, self.requests, self.poll)
+        self._commanded = GimbalCommands(key, manager, commands, self.poll)
         self.setpoints = SetpointStream(
-            self._message, commands.send, settings.setpoint_timeout,
+            key, self.reports, commands.send,
             lambda stands: emit(events.RateStopped(key, stands, self.setpoints.rate_stop.turns)))
-        self._yaw_lock = YawLock(self.requests, self.setpoints.hold)
-        self._repetition = Repetition()
         # Whether control must be taken as soon as no component has it.
         self._take_due = False
         # Whether a request for control is under way, or was neither refused nor confirmed.
@@ -123,10 +147,7 @@ class Gimbal:
     def components_lost(self, lost: Collection[Address], now: float, reason: str) -> None:
         """Record that some components cannot be reached, and the reason."""
         if self.reports.lose(lost, now, reason):
-            self._repetition.forget()
-            self._end(reason, now, YAW_LOCK)
-        if self.reports.manager.address in lost:
-            self._end(reason, now, CONTROL, POSE, PLACE)
+            self._end(reason, now, CONTROL, MOVE, YAW_LOCK)
         self.update(now)
         self._step(now)
 
@@ -137,10 +158,8 @@ class Gimbal:
         manager = self.reports.announce(source, now)
         if manager is not None and manager.take_status(status, now):
             self.update(now)
-            if manager is self.reports.manager:
-                self._step(now, self._commanded.reported(CONTROL, status, now))
-            else:
-                self._step(now)
+            self._step(now, self._commanded.reported(CONTROL, status, now)
+                       if manager is self.reports.manager else ())
 
     def take_attitude(self, status: GimbalDeviceAttitudeStatus, now: float) -> None:
         """Take GIMBAL_DEVICE_ATTITUDE_STATUS of the device."""
@@ -149,10 +168,16 @@ class Gimbal:
             return
         self.update(now)
         self._step(now, self._commanded.reported(POSE, status, now))
-        self._yaw_lock.reported(status, now)
+        for one in self.requests.live():
+            lock = one.values.get(YAW_LOCK)
+            if lock is not None and now >= one.since + STATUS_DELAY and lock.is_shown(status):
+                self._end_one(one, Result(True, (
+                    f'{lock.goal}, confirmed by {status.msgname} '
+                    f'({format_seconds(now - one.since)})')), now)
         setpoints.reported(status, now)
-        if not setpoints.may_turn:
-            self._commanded.release_now(now)
+        for one in self._releases:
+            if not setpoints.may_turn and one.due > now:
+                one.due, one.until = now, now + REQUEST_LIMIT
         self._step(now)
         self._emit(events.AttitudeReceived(
             self.key, device.attitude, device.flags, device.errors))
@@ -162,28 +187,30 @@ class Gimbal:
         self._commands.schedule.by(self.poll, now)
         reports, setpoints = self.reports, self.setpoints
         if reports.choose(now):
-            self._end('the manager was lost', now, CONTROL, POSE, PLACE)
+            self._end('the manager was lost', now, CONTROL, MOVE)
             self._step(now)
-            self._commanded = GimbalRequests(
-                self.key, reports.manager.address, self._commands, self.requests, self.poll)
+            self._commanded = GimbalCommands(
+                self.key, reports.manager.address, self._commands, self.poll)
         if reports.connect(now):
-            self._repetition.forget()
+            for one in self.requests.standing:
+                one.may_be_repeated = False
             self._take_due = self._settings.auto_take_control
         is_first = reports.last_control is None
-        if not reports.update_control(now, is_releasing=bool(self._commanded.releases),
+        if not reports.update_control(now, is_releasing=bool(self._releases),
                                       may_turn=setpoints.may_have_rate):
             return
-        self._repetition.forget()
         if not reports.in_control:
-            self._end(self.unavailable(now), now, YAW_LOCK)
+            self._end(self.unavailable(now), now, MOVE, YAW_LOCK)
+            self.requests.forget({MOVE: None})
         if reports.control is None:
-            # The manager that had shown this component in control takes the zero.
-            manager = reports.manager
-            setpoints.control_unknown(now, can_send=(
-                not reports.link_problem and manager.control is not None
-                and manager.control.primary == self._commands.address))
+            if setpoints.may_have_rate:
+                # The manager that had shown this component in control takes the zero.
+                manager = reports.manager
+                setpoints.stop(now, can_send=(
+                    not reports.link_problem and manager.control is not None
+                    and manager.control.primary == self._commands.address))
         elif is_first or not reports.in_control:
-            setpoints.control_changed(now, is_lost=not reports.in_control)
+            setpoints.control_changed(now, is_ours=reports.in_control)
 
     # Control
 
@@ -199,13 +226,11 @@ class Gimbal:
         return (self._commands.refusal or self._commands.lateness(now)
                 or self.reports.lack_of_control(now)
                 or (f'control of gimbal {self.key} is being released'
-                    if self._commanded.releases else ''))
+                    if self._releases else ''))
 
     def _begin(self, now: float) -> None:
         """Begin a request or a setpoint of a user, which may come before the poll that is due."""
         self.was_commanded = True
-        # A later setpoint or request must not be undone.
-        self._yaw_lock.stop_resending()
         self.update(now)
 
     def take_control(self, now: float, done: Done) -> None:
@@ -224,30 +249,38 @@ class Gimbal:
         that control is released. The end of the process does not wait for that attitude.
         """
         self._begin(now)
-        # Nothing that comes after the zero may turn the gimbal, as ArduPilot would let it.
-        may_turn, due = self.setpoints.may_turn, -math.inf
-        self._end_commands('superseded by a release of control', now, superseded=True)
-        reports = self.reports
-        if may_turn and reports.may_have_control and reports.manager.liveness.is_heard(now):
+        reports, due = self.reports, -math.inf
+        if (self.setpoints.may_turn and reports.may_have_control
+                and reports.manager.liveness.is_heard(now)):
             # No command stops a gimbal everywhere: PX4 reads unset angles as 0.
-            self.setpoints.set_rates(STILL, now)
-            due = now + (STOP_LIMIT_AT_END if self._commands.refusal else STOP_LIMIT)
+            self.setpoints.stop(now, can_send=True)
+            due = now + STOP_LIMIT_AT_END if self._commands.refusal else math.inf
+        # Nothing that comes after the zero may turn the gimbal, as ArduPilot would let it.
+        self._end_commands('superseded by a release of control', now, superseded=True)
         self._request_control(False, now, done, due=due)
 
     def _request_control(
         self, take: bool, now: float, done: Done, *, due: float = -math.inf,
     ) -> None:
-        control = self.reports.control
-        if refusal := (self._commands.refusal if take else '') or self.reports.absence(now):
-            done(Result(False, refusal), now)
+        control, refusal = self.reports.control, self._commands.refusal
+        new = Request(
+            {CONTROL: take}, Why.END if refusal else Why.REQUEST, now, done=done, is_call=True,
+            due=due, until=now + REQUEST_LIMIT,
+            detail=f'superseded by {describe({CONTROL: take})}')
+        if reason := (refusal if take else '') or self.reports.absence(now):
+            self._end_one(new, Result(False, reason), now)
         elif not take and control is not None and not self.has_any_control:
             # PX4 would take the system id from another component of our system.
-            done(_with_stop(self.setpoints, Result(True, f'not in control: {control}')), now)
+            self._end_one(new, Result(True, f'not in control: {control}'), now)
         else:
             self._may_have_control |= take
-            self._commanded.request_control(
-                take, now, done, due=due, is_end=bool(self._commands.refusal))
+            self.control.put(new, now)
         self._step(now)
+
+    @property
+    def _releases(self) -> list[Request]:
+        """Return the requests to release control."""
+        return [one for one in self.control.live() if not one.values[CONTROL]]
 
     def _step(self, now: float, ended: Iterable[Served[Any]] = ()) -> None:
         """
@@ -257,77 +290,66 @@ class Gimbal:
         """
         for served in ended:
             self._end_one(served.request, served.result, now)
-        if not self._commands.refusal and self.setpoints.may_turn:
-            for one in self._commanded.releases:
-                if -math.inf < one.due <= now and not one.is_served:
-                    self._end_one(one, Result(
-                        False, f'{self.setpoints.lack_of_stop}, {STOP_LIMIT:g} s after a rate of '
-                        'zero: control is kept, and the zero is sent again'), now)
-        for served in self._commanded.step(now):
-            self._end_one(served.request, served.result, now)
-        self._yaw_lock.step(now)
+        live, control = self.requests.live(), self.control.live()
+        newest = live[-1] if live else None
+        # The zero that ends a rate comes before the command of a pose or a place.
+        self.setpoints.begin(newest, now, can_send=self.reports.in_control)
+        if newest is not None and isinstance(newest.values.get(MOVE), SETPOINTS):
+            self.requests.reply(newest, SENT)
+        for served in self._commanded.step(Goal.strongest(control, CONTROL, now),
+                                           Goal.strongest(live, MOVE, now), now):
+            if served.request not in self._standing:
+                self._end_one(served.request, served.result, now)
         self.requests.answer(now)
-        self._commanded.control.answer(now)
+        self.control.answer(now)
         self._set_due()
 
     def _end_one(self, one: Request, result: Result, now: float) -> None:
         (field, value), = one.values.items()
-        if field in (POSE, PLACE):
-            self.setpoints.request_ended(SUSPENDED_BY[field], result, now)
+        if field == MOVE and not isinstance(value, SETPOINTS):
+            self.setpoints.ended(value, result)
         elif field == CONTROL:
             if result.success or result.refused and value:
                 self._may_have_control = False
-            if not value:
-                result = _with_stop(self.setpoints, result)
-            elif result.success and not self.reports.manager.enforces_control:
-                result = result._replace(message=f'{result.message}; ArduPilot also obeys '
-                                                 'components without control')
+            note = ('' if not result.success else self.setpoints.lack_of_stop if not value else
+                    '' if self.reports.manager.enforces_control else
+                    'ArduPilot also obeys components without control')
+            if note:
+                result = result._replace(message=f'{result.message}; {note}')
         if result.refused:
-            result = self.reports.explained(result, wish(field, value), now)
-        (self._commanded.control if field == CONTROL else self.requests).end(one, result, now)
+            result = self.reports.explained(result, describe(one.values), now)
+        (self.control if field == CONTROL else self.requests).end(one, result, now)
+
+    @property
+    def _standing(self) -> list[Request]:
+        return self.requests.standing + self.control.standing
 
     def _end(self, message: str, now: float, *fields: str, superseded: bool = False) -> None:
         """End the open requests for some fields."""
         result = Result(False, message, superseded=superseded)
-        for one in (*self.requests.standing, *self._commanded.control.standing):
+        for one in self._standing:
             if one.is_open and not one.values.keys().isdisjoint(fields):
                 self._end_one(one, result, now)
 
     def close(self, now: float) -> None:
         """Answer all requests; :meth:`release_control` is still possible."""
         refusal = self._commands.refusal
-        self._end(refusal, now, YAW_LOCK, CONTROL, POSE, PLACE, superseded=True)
+        self._end(refusal, now, YAW_LOCK, CONTROL, MOVE, superseded=True)
         self.requests.close(Result(False, refusal, superseded=True), now)
         self._step(now)
 
     def change_settings(self, settings: GimbalSettings, now: float) -> None:
         """Take other settings: ``setpoint_timeout`` and the time-out of ``sources`` may differ."""
         self._settings = settings
-        self.setpoints.change_timeout(settings.setpoint_timeout, now)
+        for one in self.requests.live():
+            if isinstance(one.values.get(MOVE), Rates):
+                one.until = min(one.until, now + settings.setpoint_timeout)
         if settings.sources:
             self.requests.claims.set_lease(settings.sources.timeout)
             self._expire(now)
         self._set_due()
 
     # Sources
-
-    def claim(self, source: str, now: float, *, is_call: bool = False) -> str:
-        """
-        Let a source command the gimbal, and end what other sources have sent.
-
-        A stream claims the gimbal at once, a call when it has succeeded.
-
-        :return: why the source may not command the gimbal, '' if it may.
-        """
-        self._expire(now)
-        requests = self.requests
-        refusal = requests.refusal(source)
-        if requests.are_ranked and not refusal and requests.commander != source:
-            self._end_commands(f'held by {source}', now)
-        if not is_call:
-            requests.claim(source, now)
-            self._set_due()
-        return refusal
 
     def release(self, source: str, now: float) -> str:
         """
@@ -351,135 +373,96 @@ class Gimbal:
             self._end_commands(f'the hold of {before} has ended (source_timeout)', now)
 
     def _end_commands(self, message: str, now: float, *, superseded: bool = False) -> None:
-        """End the setpoint, and the requests that may turn the gimbal or stop it later."""
-        self._repetition.forget()
-        self.setpoints.end(now)
-        self._end(message, now, POSE, PLACE, YAW_LOCK, superseded=superseded)
+        """End the requests that may turn the gimbal or stop it later, and a rate or a place."""
+        has_place = self.setpoints.has_place
+        self._end(message, now, MOVE, YAW_LOCK, superseded=superseded)
+        self.requests.forget({MOVE: None})
         self._step(now)
+        if has_place:
+            self.setpoints.stop(now, can_send=self.reports.in_control)
 
     # Requests
 
-    def set_flag(
-        self, flag: Flag, now: float, done: Done, *, source: str = DEFAULT,
-    ) -> None:
-        """Turn to a pose; or stop, and lock or unlock the yaw (GM-3)."""
-        self._begin(now)
-        self._repetition.forget()
-        message = f'superseded by {flag.goal}'
-        if reason := (self.claim(source, now, is_call=True) or self.unavailable(now)
-                      or self.reports.missing(flag.needed)):
-            done(Result(False, reason), now)
-            return
-        if flag.is_pose:
-            self._end(message, now, PLACE, YAW_LOCK, superseded=True)
-            self.setpoints.suspend(now, SuspendedBy.POSE)
-        else:
-            self._end(message, now, POSE, PLACE, superseded=True)
-        until = now + REQUEST_LIMIT if flag.is_pose else math.inf
-        self.requests.put(Request(
-            {POSE if flag.is_pose else YAW_LOCK: flag}, Why.REQUEST, now, source, done,
-            is_call=True, until=until), now)
-        self._step(now)
+    @property
+    def wanted_move(self) -> Move:
+        """Return the move that is wanted, else the one that the gimbal follows; None for none."""
+        return self.setpoints.wanted
 
-    def set_roi(
-        self, place: GeoPoint | None, now: float, done: Done, *, is_stream: bool = False,
-        source: str = DEFAULT,
+    def request(
+        self, wish: Move, now: float, done: Done, *, is_call: bool = True, source: str = DEFAULT,
     ) -> None:
         """
-        Point at a place, or at none.
+        Ask for a move, or for the yaw lock, which stops the gimbal (GM-3).
 
-        :param is_stream: whether its publisher repeats it, so that a newer one replaces it. An
-            equal one is sent once a second, as no status shows it, and else not answered.
+        A setpoint is sent at once. A place of a topic waits for the place that is under way.
+
+        :param is_call: whether a caller waits for the result; else a topic asks for it.
         """
         self._begin(now)
-        if reason := self.claim(source, now, is_call=True) or self.unavailable(now):
+        self._expire(now)
+        requests = self.requests
+        held = requests.refusal(source)
+        if requests.are_ranked and not held and requests.commander != source:
+            self._end_commands(f'held by {source}', now)
+        if not is_call:
+            requests.claim(source, now)
+        if reason := held or self.unavailable(now) or self.reports.missing(*_needed(wish)):
             done(Result(False, reason), now)
             return
-        if not is_stream:
-            self._repetition.forget()
-        elif self._repetition.is_needless(place, now, is_shown=False, moves=False):
+        is_lock = isinstance(wish, Flag) and not wish.is_pose
+        limit = (self._settings.setpoint_timeout if isinstance(wish, Rates) else
+                 math.inf if isinstance(wish, Attitude) else
+                 LOCK_LIMIT if is_lock else REQUEST_LIMIT)
+        new = Request({YAW_LOCK if is_lock else MOVE: wish}, Why.REQUEST, now, source, done,
+                      is_call, until=now + limit)
+        if not is_call and self._is_repetition(new, now):
+            done(Result(False, 'repeated', superseded=True), now)
             return
-        self.setpoints.suspend(now, SuspendedBy.PLACE, is_place=place is not None)
-        self.requests.put(Request(
-            {PLACE: place}, Why.REQUEST, now, source, done, is_call=not is_stream,
-            until=now + REQUEST_LIMIT), now)
+        result = Result(False, f'superseded by {describe(new.values)}', superseded=True)
+        for old in requests.standing[:]:
+            if old.is_open and _ends(new, old):
+                self._end_one(old, result, now)
+        if is_lock:
+            requests.forget({MOVE: None})
+        requests.put(new, now)
         self._step(now)
 
-    # Setpoints
+    def _is_repetition(self, new: Request, now: float) -> bool:
+        """Return whether a message of a topic asks for nothing new."""
+        old, move = self.requests.repeated(new), new.values[MOVE]
+        if old is None or isinstance(move, Rates) or self.wanted_move != move:
+            return False
+        is_shown = False
+        if isinstance(move, Attitude):
+            if self.setpoints.rate_stop.turns is not False:
+                return False
+            shown = self.reports.device.seen_from(move.frame)
+            is_shown = shown is not None and shown.angle_to(move.rotation) < SHOWN_ANGLE
+        return is_shown or now < old.since + REPEAT_TIME
 
-    def set_attitude(self, rotation: Quaternion, frame: YawFrame, now: float) -> str:
+    def set_angles(
+        self, angles: Vector, frame: YawFrame, now: float, done: Done, *, source: str = DEFAULT,
+    ) -> None:
         """
-        Send an attitude, unless it equals the one before and the gimbal shows it.
-
-        :param rotation: with norm 1, from the FLU axes of the gimbal as in
-            :class:`~..payload.mount_attitude.MountAttitude`.
-        :return: why it was not sent, for people; '' if it was.
-        """
-        self._begin(now)
-        reason = self.unavailable(now) or (self.reports.missing(
-            mavlink.GIMBAL_DEVICE_CAP_FLAGS_HAS_YAW_LOCK,
-            mavlink.GIMBAL_DEVICE_CAP_FLAGS_SUPPORTS_YAW_IN_EARTH_FRAME,
-        ) if frame is YawFrame.EARTH else '')
-        attitude = self.reports.device.attitude
-        shown = None if attitude is None else attitude.seen_from(frame)
-        # Angles that leave an axis as it is have rounded values.
-        if not reason and not self._repetition.is_needless(
-                (*(round(one, 6) for one in rotation), frame), now,
-                is_shown=shown is not None and shown.angle_to(rotation) < SHOWN_ANGLE,
-                moves=self.setpoints.rate_stop.turns is not False):
-            self._end('superseded by a setpoint', now, POSE, PLACE, superseded=True)
-            self._step(now)
-            self.setpoints.set_attitude(rotation, frame, now)
-            self._set_due()
-        return reason
-
-    def set_angles(self, angles: Vector, frame: YawFrame, now: float) -> str:
-        """
-        Send an attitude as roll, pitch and yaw in ROS, rad; NaN leaves an axis as it is.
+        Ask for an attitude as roll, pitch and yaw in ROS, rad; NaN leaves an axis as it is.
 
         Such an axis keeps its angle in the last sent attitude, else its reported angle.
-
-        :return: why it was not sent, for people; '' if it was.
         """
         if any(map(math.isnan, angles)):
-            self._begin(now)
-            if reason := self.unavailable(now):
-                return reason
-            base, attitude = self.setpoints.attitude(frame), self.reports.device.attitude
-            if base is None and attitude is not None:
-                base = attitude.seen_from(frame)
+            last = self.setpoints.followed
+            base = (last.rotation if isinstance(last, Attitude) and last.frame is frame
+                    else self.reports.device.seen_from(frame))
             if base is None:
-                return (f'gimbal {self.key} has not reported its attitude with a yaw relative to '
-                        f'the {frame.value}, so no axis can be left as it is')
-            roll, pitch, yaw = (old if math.isnan(new) else new
+                done(Result(False, self.unavailable(now) or (
+                    f'gimbal {self.key} has not reported its attitude with a yaw relative to the '
+                    f'{frame.value}, so no axis can be left as it is')), now)
+                return
+            # Rounded, so that the next message asks for the same attitude.
+            roll, pitch, yaw = (round(old, 6) if math.isnan(new) else new
                                 for new, old in zip(angles, base.euler(), strict=True))
             angles = roll, pitch, yaw
-        return self.set_attitude(Quaternion.from_euler(*angles), frame, now)
-
-    def set_rates(self, rates: Vector, now: float) -> str:
-        """
-        Send rates of roll, pitch and yaw in ROS, rad/s; zero is sent after the time-out.
-
-        :return: why they were not sent, for people; '' if they were.
-        """
-        self._begin(now)
-        reason = self.unavailable(now)
-        if not reason:
-            self._repetition.forget()
-            self._end('superseded by a setpoint', now, POSE, PLACE, superseded=True)
-            self._step(now)
-            self.setpoints.set_rates(rates, now)
-            self._set_due()
-        return reason
-
-    def _message(
-        self, frame: YawFrame, q: Wxyz, rates: Vector,
-    ) -> gimbal.GimbalManagerSetAttitude:
-        flags = setpoint_flags(frame)
-        if self.reports.missing(mavlink.GIMBAL_DEVICE_CAP_FLAGS_HAS_YAW_LOCK):
-            flags &= ~mavlink.GIMBAL_DEVICE_FLAGS_YAW_LOCK
-        return gimbal.GimbalManagerSetAttitude(
-            *self.reports.manager.address, flags, self.key.device_id, q, *rates)
+        self.request(Attitude(Quaternion.from_euler(*angles), frame), now, done, is_call=False,
+                     source=source)
 
     # Time
 
@@ -491,10 +474,12 @@ class Gimbal:
 
         self.update(now)
         self._expire(now)
-        self._yaw_lock.poll(now)
+        for one in self._standing:
+            if one.is_open and not one.is_served and now >= one.until:
+                self._end_one(one, self._out_of_time(one), now)
         self._step(now, self._commanded.poll(now))
         if self.reports.in_control:
-            self.setpoints.poll(now, may_stop=not self._commanded.may_turn)
+            self.setpoints.poll(now, may_stop=not self._commanded.may_move)
         control = self.reports.control
         if self._take_due and self.reports.is_connected and control is not None:
             self._take_due = False
@@ -503,14 +488,31 @@ class Gimbal:
         self.reports.poll(now)
         self._set_due()
 
+    def _out_of_time(self, one: Request) -> Result:
+        """Return the result of a request that has ended without a command."""
+        (field, value), = one.values.items()
+        if field == CONTROL:
+            return Result(False, f'{self.setpoints.lack_of_stop}, {REQUEST_LIMIT:g} s after a '
+                          'rate of zero: control is kept, and the zero is sent again')
+        if field == MOVE:
+            return SENT
+        device, name = self.reports.device, GimbalDeviceAttitudeStatus.msgname
+        shown = (f'{name} shows {describe_flags(device.flags)}'
+                 if device.attitude_at >= one.since + STATUS_DELAY else f'no {name} came')
+        advice = '; the device may need the heading of the vehicle' if value.is_set else ''
+        return Result(
+            False, f'{value.goal} not confirmed: {shown} within {LOCK_LIMIT:g} s{advice}')
+
     def _set_due(self) -> None:
         """Have :meth:`poll` called when it is due."""
         reports = self.reports
         if self._take_due and reports.is_connected and reports.control is not None:
             due = -math.inf
         else:
-            due = min(self.requests.claims.due, self._yaw_lock.due, self._commanded.due,
-                      reports.due, self.setpoints.due(may_stop=not self._commanded.may_turn)
+            due = min(*(time for one in self._standing if one.is_open and not one.is_served
+                        for time in (one.due, one.until) if time > -math.inf),
+                      self.requests.claims.due, self._commanded.due, reports.due,
+                      self.setpoints.due(may_stop=not self._commanded.may_move)
                       if reports.in_control else math.inf)
         self._commands.schedule.at(self.poll, due)
 
@@ -531,8 +533,19 @@ class Gimbal:
             requests.shown_holder, requests.claims.since)
 
 
-def _with_stop(setpoints: SetpointStream, result: Result) -> Result:
-    """Return the result of a release of control, which names a gimbal that may still turn."""
-    if result.success and setpoints.may_turn:
-        return result._replace(message=f'{result.message}; {setpoints.lack_of_stop}')
-    return result
+def _needed(wish: Move) -> tuple[int, ...]:
+    """Return the capabilities of which a gimbal must have one."""
+    if isinstance(wish, Attitude) and wish.frame is YawFrame.EARTH:
+        return (mavlink.GIMBAL_DEVICE_CAP_FLAGS_HAS_YAW_LOCK,
+                mavlink.GIMBAL_DEVICE_CAP_FLAGS_SUPPORTS_YAW_IN_EARTH_FRAME)
+    return (wish.needed if isinstance(wish, Flag) else 0,)
+
+
+def _ends(new: Request, old: Request) -> bool:
+    """Return whether a request for a move or the yaw lock ends an older one."""
+    (field, wish), (old_field, before) = *new.values.items(), *old.values.items()
+    if old_field == YAW_LOCK:
+        return field == MOVE and not isinstance(wish, SETPOINTS)
+    # Of places of a topic the newest is sent when one has ended.
+    waits = not new.is_call and isinstance(wish, GeoPoint) and isinstance(before, GeoPoint)
+    return field == YAW_LOCK or wish != before and not waits

@@ -25,8 +25,9 @@ from ..mavlink.retries import GIMBAL_MESSAGE, Retries
 from ..payload.device_events import DeviceConnected, DeviceDisconnected
 from ..payload.liveness import Liveness
 from ..payload.messages import GimbalDeviceAttitudeStatus
-from ..payload.mount_attitude import MountAttitude
+from ..payload.mount_attitude import MountAttitude, YawFrame
 from ..payload.requests import Result
+from ..payload.rotation import Quaternion
 
 # s of silence after which a manager or a device is lost.
 SILENCE_LIMIT = 3.0
@@ -206,6 +207,10 @@ class RemoteDevice:
         except ValueError as error:
             self.attitude, self.problem = None, str(error)
         return True
+
+    def seen_from(self, frame: YawFrame) -> Quaternion | None:
+        """Return its rotation relative to a frame, None if it is not known."""
+        return None if self.attitude is None else self.attitude.seen_from(frame)
 
     def request_identity(self, now: float) -> None:
         """Request GIMBAL_DEVICE_INFORMATION if that is due."""

@@ -12,6 +12,7 @@ import math
 import random
 from typing import Any
 
+from illuminator_ros.gimbal.commands import Attitude, Rates
 from illuminator_ros.gimbal.gimbal import Gimbal, GimbalSettings
 from illuminator_ros.gimbal.manager import GimbalManager, ManagerSettings, RequestRefused
 from illuminator_ros.gimbal.manager_with_client import ManagerWithClient
@@ -50,6 +51,7 @@ from support.gimbals import (
     Rig,
     set_neutral,
     set_yaw_lock,
+    setpoint,
 )
 from support.records import Answer
 
@@ -84,12 +86,13 @@ def use(rig: Rig, draw: random.Random) -> list[Answer]:
         gimbal.take_control, gimbal.take_control, partial(set_neutral, gimbal),
         partial(retract, gimbal), partial(clear_roi, gimbal),
         lambda *rest: set_yaw_lock(gimbal, draw.random() < 0.5, *rest),
-        lambda *rest: gimbal.set_roi(PLACE, *rest))
+        lambda *rest: gimbal.request(PLACE, *rest))
     setpoints = (
-        lambda: gimbal.set_rates((0.0, draw.random(), 0.2), now),
-        lambda: gimbal.set_attitude(Quaternion.from_euler(0.0, 0.2, 0.0), YawFrame.VEHICLE, now),
-        lambda: gimbal.set_angles((0.0, math.nan, 0.3), YawFrame.VEHICLE, now),
-        lambda: gimbal.claim(draw.choice(SOURCES), now),
+        lambda: setpoint(gimbal, Rates((0.0, draw.random(), 0.2)), now),
+        lambda: setpoint(gimbal, Attitude(
+            Quaternion.from_euler(0.0, 0.2, 0.0), YawFrame.VEHICLE), now),
+        lambda: gimbal.set_angles((0.0, math.nan, 0.3), YawFrame.VEHICLE, now, Answer(now),
+                                  source=draw.choice(SOURCES)),
         lambda: gimbal.release(draw.choice(SOURCES), now))
     if draw.random() < 0.5:
         draw.choice(setpoints)()
@@ -222,13 +225,13 @@ def test_ros_as_a_player_of_its_own_manager_turns_the_gimbal_no_more() -> None:
     answers = [Answer(rig.now) for _ in range(3)]
     gimbal.take_control(rig.now, answers[0])
     rig.run(1.0)
-    assert gimbal.set_rates((0.0, 0.0, 0.2), rig.now) == ''
+    assert setpoint(gimbal, Rates((0.0, 0.0, 0.2)), rig.now) == ''
     rig.run(0.1)
     assert any(rates(of(GimbalDeviceSetAttitude, rig.messages(GimbalDeviceSetAttitude))[-1]))
 
     rig.component.close(rig.now, ENDING)
     gimbal.release_control(rig.now, answers[1])
-    refusals = gimbal.set_rates((0.0, 0.0, 0.2), rig.now)
+    refusals = setpoint(gimbal, Rates((0.0, 0.0, 0.2)), rig.now)
     gimbal.take_control(rig.now, answers[2])
     rig.run(LIMIT)
 

@@ -10,6 +10,7 @@ import math
 from typing import Any
 
 from illuminator_ros.gimbal.axes import Range
+from illuminator_ros.gimbal.commands import Attitude, Rates
 from illuminator_ros.gimbal.events import AttitudeReceived
 from illuminator_ros.gimbal.gimbal import Gimbal, GimbalSettings
 from illuminator_ros.gimbal.manager import GimbalManager, ManagerSettings
@@ -38,6 +39,7 @@ from support.gimbal_manager import (
     PILOT,
     position,
 )
+from support.gimbals import setpoint
 
 
 class Rig(ManagerRig):
@@ -74,8 +76,8 @@ def test_ros_takes_control_sets_the_attitude_and_releases() -> None:
 
     assert rig.ask(rig.gimbal.take_control) == ''
     assert rig.manager.control.holder(Role.PRIMARY) == OURS
-    assert rig.gimbal.set_attitude(
-        Quaternion.from_euler(0.0, 0.2, 0.3), YawFrame.VEHICLE, rig.now) == ''
+    assert setpoint(rig.gimbal, Attitude(
+        Quaternion.from_euler(0.0, 0.2, 0.3), YawFrame.VEHICLE), rig.now) == ''
     [message] = of(GimbalDeviceSetAttitude, rig.give(PILOT))
     # ROS: pitch down and yaw left are positive.
     assert euler(message) == (0.0, -0.2, -0.3)
@@ -116,7 +118,7 @@ def test_ros_gets_the_attitude_of_the_device_and_a_region_of_interest() -> None:
     rig.ask(rig.gimbal.take_control)
     rig.give(AUTOPILOT, position(47.0, 8.0, 500.0))
 
-    assert rig.ask(rig.gimbal.set_roi, GeoPoint(47.001, 8.0, 500.0)) == ''
+    assert rig.ask(rig.gimbal.request, GeoPoint(47.001, 8.0, 500.0)) == ''
 
     assert math.isclose(euler(rig.messages(GimbalDeviceSetAttitude)[-1])[2], 0.0, abs_tol=1e-3)
 
@@ -125,7 +127,8 @@ def test_gm_22_ros_turns_a_device_without_mavlink_that_reports_no_attitude() -> 
     rig = Rig(device_id=1, ranges=(Range(0.0, 0.0), Range(-1.0, 1.0), Range(-2.0, 2.0)))
 
     assert rig.ask(rig.gimbal.take_control) == ''
-    rig.gimbal.set_attitude(Quaternion.from_euler(0.0, 0.2, 0.3), YawFrame.VEHICLE, rig.now)
+    setpoint(rig.gimbal, Attitude(
+        Quaternion.from_euler(0.0, 0.2, 0.3), YawFrame.VEHICLE), rig.now)
     rig.run(1.0)
 
     attitude = of(AttitudeReceived, rig.told)[-1].attitude
@@ -165,9 +168,9 @@ def test_a_setpoint_of_ros_that_may_have_waited_during_a_stop_of_the_process_is_
 
     rig.component.stalled(7.0, rig.now)
 
-    assert 'may be 7.00 s old' in rig.gimbal.set_rates((0.0, 0.0, 0.2), rig.now)
+    assert 'may be 7.00 s old' in setpoint(rig.gimbal, Rates((0.0, 0.0, 0.2)), rig.now)
     rig.run(1.0)
-    assert rig.gimbal.set_rates((0.0, 0.0, 0.2), rig.now) == ''
+    assert setpoint(rig.gimbal, Rates((0.0, 0.0, 0.2)), rig.now) == ''
 
 
 def test_gm_18_another_manager_with_our_own_address_makes_ours_inactive() -> None:

@@ -11,6 +11,7 @@ import math
 from typing import Any, TypeVar
 
 from illuminator_ros.gimbal.client import GimbalClient
+from illuminator_ros.gimbal.commands import Attitude, Rates
 from illuminator_ros.gimbal.events import ControlChanged
 from illuminator_ros.gimbal.gimbal import Gimbal, GimbalSettings
 from illuminator_ros.gimbal.manager_control import ControlSettings, Role
@@ -27,6 +28,7 @@ from illuminator_ros.payload.rotation import Quaternion, Vector
 from illuminator_ros.simulation.simulated import SimulatedComponents
 import pytest
 from support.gimbal_vehicle import Autopilot, HERE, managed_vehicle, Vehicle
+from support.gimbals import setpoint
 from support.live_link import EndpointLink
 from support.mavsdk_peer import DENIED, player, plugin, result
 from support.ports import free_port
@@ -172,7 +174,7 @@ def test_gm_4_mavsdk_reads_the_angles_that_we_read_in_both_frames(
         target = Quaternion.from_euler(*angles)
 
         assert ours.call(lambda gimbal, now, target=target, frame=frame:  # type: ignore[misc]
-                         gimbal.set_attitude(target, frame, now)) == ''
+                         setpoint(gimbal, Attitude(target, frame), now)) == ''
         eventually(lambda target=target, frame=frame:  # type: ignore[misc]
                    ours.rotation(frame).angle_to(target) < math.radians(0.02))
         # MAVSDK computes the other frame from the ATTITUDE of the autopilot, we from delta_yaw.
@@ -191,7 +193,7 @@ def test_gm_17_control_passes_between_mavsdk_and_us_and_the_loser_stops(
     follow = plugin.GimbalMode.YAW_FOLLOW
     assert result(theirs.take_control, GIMBAL, primary) == 'SUCCESS'
     # MAVSDK takes secondary control, too.
-    eventually(lambda: ours.call(lambda gimbal, now: gimbal.set_rates((0.0, 0.1, 0.0), now))
+    eventually(lambda: ours.call(lambda gimbal, now: setpoint(gimbal, Rates((0.0, 0.1, 0.0)), now))
                == 'no control of gimbal 1 of 1/154: primary 1/195, secondary 1/195')
 
     taken = ours.request(Gimbal.take_control)
@@ -200,7 +202,7 @@ def test_gm_17_control_passes_between_mavsdk_and_us_and_the_loser_stops(
     eventually(lambda: theirs.get_control_status(GIMBAL).compid_primary_control == OURS.component)
     # Secondary control is left as it is.
     assert theirs.get_control_status(GIMBAL).compid_secondary_control == FIRST.component
-    assert ours.call(lambda gimbal, now: gimbal.set_rates((0.0, 0.1, 0.0), now)) == ''
+    assert ours.call(lambda gimbal, now: setpoint(gimbal, Rates((0.0, 0.1, 0.0)), now)) == ''
     assert result(theirs.take_control, GIMBAL, primary) == 'SUCCESS'
     eventually(lambda: any(change.was_lost for change in ours.changes))
     before = ours.call(lambda gimbal, now: gimbal.snapshot(now).setpoints_sent)

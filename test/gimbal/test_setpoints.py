@@ -8,6 +8,7 @@ from __future__ import annotations
 from collections.abc import Callable
 import math
 
+from illuminator_ros.gimbal.commands import Attitude, Rates
 from illuminator_ros.gimbal.events import ControlChanged, GimbalKey, RateStopped
 from illuminator_ros.gimbal.gimbal import GimbalSettings
 from illuminator_ros.gimbal.messages import DEVICE_ID_PARAM, GimbalManagerSetAttitude, rates_of
@@ -56,8 +57,8 @@ def euler(message: GimbalManagerSetAttitude) -> Vector:
 def test_gm_2_gm_4_attitude_is_sent_in_the_frame_and_the_signs_of_mavlink() -> None:
     rig = in_control()
 
-    assert rig.gimbal.set_attitude(Quaternion.from_euler(*DOWN_LEFT), VEHICLE, rig.now) == ''
-    assert rig.gimbal.set_attitude(Quaternion.from_euler(*DOWN_LEFT), EARTH, rig.now) == ''
+    assert rig.send(Attitude(Quaternion.from_euler(*DOWN_LEFT), VEHICLE)) == ''
+    assert rig.send(Attitude(Quaternion.from_euler(*DOWN_LEFT), EARTH)) == ''
     rig.run(0.1)
 
     (_, relative), (_, absolute) = setpoints(rig)
@@ -75,13 +76,13 @@ def test_gm_2_gm_4_attitude_is_sent_in_the_frame_and_the_signs_of_mavlink() -> N
 
 def test_attitude_is_sent_again_a_few_times_unless_another_replaces_it() -> None:
     rig = in_control()
-    rig.gimbal.set_attitude(Quaternion(), VEHICLE, rig.now)
+    rig.send(Attitude(Quaternion(), VEHICLE))
     start = rig.now
     rig.run(5.0)
 
     assert [at - start for at, _ in setpoints(rig)] == approx([0.0, *REPEATS], abs=0.03)
     for rotation in (Quaternion.from_euler(0.0, 0.2, 0.0), Quaternion.from_euler(*DOWN_LEFT)):
-        rig.gimbal.set_attitude(rotation, VEHICLE, rig.now)
+        rig.send(Attitude(rotation, VEHICLE))
     rig.run(5.0)
     assert [one.q[3] == 0.0 for _, one in setpoints(rig)[1 + len(REPEATS):]] == [
         True, *[False] * (1 + len(REPEATS))]
@@ -106,12 +107,12 @@ def test_equal_angles_are_not_sent_again_while_a_standing_gimbal_shows_them(
     rig.managers[0].rates = STANDING
 
     def press() -> None:
-        assert rig.gimbal.set_angles(angles, VEHICLE, rig.now) == ''
+        assert rig.send_angles(angles, VEHICLE) == ''
 
     hold_button(rig, press)
 
     assert hold_button(rig, press) == 0
-    rig.gimbal.set_angles((0.0, 0.1, 0.0), VEHICLE, rig.now)
+    rig.send_angles((0.0, 0.1, 0.0), VEHICLE)
     rig.run(3.0)
     assert hold_button(rig, press) > 0
 
@@ -123,7 +124,7 @@ def test_equal_angles_that_a_gimbal_does_not_show_are_sent_once_a_second_or_whil
     rig.managers[0].rates = rates
 
     def press() -> None:
-        rig.gimbal.set_angles(DOWN_LEFT, VEHICLE, rig.now)
+        rig.send_angles(DOWN_LEFT, VEHICLE)
 
     hold_button(rig, press)
 
@@ -135,23 +136,22 @@ def test_equal_rates_are_always_sent_and_equal_places_once_a_second() -> None:
 
     assert hold_button(rig, lambda: turn(rig)) == 250
     rig.managers[0].rates = STANDING
-    rig.gimbal.set_rates(STILL, rig.now)
+    rig.send(Rates(STILL))
     rig.run(3.0)
-    assert hold_button(rig, lambda: rig.gimbal.set_roi(
-        PLACE, rig.now, rig.done, is_stream=True)) == 5
+    assert hold_button(rig, lambda: rig.gimbal.request(
+        PLACE, rig.now, rig.done, is_call=False)) == 5
 
 
 @pytest.mark.parametrize('between', [
     lambda rig: rig.gimbal.release('default', rig.now),
     lambda rig: set_neutral(rig.gimbal, rig.now, rig.done),
-    lambda rig: rig.gimbal.set_rates(STILL, rig.now),
+    lambda rig: rig.send(Rates(STILL)),
     lambda rig: rig.component.components_lost([DEVICE], rig.now, 'cut')],
     ids=['end of the claim', 'request', 'rate', 'loss'])
 def test_an_equal_attitude_is_sent_after_something_else(
         between: Callable[[Rig], object]) -> None:
     rig = in_control(sources=SourceSettings(('default',)))
     rig.managers[0].rates = STANDING
-    rig.gimbal.claim('default', rig.now)
     for _ in range(2):
         send_attitude(rig)
         rig.run(3.0)
@@ -159,7 +159,6 @@ def test_an_equal_attitude_is_sent_after_something_else(
     rig.run(2.0)
     before = len(setpoints(rig))
 
-    rig.gimbal.claim('default', rig.now)
     send_attitude(rig)
     rig.run(0.1)
 
@@ -171,7 +170,7 @@ def test_rate_is_a_message_in_rad_per_s_and_ends_with_a_zero() -> None:
     rig.managers[0].rates = STANDING
     start = rig.now
     for _ in range(3):
-        assert rig.gimbal.set_rates((0.0, 0.2, -0.1), rig.now) == ''
+        assert rig.send(Rates((0.0, 0.2, -0.1))) == ''
         rig.run(0.3)
     rig.run(5.0)
 
@@ -186,7 +185,7 @@ def test_a_rate_that_lasts_ends_after_a_shorter_timeout_and_never_later_than_it_
         timeout: float, zero_at: float) -> None:
     rig = in_control(setpoint_timeout=5.0)
     start = rig.now
-    rig.gimbal.set_rates((0.0, 0.2, 0.0), rig.now)
+    rig.send(Rates((0.0, 0.2, 0.0)))
     rig.run(1.0)
 
     rig.client.change_settings(GimbalSettings(setpoint_timeout=timeout), rig.now)
@@ -199,7 +198,7 @@ def test_gm_14_setpoint_that_comes_before_the_poll_after_a_pause_is_not_sent() -
     rig = in_control()
     rig.now += 60.0
 
-    assert 'not connected' in rig.gimbal.set_attitude(Quaternion(), VEHICLE, rig.now)
+    assert 'not connected' in rig.send(Attitude(Quaternion(), VEHICLE))
     assert not rig.component.outgoing
 
 
@@ -208,7 +207,7 @@ def request_lock(rig: Rig, lock: bool) -> None:
 
 
 def turn(rig: Rig) -> None:
-    assert rig.gimbal.set_rates((0.0, 0.0, 0.2), rig.now) == ''
+    assert rig.send(Rates((0.0, 0.0, 0.2))) == ''
 
 
 def turn_and_release(rig: Rig) -> None:
@@ -220,7 +219,7 @@ def turn_and_release(rig: Rig) -> None:
 
 
 def send_attitude(rig: Rig, lock: bool = False) -> None:
-    rig.gimbal.set_attitude(Quaternion(), EARTH if lock else VEHICLE, rig.now)
+    rig.send(Attitude(Quaternion(), EARTH if lock else VEHICLE))
 
 
 @pytest.mark.parametrize('rates', [STANDING, (NAN, 0.0, 0.001), (NAN, NAN, NAN)])
@@ -229,7 +228,7 @@ def test_a_zero_is_not_sent_again_once_attitudes_show_that_the_gimbal_stands(
     rig = in_control()
     rig.managers[0].rates = rates
     start = rig.now
-    rig.gimbal.set_rates(STILL, rig.now)
+    rig.send(Rates(STILL))
     rig.run(10.0)
 
     # Without rates two attitudes are compared, of five in a second.
@@ -237,7 +236,7 @@ def test_a_zero_is_not_sent_again_once_attitudes_show_that_the_gimbal_stands(
 
 
 @pytest.mark.parametrize('end', [
-    lambda rig: rig.run(0.5), lambda rig: rig.gimbal.set_rates(STILL, rig.now),
+    lambda rig: rig.run(0.5), lambda rig: rig.send(Rates(STILL)),
     lambda rig: rig.gimbal.release('default', rig.now), send_attitude],
     ids=['user dies', 'zero', 'source releases', 'attitude'])
 @pytest.mark.parametrize('outage', [1.4, 20.0, 200.0])
@@ -245,7 +244,6 @@ def test_what_ends_a_rate_is_sent_until_an_attitude_shows_that_the_gimbal_stands
         outage: float, end: Callable[[Rig], object]) -> None:
     rig = in_control(sources=SourceSettings(('default',)))
     manager = rig.managers[0]
-    rig.gimbal.claim('default', rig.now)
     turn(rig)
     rig.run(0.1)
     manager.rates = TURNING
@@ -310,7 +308,7 @@ def test_gm_2_rate_leaves_the_yaw_lock_as_the_device_has_it(shown: int, sent: in
     rig = in_control()
     rig.managers[0].flags = shown
     rig.run(1.0)
-    rig.gimbal.set_rates((0.0, 0.2, 0.0), rig.now)
+    rig.send(Rates((0.0, 0.2, 0.0)))
 
     assert setpoints(rig.run(0.1))[0][1].flags == sent
 
@@ -326,7 +324,7 @@ def test_gm_2_rate_leaves_a_yaw_lock_that_the_device_does_not_report_yet(
 
     change(rig, lock)
     rig.run(0.02)
-    rig.gimbal.set_rates((0.0, 0.2, 0.0), rig.now)
+    rig.send(Rates((0.0, 0.2, 0.0)))
     rig.run(0.02)
 
     has_lock = bool(setpoints(rig)[-1][1].flags & mavlink.GIMBAL_DEVICE_FLAGS_YAW_LOCK)
@@ -344,7 +342,7 @@ def test_gm_2_rate_leaves_the_yaw_lock_of_the_newer_of_a_request_and_an_attitude
         change(rig, lock is bool(number))
         rig.run(0.02)
 
-    rig.gimbal.set_rates((0.0, 0.2, 0.0), rig.now)
+    rig.send(Rates((0.0, 0.2, 0.0)))
     rig.run(0.02)
 
     has_lock = bool(setpoints(rig)[-1][1].flags & mavlink.GIMBAL_DEVICE_FLAGS_YAW_LOCK)
@@ -405,7 +403,7 @@ def test_a_rate_gets_another_zero_after_a_place_that_is_not_answered(places: int
     rig.run(0.1)
     rig.managers.clear()
     for _ in range(places):
-        rig.gimbal.set_roi(PLACE, rig.now, rig.done)
+        rig.gimbal.request(PLACE, rig.now, rig.done)
         rig.run(0.1)
     rig.component.link_closed(rig.now, 'cut')
     rig.managers.append(manager)
@@ -419,7 +417,7 @@ def test_a_rate_gets_another_zero_after_a_place_that_is_not_answered(places: int
 def test_a_place_without_an_answer_that_came_after_no_rate_is_not_ended() -> None:
     rig = in_control()
     rig.managers[0].answers = False
-    rig.gimbal.set_roi(PLACE, rig.now, rig.done)
+    rig.gimbal.request(PLACE, rig.now, rig.done)
     rig.run(6.0)
 
     assert [one.success for one in rig.results] == [False]
@@ -428,13 +426,12 @@ def test_a_place_without_an_answer_that_came_after_no_rate_is_not_ended() -> Non
 
 @pytest.mark.parametrize('follow', [
     lambda rig: set_neutral(rig.gimbal, rig.now, rig.done),
-    lambda rig: rig.gimbal.set_roi(None, rig.now, rig.done),
-    lambda rig: rig.gimbal.set_roi(PLACE, rig.now, rig.done),
+    lambda rig: rig.gimbal.request(None, rig.now, rig.done),
+    lambda rig: rig.gimbal.request(PLACE, rig.now, rig.done),
     lambda rig: rig.gimbal.release('default', rig.now)], ids=['pose', 'clear', 'place', 'release'])
 def test_a_rate_ends_with_a_zero_though_an_attitude_came_after_it_which_may_be_lost(
         follow: Callable[[Rig], object]) -> None:
     rig = in_control(sources=SourceSettings(('default',)))
-    rig.gimbal.claim('default', rig.now)
     turn(rig)
     send_attitude(rig)
     rig.run(0.1)
@@ -594,7 +591,7 @@ def test_a_rate_ends_with_a_zero_when_the_manager_is_lost_which_may_hear_it() ->
     manager = rig.managers[0]
     rig.managers = []
     while rig.gimbal.reports.in_control:
-        rig.gimbal.set_rates((0.0, 0.0, 0.2), rig.now)
+        rig.send(Rates((0.0, 0.0, 0.2)))
         rig.run(0.1)
     assert [one.angular_velocity_z for _, one in setpoints(rig)[-2:]] == [approx(-0.2), 0.0]
 
@@ -606,7 +603,7 @@ def test_a_rate_ends_with_a_zero_when_the_manager_is_lost_which_may_hear_it() ->
 
 
 @pytest.mark.parametrize('start', [
-    turn, lambda rig: rig.gimbal.set_roi(PLACE, rig.now, lambda *_: None)],
+    turn, lambda rig: rig.gimbal.request(PLACE, rig.now, lambda *_: None)],
     ids=['rate', 'place'])
 def test_zero_of_a_release_while_the_manager_is_lost_is_sent_when_it_is_heard_again(
         start: Callable[[Rig], object]) -> None:
@@ -634,7 +631,7 @@ def test_control_is_released_once_an_attitude_shows_that_the_gimbal_stands(
     rig = in_control()
     manager = rig.managers[0]
     manager.rates = (0.0, -turning, 0.0)
-    rig.gimbal.set_rates((0.0, 0.2, 0.0), rig.now)
+    rig.send(Rates((0.0, 0.2, 0.0)))
     rig.run(0.1)
     asked_at, before = rig.now, len(manager.received)
 
@@ -677,7 +674,7 @@ def test_a_release_of_a_gimbal_that_shows_no_attitude_is_refused_and_the_zero_go
         False, 'no attitude shows that the gimbal stands, 5 s after a rate of zero: control is '
         'kept, and the zero is sent again')]
     assert len(setpoints(rig)) >= before + 4
-    assert rig.gimbal.set_rates((0.0, 0.2, 0.0), rig.now) == ''
+    assert rig.send(Rates((0.0, 0.2, 0.0))) == ''
 
 
 def lose_control_for_a_while(rig: Rig) -> None:
@@ -693,7 +690,7 @@ def test_a_gimbal_that_no_zero_has_stopped_gets_another_one_when_control_changes
         change: Callable[[Rig], object]) -> None:
     rig = in_control()
     rig.managers[0].rates = (0.0, -0.2, 0.0)
-    rig.gimbal.set_rates((0.0, 0.2, 0.0), rig.now)
+    rig.send(Rates((0.0, 0.2, 0.0)))
     rig.run(3.0)
     before = len(setpoints(rig))
 
@@ -704,16 +701,16 @@ def test_a_gimbal_that_no_zero_has_stopped_gets_another_one_when_control_changes
 
 
 MOVES: list[Callable[[Rig], object]] = [
-    lambda rig: rig.gimbal.set_rates((0.0, 0.2, 0.0), rig.now),
-    lambda rig: rig.gimbal.set_attitude(Quaternion(), VEHICLE, rig.now),
-    lambda rig: rig.gimbal.set_angles((0.0, 0.2, 0.0), VEHICLE, rig.now),
+    lambda rig: rig.send(Rates((0.0, 0.2, 0.0))),
+    lambda rig: rig.send(Attitude(Quaternion(), VEHICLE)),
+    lambda rig: rig.send_angles((0.0, 0.2, 0.0), VEHICLE),
     lambda rig: set_neutral(rig.gimbal, rig.now, rig.done),
-    lambda rig: rig.gimbal.set_roi(PLACE, rig.now, rig.done)]
+    lambda rig: rig.gimbal.request(PLACE, rig.now, rig.done)]
 
 
 def test_at_the_end_of_the_process_only_a_zero_and_the_release_are_sent() -> None:
     rig = in_control()
-    rig.gimbal.set_rates((0.0, 0.2, 0.0), rig.now)
+    rig.send(Rates((0.0, 0.2, 0.0)))
     rig.run(0.02)
     begun = len(rig.sent)
 
@@ -734,7 +731,7 @@ def test_nothing_moves_the_gimbal_while_its_control_is_released() -> None:
     rig = in_control()
     rig.managers[0].answers = False
     set_neutral(rig.gimbal, rig.now, rig.done)
-    rig.gimbal.set_roi(PLACE, rig.now, rig.done)
+    rig.gimbal.request(PLACE, rig.now, rig.done)
     rig.run(0.1)
     asked_at = rig.now
 
@@ -754,7 +751,7 @@ def test_nothing_moves_the_gimbal_while_its_control_is_released() -> None:
                             mavlink.MAV_CMD_DO_GIMBAL_MANAGER_PITCHYAW)))]
     assert moves == []
     # Without an answer this node may still have control.
-    assert rig.gimbal.set_rates((0.0, 0.2, 0.0), rig.now) == ''
+    assert rig.send(Rates((0.0, 0.2, 0.0))) == ''
 
 
 @pytest.mark.parametrize(('primary', 'reports', 'reason'), [
@@ -764,9 +761,9 @@ def test_gm_14_setpoint_without_control_is_not_sent(
         primary: object, reports: bool, reason: str) -> None:
     rig = Rig(FakeManager(primary=primary, reports=reports)).run(3.0)  # type: ignore[arg-type]
 
-    assert [rig.gimbal.set_attitude(Quaternion(), VEHICLE, rig.now),
-            rig.gimbal.set_angles((0.0, NAN, 0.0), VEHICLE, rig.now),
-            rig.gimbal.set_rates((0.0, 0.0, 0.1), rig.now)] == [reason] * 3
+    assert [rig.send(Attitude(Quaternion(), VEHICLE)),
+            rig.send_angles((0.0, NAN, 0.0), VEHICLE),
+            rig.send(Rates((0.0, 0.0, 0.1)))] == [reason] * 3
     assert setpoints(rig.run(1.0)) == []
 
 
@@ -782,13 +779,13 @@ def test_gm_3_yaw_relative_to_the_earth_is_sent_only_to_a_gimbal_that_has_it(
                & ~mavlink.GIMBAL_DEVICE_CAP_FLAGS_SUPPORTS_YAW_IN_EARTH_FRAME)
     rig = Rig(FakeManager(primary=OURS, capabilities=lacking | has)).run(3.0)
 
-    reason = rig.gimbal.set_attitude(Quaternion(), EARTH, rig.now)
+    reason = rig.send(Attitude(Quaternion(), EARTH))
 
     assert reason == ('' if sent else 'gimbal 1/154 does not have HAS_YAW_LOCK or '
                       'SUPPORTS_YAW_IN_EARTH_FRAME')
     rig.run(0.1)
     assert [one.flags for _, one in setpoints(rig)] == ([LEVEL | sent] if sent else [])
-    assert rig.gimbal.set_attitude(Quaternion(), VEHICLE, rig.now) == ''
+    assert rig.send(Attitude(Quaternion(), VEHICLE)) == ''
 
 
 def turned(roll: float, pitch: float, yaw: float, frame: YawFrame) -> FakeManager:
@@ -801,8 +798,8 @@ def turned(roll: float, pitch: float, yaw: float, frame: YawFrame) -> FakeManage
 def test_angle_that_is_nan_stays_where_it_is_and_then_where_it_was_sent() -> None:
     rig = Rig(turned(0.1, 0.2, 0.3, VEHICLE)).run(3.0)
 
-    assert rig.gimbal.set_angles((NAN, 0.5, NAN), VEHICLE, rig.now) == ''
-    assert rig.gimbal.set_angles((NAN, NAN, -0.4), VEHICLE, rig.now) == ''
+    assert rig.send_angles((NAN, 0.5, NAN), VEHICLE) == ''
+    assert rig.send_angles((NAN, NAN, -0.4), VEHICLE) == ''
     rig.run(0.1)
 
     first, second = (from_mavlink(one.q, VEHICLE).euler() for _, one in setpoints(rig)[:2])
@@ -817,7 +814,7 @@ def test_gm_2_axis_is_left_as_it_is_in_the_other_frame_only_if_the_heading_is_kn
     manager.delta_yaw = delta_yaw
     rig = Rig(manager).run(3.0)
 
-    reason = rig.gimbal.set_angles((0.0, 0.5, NAN), EARTH, rig.now)
+    reason = rig.send_angles((0.0, 0.5, NAN), EARTH)
     rig.run(0.1)
 
     assert bool(reason) is not sent

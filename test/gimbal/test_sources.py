@@ -9,14 +9,14 @@ from collections.abc import Callable
 import random
 from typing import Any
 
-from illuminator_ros.gimbal.commands import NEUTRAL
-from illuminator_ros.gimbal.messages import DEVICE_ID_PARAM, GimbalManagerSetAttitude
+from illuminator_ros.gimbal.commands import NEUTRAL, Rates, YAW_LOCKS
+from illuminator_ros.gimbal.messages import DEVICE_ID_PARAM, GimbalManagerSetAttitude, rates_of
 from illuminator_ros.mavlink.dialect import mavlink
 from illuminator_ros.mavlink.messages import CommandInt, CommandLong
 from illuminator_ros.payload.arbitration import Cause, HolderChanged
 from illuminator_ros.payload.command_sources import SourceSettings
 from illuminator_ros.payload.device_events import DeviceHeld
-from illuminator_ros.payload.mount_attitude import from_mavlink, YawFrame
+from illuminator_ros.payload.mount_attitude import from_mavlink, STILL, YawFrame
 import pytest
 from support.gimbals import (
     FakeManager,
@@ -24,6 +24,7 @@ from support.gimbals import (
     OURS,
     PLACE,
     Rig,
+    setpoint,
     steps,
 )
 
@@ -40,8 +41,7 @@ def shared(**fields: Any) -> Rig:
 
 def point(rig: Rig, source: str) -> str:
     """Let a source request its yaw; return the refusal."""
-    return rig.gimbal.claim(source, rig.now) or rig.gimbal.set_angles(
-        (0.0, 0.0, YAW[source]), VEHICLE, rig.now)
+    return rig.send_angles((0.0, 0.0, YAW[source]), VEHICLE, source)
 
 
 def holder(rig: Rig) -> str | None:
@@ -81,13 +81,12 @@ def test_the_next_source_has_the_gimbal_afterwards_and_must_send_a_setpoint(
 
 @pytest.mark.parametrize('end', ENDS.values())
 @pytest.mark.parametrize(('start', 'sent'), [
-    (lambda rig: rig.gimbal.set_rates((0.0, 0.0, 0.2), rig.now), [pytest.approx(-0.2)]),
-    (lambda rig: rig.gimbal.set_roi(PLACE, rig.now, rig.done, source='safety'), [])],
+    (lambda rig: rig.send(Rates((0.0, 0.0, 0.2)), 'safety'), [pytest.approx(-0.2)]),
+    (lambda rig: rig.gimbal.request(PLACE, rig.now, rig.done, source='safety'), [])],
     ids=['rate', 'place'])
 def test_a_rate_or_a_place_ends_with_the_hold_of_its_source(
         start: Callable[[Rig], object], sent: list[float], end: Callable[[Rig], object]) -> None:
     rig = shared(setpoint_timeout=30.0)
-    rig.gimbal.claim('safety', rig.now)
     start(rig)
     rig.run(1.0)
     end(rig)
@@ -105,10 +104,10 @@ def test_an_attitude_is_not_sent_again_after_the_hold_of_its_source() -> None:
     rig.run(0.1)
     before = len(rig.messages(GimbalManagerSetAttitude))
 
-    rig.gimbal.claim('safety', rig.now)
+    rig.send(Rates(), 'safety')
     rig.run(3.0)
 
-    assert len(rig.messages(GimbalManagerSetAttitude)) == before
+    assert {rates_of(one) for one in rig.messages(GimbalManagerSetAttitude)[before:]} == {STILL}
 
 
 def test_a_takeover_leaves_the_commands_to_another_gimbal_of_the_manager() -> None:
@@ -117,9 +116,8 @@ def test_a_takeover_leaves_the_commands_to_another_gimbal_of_the_manager() -> No
     first, second = rig.client.gimbals.values()
     rig.managers[0].answers = rig.managers[1].answers = False
     for gimbal in (first, second):
-        gimbal.claim('autonomy', rig.now)
-        gimbal.set_roi(None, rig.now, rig.done, source='autonomy')
-    first.claim('safety', rig.now)
+        gimbal.request(None, rig.now, rig.done, source='autonomy')
+    setpoint(first, Rates(), rig.now, 'safety')
     rig.run(0.1)
 
     assert len(rig.results) == 1
@@ -131,8 +129,8 @@ def test_a_takeover_leaves_the_commands_to_another_gimbal_of_the_manager() -> No
 def test_a_stream_leaves_the_call_of_its_own_source_under_way() -> None:
     rig = shared()
     rig.managers[0].answers = False
-    rig.gimbal.set_roi(None, rig.now, rig.done, source='operator')
-    rig.gimbal.claim('operator', rig.now)
+    rig.gimbal.request(None, rig.now, rig.done, source='operator')
+    rig.gimbal.request(None, rig.now, rig.done, is_call=False, source='operator')
     rig.run(0.1)
 
     assert (holder(rig), rig.results) == ('operator', [])
@@ -141,7 +139,7 @@ def test_a_stream_leaves_the_call_of_its_own_source_under_way() -> None:
 def call(rig: Rig, source: str) -> None:
     """Request the neutral position, which no status shows yet."""
     rig.managers[0].applies = False
-    rig.gimbal.set_flag(NEUTRAL, rig.now, rig.done, source=source)
+    rig.gimbal.request(NEUTRAL, rig.now, rig.done, source=source)
     rig.run(0.1)
 
 
@@ -150,7 +148,7 @@ def test_a_source_that_releases_the_gimbal_during_its_call_does_not_hold_it_late
         holds: bool) -> None:
     rig = shared()
     if holds:
-        rig.gimbal.claim('default', rig.now)
+        rig.send(Rates(), 'default')
     call(rig, 'default')
 
     rig.gimbal.release('default', rig.now)
@@ -167,7 +165,7 @@ def test_a_source_that_releases_the_gimbal_during_its_call_does_not_hold_it_late
 def test_a_call_goes_on_when_the_hold_of_a_lower_source_ends(
         end: Callable[[Rig], object]) -> None:
     rig = shared()
-    rig.gimbal.claim('autonomy', rig.now)
+    rig.send(Rates(), 'autonomy')
     rig.run(1.2)
     call(rig, 'default')
 
@@ -183,15 +181,16 @@ def test_a_call_goes_on_when_the_hold_of_a_lower_source_ends(
 def test_a_takeover_ends_the_commands_of_the_lower_source_and_their_resends() -> None:
     rig = shared()
     rig.managers[0].answers = False
-    rig.gimbal.set_flag(NEUTRAL, rig.now, rig.done, source='autonomy')
-    rig.gimbal.set_roi(PLACE, rig.now, rig.done, source='autonomy')
+    rig.gimbal.request(YAW_LOCKS[True], rig.now, rig.done, source='autonomy')
+    rig.send(Rates((0.0, 0.0, 0.2)), 'autonomy')
+    rig.gimbal.request(PLACE, rig.now, rig.done, source='autonomy')
     rig.run(0.1)
     point(rig, 'safety')
     taken_at = rig.now
     rig.run(3.0)
 
-    assert [one.success for one in rig.results] == [False, False]
-    assert rig.results[0].message == 'held by safety'
+    assert [one.message for one in rig.results] == [
+        'superseded by point at 47, 8.5, 500 m', 'held by safety']
     assert not [one for at, one in rig.sent if at > taken_at
                 and isinstance(one, CommandLong | CommandInt)
                 and one.command in set(DEVICE_ID_PARAM)]

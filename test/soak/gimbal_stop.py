@@ -30,6 +30,7 @@ import sys
 TEST = Path(__file__).resolve().parents[1]
 sys.path[:0] = [str(TEST.parent), str(TEST)]
 
+from illuminator_ros.gimbal.commands import Rates  # noqa: E402
 from illuminator_ros.gimbal.messages import GimbalManagerSetAttitude, rates_of  # noqa: E402
 from illuminator_ros.mavlink.messages import Address, Message  # noqa: E402
 from illuminator_ros.payload.command_sources import SourceSettings  # noqa: E402
@@ -77,7 +78,7 @@ class TurningManager(FakeManager):
 # The end of the rate.
 ENDS: dict[str, Callable[[Rig], object]] = {
     'dies': lambda rig: None,
-    'zero': lambda rig: rig.gimbal.set_rates((0.0, 0.0, 0.0), rig.now),
+    'zero': lambda rig: rig.send(Rates(), SOURCE),
     'release of control': lambda rig: rig.gimbal.release_control(rig.now, rig.done),
     'release of the source': lambda rig: rig.gimbal.release(SOURCE, rig.now)}
 
@@ -90,8 +91,7 @@ def play(seed: int, loss: float) -> tuple[str, float]:
     manager.loss = loss
     while not manager.turning:
         for _ in range(20):
-            if not rig.gimbal.claim(SOURCE, rig.now):
-                rig.gimbal.set_rates(RATE, rig.now)
+            rig.send(Rates(RATE), SOURCE)
             rig.run(0.06)
     way = draw.choice(list(ENDS))
     manager.hears = draw.random() < 0.5

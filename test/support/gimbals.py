@@ -13,7 +13,7 @@ from typing import Any, TypeVar
 
 from illuminator_ros.gimbal import messages as gm
 from illuminator_ros.gimbal.client import GimbalClient
-from illuminator_ros.gimbal.commands import NEUTRAL, RETRACT, YAW_LOCKS
+from illuminator_ros.gimbal.commands import Move, NEUTRAL, RETRACT, YAW_LOCKS
 from illuminator_ros.gimbal.events import GimbalEvent, GimbalKey
 from illuminator_ros.gimbal.gimbal import Gimbal, GimbalSettings
 from illuminator_ros.mavlink import messages as mav
@@ -21,8 +21,11 @@ from illuminator_ros.mavlink.command_sender import CommandSender
 from illuminator_ros.mavlink.component import Component, Endpoint
 from illuminator_ros.mavlink.dialect import entry_names, mavlink
 from illuminator_ros.mavlink.link import Link
+from illuminator_ros.payload.command_sources import DEFAULT
 from illuminator_ros.payload.messages import GeoPoint, GimbalDeviceAttitudeStatus
+from illuminator_ros.payload.mount_attitude import YawFrame
 from illuminator_ros.payload.requests import Done, Result
+from illuminator_ros.payload.rotation import Vector
 from support.bench import Bench
 from support.live_link import EndpointLink
 
@@ -212,6 +215,17 @@ class Rig(Bench):
         """Return the events of a kind."""
         return [event for event in self.events if isinstance(event, kind)]
 
+    def send(self, move: Move, source: str = DEFAULT) -> str:
+        """Ask for a move as a topic does; return why it was refused, '' if it was not."""
+        return setpoint(self.gimbal, move, self.now, source)
+
+    def send_angles(self, angles: Vector, frame: YawFrame, source: str = DEFAULT) -> str:
+        """Ask for angles as a topic does; return why they were refused, '' if they were not."""
+        refusals: list[Result] = []
+        self.gimbal.set_angles(
+            angles, frame, self.now, lambda result, now: refusals.append(result), source=source)
+        return refusal(refusals)
+
     def receive(self, source: mav.Address, message: mav.Message) -> None:
         self.component.receive(source, message, self.now)
 
@@ -282,17 +296,30 @@ def in_control(**fields: Any) -> Rig:
     return rig
 
 
+def setpoint(gimbal: Gimbal, move: Move, now: float, source: str = DEFAULT) -> str:
+    """Ask for a move as a topic does; return why it was refused, '' if it was not."""
+    results: list[Result] = []
+    gimbal.request(move, now, lambda result, now: results.append(result), is_call=False,
+                   source=source)
+    return refusal(results)
+
+
+def refusal(results: Sequence[Result]) -> str:
+    """Return why a message of a topic was refused, '' if it was not."""
+    return next((one.message for one in results if not (one.success or one.superseded)), '')
+
+
 def set_neutral(gimbal: Gimbal, now: float, done: Done) -> None:
-    gimbal.set_flag(NEUTRAL, now, done)
+    gimbal.request(NEUTRAL, now, done)
 
 
 def retract(gimbal: Gimbal, now: float, done: Done) -> None:
-    gimbal.set_flag(RETRACT, now, done)
+    gimbal.request(RETRACT, now, done)
 
 
 def clear_roi(gimbal: Gimbal, now: float, done: Done) -> None:
-    gimbal.set_roi(None, now, done)
+    gimbal.request(None, now, done)
 
 
 def set_yaw_lock(gimbal: Gimbal, lock: bool, now: float, done: Done) -> None:
-    gimbal.set_flag(YAW_LOCKS[lock], now, done)
+    gimbal.request(YAW_LOCKS[lock], now, done)

@@ -19,7 +19,7 @@ from . import conversions
 from .diagnostics import controller, NO_GEOID, reports, why_no_gimbal
 from .. import events
 from ..client import GimbalClient
-from ..commands import Control, NEUTRAL, RETRACT, YAW_LOCKS
+from ..commands import Attitude, Control, Move, NEUTRAL, Rates, RETRACT, YAW_LOCKS
 from ..gimbal import Gimbal
 from ...mavlink.dialect import flag_names, mavlink
 from ...payload.command_sources import DEFAULT
@@ -61,14 +61,14 @@ REQUESTS: dict[Interface, Callable[[Gimbal, Any, float, Done], None]] = {
               'the gimbal stands'):
         lambda gimbal, _, *asked: gimbal.release_control(*asked),
     Interface('neutral', Trigger, 'turn to the neutral position'):
-        lambda gimbal, _, *asked: gimbal.set_flag(NEUTRAL, *asked),
+        lambda gimbal, _, *asked: gimbal.request(NEUTRAL, *asked),
     Interface('retract', Trigger, 'turn to the retracted position'):
-        lambda gimbal, _, *asked: gimbal.set_flag(RETRACT, *asked),
+        lambda gimbal, _, *asked: gimbal.request(RETRACT, *asked),
     Interface('clear_roi', Trigger, 'no longer point at a place'):
-        lambda gimbal, _, *asked: gimbal.set_roi(None, *asked),
+        lambda gimbal, _, *asked: gimbal.request(None, *asked),
     Interface('set_yaw_lock', SetBool, 'stop, and hold yaw against the earth or let it follow the '
               'vehicle; refused where the gimbal lacks it'):
-        lambda gimbal, message, *asked: gimbal.set_flag(YAW_LOCKS[message.data], *asked),
+        lambda gimbal, message, *asked: gimbal.request(YAW_LOCKS[message.data], *asked),
 }
 CMD_ATTITUDE = Interface(
     'cmd/attitude', QuaternionStamped,
@@ -256,36 +256,35 @@ class GimbalNode:
         separation: float = self._host.values['geoid_separation']
 
         def topic(
-            plain: Interface, send: Callable[[Gimbal, T, float], str], read: Callable[[Any], T],
+            plain: Interface, send: Callable[..., None], read: Callable[[Any], T],
         ) -> ros_node.CommandTopic[T]:
             endpoint = plain.of(prefix)
 
             def take(value: T, now: float) -> None:
-                gimbal = self._gimbal()
-                self._refused(endpoint.name, self.absence(now) if gimbal is None else
-                              gimbal.claim(source, now) or send(gimbal, value, now))
+                if (gimbal := self._gimbal()) is None:
+                    self._refused(endpoint.name, self.absence(now))
+                else:
+                    send(gimbal, value, now, functools.partial(sent, value), source=source)
+
+            def sent(value: T, result: Result, now: float) -> None:
+                if not (result.success or result.superseded):
+                    self._refused(endpoint.name, result.message)
+                elif result.success and isinstance(value, GeoPoint) and not self._geoid_is_known:
+                    # Once: the condition never ends.
+                    self._log.write_conditions([NO_GEOID], 'geoid')
 
             return ros_node.CommandTopic(endpoint, take, read)
 
-        def point(gimbal: Gimbal, place: GeoPoint, now: float) -> str:
-            gimbal.set_roi(place, now, pointed, is_stream=True, source=source)
-            return ''
-
-        def pointed(result: Result, now: float) -> None:
-            if result.success and not self._geoid_is_known:
-                # Once: the condition never ends.
-                self._log.write_conditions([NO_GEOID], 'geoid')
-            elif not (result.success or result.superseded):
-                self._refused(CMD_ROI.of(prefix).name, result.message)
+        def move(gimbal: Gimbal, value: Move, now: float, done: Done, *, source: str) -> None:
+            gimbal.request(value, now, done, is_call=False, source=source)
 
         return (
-            topic(CMD_ATTITUDE, lambda gimbal, value, now: gimbal.set_attitude(*value, now),
-                  self._frames.read_attitude),
-            topic(CMD_ANGLES, lambda gimbal, value, now: gimbal.set_angles(*value, now),
-                  self._frames.read_angles),
-            topic(CMD_RATE, Gimbal.set_rates, conversions.read_rates),
-            topic(CMD_ROI, point,
-                  lambda message: conversions.read_place(message, separation)))
+            topic(CMD_ATTITUDE, move,
+                  lambda message: Attitude(*self._frames.read_attitude(message))),
+            topic(CMD_ANGLES, lambda gimbal, value, *rest, **source: gimbal.set_angles(
+                *value, *rest, **source), self._frames.read_angles),
+            topic(CMD_RATE, move, lambda message: Rates(conversions.read_rates(message))),
+            topic(CMD_ROI, move, lambda message: conversions.read_place(message, separation)))
 
     def _refused(self, topic: str, reason: str) -> None:
         if reason:
