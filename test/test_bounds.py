@@ -159,7 +159,7 @@ def players(message: Message) -> object:
 def mounts(message: Message) -> object:
     one = MountOrientations()
     for system in range(256):
-        one.take(Address(system, 1), message, 0.0)
+        one.receive(Address(system, 1), message, 0.0)
     return one
 
 

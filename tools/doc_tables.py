@@ -25,7 +25,7 @@ from illuminator_ros.rededge.conversions import FIELDS
 from illuminator_ros.rededge.simulated import COLUMNS
 
 if TYPE_CHECKING:
-    from illuminator_ros.ros.node import Interface
+    from illuminator_ros.ros.node import Entity
     from illuminator_ros.ros.parameters import ParameterSpec
 
 ROOT = Path(__file__).resolve().parent.parent
@@ -87,14 +87,14 @@ def parameters(of: Sequence[ParameterSpec]) -> Rows:
              values_of(spec), spec.unit, meaning_of(spec)] for spec in of]
 
 
-def endpoints(of: Iterable[Interface], name: str = '~/{}') -> list[list[str]]:
+def endpoints(of: Iterable[Entity], name: str = '~/{}') -> list[list[str]]:
     """Return the rows of topics or services: name, type and meaning."""
     return [[f'`{name.format(one.name)}`',
              f'`{one.type.__module__.partition(".")[0]}/{one.type.__name__}`', one.meaning]
             for one in of]
 
 
-def published(of: Iterable[Interface], statuses: str) -> Rows:
+def published(of: Iterable[Entity], statuses: str) -> Rows:
     """Return the rows of published topics, with their QoS, and of the diagnostics."""
     return [*([name, type_, 'stream' if one.qos else 'state', meaning]
               for one in of for name, type_, meaning in endpoints([one])),
@@ -107,7 +107,7 @@ def diagnostic_values(of: Mapping[str, str]) -> Rows:
             for meaning, keys in itertools.groupby(of, key=of.__getitem__)]
 
 
-def of_a_source(of: Iterable[Interface], release: Interface) -> Rows:
+def of_a_source(of: Iterable[Entity], release: Entity) -> Rows:
     """Return the rows of the topics and services that each source of commands has."""
     return endpoints(
         [*(one._replace(meaning=f'as `~/{one.name}`, for that source') for one in of), release],

@@ -141,7 +141,7 @@ class ManagerWithClient(Payload):
         elif mav.target_of(message) != self._commands.address:
             self._commands.send(message)
         elif isinstance(message, AnyCommand):
-            ack = self._received.take(source, message, now, self.manager.execute)
+            ack = self._received.receive(source, message, now, self.manager.execute)
             if ack is not None:
                 self._component.commands.acknowledge(source, ack, now)
         else:

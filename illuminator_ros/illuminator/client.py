@@ -125,7 +125,7 @@ class IlluminatorClient(Payload):
             if light := self.discovery.hear(source, now, self._make, proved=False):
                 light.heard(now)
         elif isinstance(message, self.mounts.messages):
-            if self.mounts.take(source, message, now):
+            if self.mounts.receive(source, message, now):
                 self.mount_moved.emit(source.system)
         elif light := self.discovery.get(source):
             if isinstance(message, Heartbeat):

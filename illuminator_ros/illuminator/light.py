@@ -146,7 +146,7 @@ class Light:
         self.heard(now)
         twin, control, before = self.twin, self._control, self.twin.order.newest_at
         has_news = not (self._is_settled and status.repeats(twin.status))
-        order = twin.order.take(status, now, control.expects)
+        order = twin.order.add(status, now, control.expects)
         if order is Order.LATE:
             return
         twin.gap = now - before if math.isfinite(before) else 0.0
@@ -157,10 +157,10 @@ class Light:
             self._queries.begin(now)
             control.restarted(status, now)
         elif has_news:
-            if twin.changing.take(status, now, is_commanded=control.may_cause(now)):
+            if twin.changing.add(status, now, is_commanded=control.may_cause(now)):
                 self._emit(events.StatesChanging(self.address, True))
             control.reported(status, now)
-        self._queries.take_status(now)
+        self._queries.receive_status(now)
         if has_news or order is Order.RESTARTED:
             self._step(now)
             self._is_settled = control.is_settled(now)
@@ -169,7 +169,7 @@ class Light:
 
     def receive_identity(self, identity: Identity, now: float) -> None:
         """Receive a COMPONENT_INFORMATION_BASIC."""
-        self._queries.take_identity(identity, now)
+        self._queries.receive_identity(identity, now)
         if not self._queries.serials.shared(now):
             self._emit(events.LightIdentified(self.address, identity))
 

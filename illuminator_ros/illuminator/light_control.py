@@ -230,7 +230,7 @@ class LightControl:
         sent_at = max(switch.sent_at, -math.inf if late else configuration.sent_at)
         ours = OwnCommands(self.configuration.is_busy, late, sent_at + IMPLIED_TIME)
         before, was_off_by_heat = twin.enabled, twin.is_off_by_heat
-        twin.take(status)
+        twin.update(status)
         origin = (events.LATE_EFFECT if self._is_late(now) else
                   events.A_REQUEST if self._may_light_up(now) else events.OTHER_SENDER)
         is_idle = not switch.is_busy and not twin.changing.are_changing

@@ -175,16 +175,16 @@ class LightQueries:
         self._status.finish(reason, now)
         self._identity.finish(reason, now)
 
-    def take_status(self, now: float) -> None:
+    def receive_status(self, now: float) -> None:
         """Note that a status has come."""
         self._due = now + self._timeout
         if self._status.is_awaited:
             self._status.finish('', now)
 
-    def take_identity(self, identity: Identity, now: float) -> None:
+    def receive_identity(self, identity: Identity, now: float) -> None:
         """Take the identity."""
         self.identity = identity
-        self.serials.take(identity.serial_number, now)
+        self.serials.note(identity.serial_number, now)
         self._target.wake(self.serials.due)
         self._identity.finish('', now)
 

@@ -27,7 +27,7 @@ class MountOrientations:
         self._mounts: dict[tuple[int, int], tuple[MountAttitude | None, float]] = {}
         self._vehicles: dict[int, tuple[Attitude, float]] = {}
 
-    def take(self, source: Address, message: Message, now: float) -> bool:
+    def receive(self, source: Address, message: Message, now: float) -> bool:
         """Take a message of one of :attr:`messages`; return whether a mount has sent it."""
         if isinstance(message, GimbalDeviceAttitudeStatus):
             key = source.system, message.gimbal_device_id or source.component

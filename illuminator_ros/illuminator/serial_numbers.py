@@ -26,7 +26,7 @@ class SerialNumbers:
         self._received: dict[str, float] = {}
         self._asked_at = -math.inf
 
-    def take(self, serial: str, now: float) -> None:
+    def note(self, serial: str, now: float) -> None:
         """Note a serial number, '' where the light has none."""
         self._forget(now)
         if serial:

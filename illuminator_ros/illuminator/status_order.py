@@ -64,7 +64,7 @@ class StatusOrder:
         """Note that the light was lost: it may have restarted."""
         self._was_lost = True
 
-    def take(self, status: Status, now: float, is_expected: Callable[[Status], bool]) -> Order:
+    def add(self, status: Status, now: float, is_expected: Callable[[Status], bool]) -> Order:
         """
         Return the place of a status that has come.
 
@@ -128,7 +128,7 @@ class ChangingStates:
         self._states: deque[Status] = deque(maxlen=MAX_STATES)
         self._returns: deque[float] = deque(maxlen=MAX_RETURNS)
 
-    def take(self, status: Status, now: float, *, is_commanded: bool) -> bool:
+    def add(self, status: Status, now: float, *, is_commanded: bool) -> bool:
         """
         Take a status that counts.
 

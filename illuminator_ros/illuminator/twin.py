@@ -148,7 +148,7 @@ class Twin:
 
     # The switch
 
-    def take(self, status: Status) -> None:
+    def update(self, status: Status) -> None:
         """Take the state of a status that counts."""
         # Lights that do not measure send 0 (ArduSub), and a sensor rarely reads exactly 0.
         self._measures_temperature |= bool(status.temperature)
@@ -162,7 +162,7 @@ class Twin:
     def restarted(self, status: Status) -> None:
         """Take the state of the first status after a restart."""
         self.enabled, self.is_off_by_heat = None, False
-        self.take(status)
+        self.update(status)
         self.tell('')
 
     @property

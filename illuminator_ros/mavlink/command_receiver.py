@@ -44,7 +44,7 @@ class CommandReceiver:
         self._address = address
         self._executed: dict[tuple[mav.Address, int], _Executed] = {}
 
-    def take(
+    def receive(
         self, source: mav.Address, command: mav.AnyCommand, now: float, execute: Execute,
     ) -> mav.CommandAck | None:
         """

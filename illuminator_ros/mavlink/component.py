@@ -261,7 +261,7 @@ class Component(Endpoint):
         if isinstance(message, CommandAck) and not self.commands.acknowledge(source, message, now):
             return
         if isinstance(message, AnyCommand):
-            self._take_command(source, message, now)
+            self._receive_command(source, message, now)
             return
         if isinstance(message, Heartbeat) and (
                 source in self.heartbeats or len(self.heartbeats) < MAX_SOURCES):
@@ -274,9 +274,9 @@ class Component(Endpoint):
         for payload in self._payloads:
             payload.sent(message, now)
 
-    def _take_command(self, source: Address, command: AnyCommand, now: float) -> None:
+    def _receive_command(self, source: Address, command: AnyCommand, now: float) -> None:
         before = len(self.outgoing)
-        ack = self._received.take(source, command, now, self._execute)
+        ack = self._received.receive(source, command, now, self._execute)
         if ack is not None:
             # Ahead of the messages that the command has caused.
             self.outgoing.insert(before, (self.address, ack))

@@ -94,7 +94,7 @@ class ConflatingQueue:
         held.messages.append((source, message))
         return True
 
-    def take(self, now: float) -> list[tuple[Address, Message]]:
+    def pop(self, now: float) -> list[tuple[Address, Message]]:
         """Return the messages that are next; none if they are old."""
         stream = self._next
         held = self._held.pop(stream)
@@ -104,7 +104,7 @@ class ConflatingQueue:
         self.dropped += len(held.messages)
         return []
 
-    def take_for(self, target: Address) -> list[tuple[Address, Message]]:
+    def pop_for(self, target: Address) -> list[tuple[Address, Message]]:
         """Return the messages of streams for one target, which a message to it must follow."""
         if target == NO_TARGET:
             return []

@@ -72,7 +72,7 @@ class ForwardQueue:
             while self._size > self._capacity and self._held[priority]:
                 self._drop(priority)
 
-    def take(self, now: float) -> bytes:
+    def pop(self, now: float) -> bytes:
         """Return the next frame that is still worth sending, b'' if there is none."""
         while self:
             urgent = self._held[Priority.URGENT]

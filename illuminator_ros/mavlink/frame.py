@@ -172,7 +172,7 @@ class Decoder:
         position = 0
         signature_end = self._signature_end
         if not signature_end:
-            position = self._take_plain(data, 0, foreign, frames)
+            position = self._read_plain(data, 0, foreign, frames)
             if position == len(data):
                 self.rest = b''
                 return frames
@@ -183,7 +183,7 @@ class Decoder:
                 continue
             start = match.start()
             if start >= signature_end and data[start] == STX_V2:
-                position = self._take_plain(data, start, foreign, frames)
+                position = self._read_plain(data, start, foreign, frames)
                 if position > start:
                     continue
             found = self._read(data, start)
@@ -211,7 +211,7 @@ class Decoder:
         self._signature_end = max(signature_end - start, 0)
         return frames
 
-    def _take_plain(
+    def _read_plain(
         self, data: bytes, start: int, foreign: Mapping[int, bytes],
         frames: list[Frame | ForeignFrames],
     ) -> int:

@@ -156,7 +156,7 @@ class Line:
         self._user.opened(now)
         # Sending the first heartbeat may already have failed.
         if self._channel is channel:
-            self.status.take(LinkInput.OPENED, now, channel.name)
+            self.status.transition(LinkInput.OPENED, now, channel.name)
 
     def peers(self, now: float) -> Sequence[Peer]:
         """Return all peers, none without a channel."""
@@ -236,7 +236,7 @@ class Line:
     def _prove(self, now: float) -> None:
         """Note that the channel has lasted, so the next try after its loss is immediate."""
         self._connector.backoff.succeeded()
-        self.status.take(LinkInput.PROVED, now, self.name)
+        self.status.transition(LinkInput.PROVED, now, self.name)
 
     def _announce(self, now: float) -> None:
         """Have the user announce itself to a peer that is not heard."""
@@ -279,7 +279,7 @@ class Line:
         heard = self.receiver.routes.sources()
         self.close()
         self._schedule.at(self._connect, -math.inf)
-        self.status.take(LinkInput.CLOSED, now, name, reason)
+        self.status.transition(LinkInput.CLOSED, now, name, reason)
         self._user.lost(heard, reason, now)
 
     def _serve(self, handle: object, events: int) -> None:
@@ -295,17 +295,17 @@ class Line:
             if events & selectors.EVENT_READ and not self._user.is_behind:
                 for peer, data in channel.receive(handle):
                     if self._silent and self._silent.is_away:
-                        self._silent.take(data)
+                        self._silent.feed(data)
                         continue
                     now = self._clock()
-                    frames = self.receiver.take(peer, data, now)
+                    frames = self.receiver.feed(peer, data, now)
                     # Most lines wait for none.
                     if self.receiver.waits:
                         self._schedule.by(self._give_up, self.receiver.due)
                     if frames is not None:
                         self._handle(channel, peer, frames, now)
                     elif self._silent:
-                        self._silent.take(data)
+                        self._silent.feed(data)
                     if (self.receiver.is_behind and channel.has_clients
                             and peer not in channel.peers(now)):
                         self._user.behind(self, peer, now)
@@ -318,7 +318,7 @@ class Line:
         """Take accepted frames of a peer, of which all may be of messages that are not handled."""
         if self.status.state is not LinkState.OPEN:
             self._connector.backoff.answered()
-            self.status.take(LinkInput.PROVED, now, channel.name)
+            self.status.transition(LinkInput.PROVED, now, channel.name)
         self._schedule.at(self._announce, now + SILENCE)
         if channel.heard(peer, now):
             if _frame_log.isEnabledFor(logging.DEBUG):

@@ -200,21 +200,21 @@ class Lines(LineUser):
         was_behind = self.is_behind
         self._received += [(line, one) for one in frames if one.message_id in self._classes]
         if not was_behind:
-            self._take_received(now)
+            self._receive_waiting(now)
 
     @property
     def is_behind(self) -> bool:
         """See :meth:`LineUser.is_behind`."""
         return bool(self._received)
 
-    def _take_received(self, now: float) -> None:
+    def _receive_waiting(self, now: float) -> None:
         """Take received messages while the turn of the thread lasts, others in its next turn."""
         while self._received:
-            if self._defer(self._take_received):
+            if self._defer(self._receive_waiting):
                 return
-            self._take_frame(self._received.popleft()[1], now)
+            self._receive_frame(self._received.popleft()[1], now)
 
-    def _take_frame(self, frame: Frame, now: float) -> None:
+    def _receive_frame(self, frame: Frame, now: float) -> None:
         cls = self._classes[frame.message_id]
         if self._endpoint.inspect is not None:
             self._faults.call(self._endpoint.inspect, frame, cls)

@@ -138,7 +138,7 @@ class Link:
         self._store_timestamp(last=True)
         for line in self.lines:
             line.close()
-            line.status.take(LinkInput.STOPPED, self.clock())
+            line.status.transition(LinkInput.STOPPED, self.clock())
 
     def _store_timestamp(self, *, last: bool) -> None:
         if self._store:

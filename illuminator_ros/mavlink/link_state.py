@@ -153,7 +153,7 @@ class LinkStatus:
         self.events: list[LinkEvent] = []
         self._reasons: set[str] = set()
 
-    def take(self, input_: LinkInput, now: float, name: str = '', reason: str = '') -> None:
+    def transition(self, input_: LinkInput, now: float, name: str = '', reason: str = '') -> None:
         """Change the state; ``reason`` says why a transport was closed."""
         was_open = self.state.is_open
         self.state = TRANSITIONS.get((self.state, input_), self.state)

@@ -136,7 +136,7 @@ class Listener:
         """Take the frames behind incomplete ones, and the next rate if its time has come."""
         now = self._clock()
         for _, frames in self._receiver.give_up(now):
-            self._take(frames)
+            self._receive(frames)
         if (self.channel is not None and not self.components
                 and (rate := self.scan.next_rate(now))):
             # The hardware may not have this rate.
@@ -147,15 +147,15 @@ class Listener:
         assert self.channel is not None
         try:
             for peer, data in self.channel.receive(handle):
-                if frames := self._receiver.take(peer, data, self._clock()):
+                if frames := self._receiver.feed(peer, data, self._clock()):
                     self.is_loopback &= isinstance(peer, tuple) and peer[0].startswith('127.')
-                    self._take(frames)
+                    self._receive(frames)
                 elif not self.components:
-                    self.scan.take(data)
+                    self.scan.feed(data)
         except OSError as error:
             self.close(f'lost: {error.strerror or error}')
 
-    def _take(self, frames: Iterable[Frame]) -> None:
+    def _receive(self, frames: Iterable[Frame]) -> None:
         for frame in frames:
             if frame.source not in self.components and len(self.components) >= MAX_SOURCES:
                 continue

@@ -70,7 +70,7 @@ class RateScan:
         """Return the present rate."""
         return self._rates[0]
 
-    def take(self, data: bytes) -> None:
+    def feed(self, data: bytes) -> None:
         """Take bytes in which no frame is valid."""
         if len(self._data) < ENOUGH and not self.found:
             self._data += data

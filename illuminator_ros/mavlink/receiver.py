@@ -98,7 +98,7 @@ class Receiver:
         # The time of the last pause, s, and the foreign frames until then.
         self._paused = (-math.inf, 0)
 
-    def take(self, peer: Peer, data: bytes, now: float) -> list[Frame] | None:
+    def feed(self, peer: Peer, data: bytes, now: float) -> list[Frame] | None:
         """
         Return the frames to handle that bytes of a peer complete.
 

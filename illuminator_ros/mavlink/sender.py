@@ -70,11 +70,11 @@ class Sender:
         for source, message in messages:
             if not self._streams.hold(source, message, now):
                 # Messages to one target keep their order.
-                at_once += [*self._streams.take_for(target_of(message)), (source, message)]
+                at_once += [*self._streams.pop_for(target_of(message)), (source, message)]
         self._send_now(at_once, now)
         self.is_holding = bool(self._streams)
         while self.is_holding and self.due <= now:
-            taken = self._streams.take(now)
+            taken = self._streams.pop(now)
             self._send_now(taken, now)
             for _, message in taken:
                 self._faults.call(self._sent, message, now)

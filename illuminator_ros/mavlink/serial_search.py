@@ -93,7 +93,7 @@ class SerialSearch:
                     self._first = now
                     raise OSError('several ports have such a device: give one of ' + ', '.join(
                         f'{one.tuned_url} ({_heard(one, self._url.known)})' for one in fitting))
-                return self._take(fitting[0])
+                return self._claim(fitting[0])
             if not fitting and now >= end:
                 raise OSError(self._reason())
             for key, events in self._selector.select(TICK):
@@ -149,7 +149,7 @@ class SerialSearch:
             if one.channel and one.components:
                 one.channel.send(frames, one.channel.peers(now))
 
-    def _take(self, one: Listener) -> Channel:
+    def _claim(self, one: Listener) -> Channel:
         # After a loss the device is likely to have the same rate.
         self._rates.sort(key=lambda rate: rate != one.scan.rate)
         channel = one.release()

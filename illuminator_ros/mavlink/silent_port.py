@@ -53,7 +53,7 @@ class SilentPort:
         """Return whether the port has another rate than the link."""
         return self._baud != self._url.baud
 
-    def take(self, data: bytes) -> None:
+    def feed(self, data: bytes) -> None:
         """Take bytes in which no frame is valid, or that came at another rate."""
         self._received += 0 if self.is_away else len(data)
         if len(self._data) < ENOUGH:

@@ -277,14 +277,14 @@ class Requests:
         text = new.detail if not is_request else f'superseded by {self._describe(new.values)}'
         for old in [*self.standing]:
             if is_request and old.why is Why.REQUEST and old.source != new.source:
-                self._take_from(old, f'held by {new.source}', now)
+                self._displace(old, f'held by {new.source}', now)
             elif new.ends(old):
                 self.end(old, Result(False, text, superseded=True), now)
         if new.values.get('enabled') is False:
             # An OFF ends an ON that is remembered, though it may fail.
             self.forget({'enabled': True}, new.source if is_request else None, text)
 
-    def _take_from(self, old: Request, text: str, now: float) -> None:
+    def _displace(self, old: Request, text: str, now: float) -> None:
         """End a request of a source that another one replaces; a claimed wish is kept."""
         result = Result(False, text, superseded=True)
         if old.is_call or not self.claims.is_claimed_by(old.source):

@@ -96,22 +96,22 @@ class Captures:
         """End the request."""
         self._end(False, f'{reason}; the image may have been taken')
 
-    def take_status(self, message: rededge.CameraStatus, now: float) -> None:
+    def receive_status(self, message: rededge.CameraStatus, now: float) -> None:
         """Take CAMERA_STATUS, which reports that an image was triggered."""
         if message.event_id == mavlink.CAMERA_STATUS_TYPE_TRIGGER:
             if message.img_idx == self._triggered[0] and self._is_new(message.img_idx):
                 # Each image is triggered once: the camera has restarted and counts from the start.
                 self._triggered = 0, -math.inf
-            self._take_index(message.img_idx, now)
+            self._note_index(message.img_idx, now)
 
-    def take_feedback(self, message: rededge.CameraFeedback, now: float, note: str) -> None:
+    def receive_feedback(self, message: rededge.CameraFeedback, now: float, note: str) -> None:
         """
         Take CAMERA_FEEDBACK, which reports that an image was taken.
 
         :param note: is added to the answer of the request that caused the image.
         """
         self.images += 1
-        self._take_index(message.img_idx, now)
+        self._note_index(message.img_idx, now)
         capture = self._capture
         if capture is None or capture.index != message.img_idx:
             return
@@ -126,7 +126,7 @@ class Captures:
         """Return whether an image is newer than all others; its index has 16 bits."""
         return self.newest is None or (self.newest - index) & 0xFFFF >= OLDER_INDICES
 
-    def _take_index(self, index: int, now: float) -> None:
+    def _note_index(self, index: int, now: float) -> None:
         """Record an image; a request causes the first new image after it."""
         if not self._is_new(index):
             return

@@ -144,7 +144,7 @@ class RedEdgeClient(Payload):
         if self._address in lost:
             self._lose(f'link lost: {reason}', now)
 
-    def _take_heartbeat(self, source: Address, now: float) -> None:
+    def _receive_heartbeat(self, source: Address, now: float) -> None:
         """Take a heartbeat of the camera's component id, whatever its content."""
         self._heartbeats.append(now)
         own, address = self._commands.address.system, self._address
@@ -190,17 +190,17 @@ class RedEdgeClient(Payload):
         if source.component != mavlink.MAV_COMP_ID_CAMERA:
             return
         if isinstance(message, Heartbeat):
-            self._take_heartbeat(source, now)
+            self._receive_heartbeat(source, now)
         elif isinstance(message, rededge.Ping):
-            self._pings.take(message, now)
+            self._pings.receive(message, now)
         elif isinstance(message, rededge.CameraStatus):
-            self._captures.take_status(message, now)
+            self._captures.receive_status(message, now)
         elif isinstance(message, rededge.CameraFeedback) and message not in self._reports:
             self._reports.append(message)
             note = ("; several components have the camera's id, so another may have taken it"
                     if self._is_conflict(now) else '')
             self.events.emit(ImageTaken(message))
-            self._captures.take_feedback(message, now, note)
+            self._captures.receive_feedback(message, now, note)
 
     def sent(self, message: Message, now: float) -> None:
         """See :meth:`Payload.sent`."""

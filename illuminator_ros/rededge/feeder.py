@@ -122,12 +122,12 @@ class Feeder:
 
     # Position and time
 
-    def take_fix(self, position: Position, stamp: Stamp, now: float) -> None:
+    def receive_fix(self, position: Position, stamp: Stamp, now: float) -> None:
         """Send a position at once, or refuse it."""
         settings, is_fresh = self._settings, self._inputs.is_fresh
         velocity = next((self._velocities[one] for one in VELOCITIES if is_fresh(one, now)), None)
         satellites = self._satellites if is_fresh(Input.SATELLITES, now) else None
-        with self._inputs.take(Input.FIX, now, stamp):
+        with self._inputs.receiving(Input.FIX, now, stamp):
             conversions.fix_type(position.status)
             if conversions.is_no_place(position):
                 raise ValueError('no fix: its position is 0, 0')
@@ -165,20 +165,20 @@ class Feeder:
                              'it by a clock that is set, or publish ~/time_reference')
         return utc
 
-    def take_time_reference(self, utc: int, stamp: Stamp, now: float) -> None:
+    def receive_time_reference(self, utc: int, stamp: Stamp, now: float) -> None:
         """
         Take the UTC (ns since the UNIX epoch) of a stamp.
 
         From then on ROS time is no longer used as UTC.
         """
-        with self._inputs.take(Input.TIME_REFERENCE, now, stamp):
+        with self._inputs.receiving(Input.TIME_REFERENCE, now, stamp):
             if not FIRST_UTC <= utc // 1000 <= LAST_UTC:
                 raise ValueError(f'{utc / 1e9:.1f} s after 1970-01-01 cannot be UTC')
             self._inputs.check(Input.TIME_REFERENCE, stamp)
             self._needs_reference = True
             self._reference = _Reference(stamp.time, utc - stamp.time)
 
-    def take_velocity(
+    def receive_velocity(
         self, name: Input, velocity: Vector, stamp: Stamp, now: float, body: Quaternion = ENU,
     ) -> None:
         """
@@ -187,15 +187,15 @@ class Feeder:
         :param velocity: m/s, in the axes of ``body``.
         :param body: the orientation of these axes in ENU, of any norm.
         """
-        with self._inputs.take(name, now, stamp):
+        with self._inputs.receiving(name, now, stamp):
             self._inputs.check(name, stamp)
             if not all(map(math.isfinite, velocity)):
                 raise ValueError('a component is not a finite number')
             self._velocities[name] = body.normalized().rotate(velocity)
 
-    def take_satellites(self, count: int, now: float) -> None:
+    def receive_satellites(self, count: int, now: float) -> None:
         """Take the number of satellites."""
-        with self._inputs.take(Input.SATELLITES, now):
+        with self._inputs.receiving(Input.SATELLITES, now):
             self._satellites = count
             if self._settings.send_gps_status and now >= self._gps_status_due:
                 self._gps_status_due = now + GPS_STATUS_INTERVAL

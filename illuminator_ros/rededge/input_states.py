@@ -174,7 +174,7 @@ class InputStates:
         self._trackers = {name: _Tracker(settings.timeout(name)) for name in Input}
 
     @contextlib.contextmanager
-    def take(self, name: Input, now: float, stamp: Stamp | None = None) -> Iterator[None]:
+    def receiving(self, name: Input, now: float, stamp: Stamp | None = None) -> Iterator[None]:
         """Take a message in the context, which raises ValueError with the reason to refuse it."""
         tracker = self._trackers[name]
         if not tracker.is_fresh(now):

@@ -86,7 +86,7 @@ class OrientationFeeder:
         self._pair_sent_at = -math.inf
         self._set_due()
 
-    def take_attitude(
+    def receive_attitude(
         self, name: Input, orientation: Quaternion | None, rates: Vector, stamp: Stamp,
         now: float,
     ) -> None:
@@ -97,13 +97,13 @@ class OrientationFeeder:
         :param orientation: of any norm; None if the message has none.
         :param rates: of the body, FLU, rad/s; NaN if unknown.
         """
-        with self._inputs.take(name, now, stamp):
+        with self._inputs.receiving(name, now, stamp):
             if orientation is None:
                 raise ValueError('it has no orientation: its covariance begins with -1')
             self._add(name, orientation, rates, stamp)
         self._send_pair(now)
 
-    def take_mount(
+    def receive_mount(
         self, orientation: Quaternion, frame_id: str, stamp: Stamp, now: float,
     ) -> None:
         """
@@ -112,7 +112,7 @@ class OrientationFeeder:
         :param frame_id: the frame of the orientation, see :class:`~.conversions.MountParent`.
         """
         self.expect_mount()
-        with self._inputs.take(Input.MOUNT, now, stamp):
+        with self._inputs.receiving(Input.MOUNT, now, stamp):
             parent = MountParent.of(frame_id)
             if parent is not self._mount_parent:
                 self._mount_parent = parent

@@ -77,7 +77,7 @@ class Pings:
         self._sent[self._sequence] = now
         self._commands.send(rededge.Ping(int(now * 1e6), self._sequence, 0, 0))
 
-    def take(self, message: rededge.Ping, now: float) -> None:
+    def receive(self, message: rededge.Ping, now: float) -> None:
         """Take a PING of the camera, which is a reply if its target is our address."""
         if target_of(message) != self._commands.address:
             return

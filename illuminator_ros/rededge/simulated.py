@@ -365,7 +365,7 @@ class SimulatedRedEdge(simulated.SimulatedDevice):
     def receive(self, source: Address, message: Message, now: float) -> Iterable[Message]:
         """See :meth:`SimulatedDevice.receive`."""
         # The images that are due were taken before the message came.
-        self._take_due_images(now)
+        self._capture_due_images(now)
         if isinstance(message, rededge.Ping):
             return self._answer(source, message)
         if isinstance(message, rededge.DigicamControl):
@@ -471,11 +471,11 @@ class SimulatedRedEdge(simulated.SimulatedDevice):
 
     def poll(self, now: float) -> Iterable[Message]:
         """See :meth:`SimulatedDevice.poll`."""
-        self._take_due_images(now)
+        self._capture_due_images(now)
         while self._pending and now >= self._pending[0][0]:
             yield self._pending.popleft()[1]
 
-    def _take_due_images(self, now: float) -> None:
+    def _capture_due_images(self, now: float) -> None:
         while now >= self._image_due:
             self.capture(rededge.Shot.SURVEY, 'interval', self._image_due)
             self._image_due += self._interval

@@ -37,7 +37,7 @@ from .parameters import (
     LinkParameters,
     ParameterError,
 )
-from .payload import Host, RosPayload, ServedPayload, ShutdownReport
+from .payload import BridgeContext, RosPayload, ServedPayload, ShutdownReport
 from .payload_node import PayloadNode
 from .throttled_log import LogForwarder, NodeLog
 from ..mavlink.command_sender import CommandSender
@@ -137,7 +137,7 @@ class Bridge:
             self._executor.add_node(own)
         for own, kind, client, value in zip(nodes, kinds, clients, values, strict=True):
             log = self.log if own is node else NodeLog(own.get_logger())
-            self._served.append(_Served(own, log, kind.serve(client, Host(
+            self._served.append(_Served(own, log, kind.serve(client, BridgeContext(
                 own, self.link, log, frame_log, self._nodes, self._diagnostics, value,
                 self._wake))))
         specs = itertools.chain(LINK_PARAMETERS, *(kind.parameters for kind in kinds))

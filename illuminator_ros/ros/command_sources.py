@@ -13,14 +13,14 @@ from std_msgs.msg import String
 from std_srvs.srv import Trigger
 
 from .diagnostics import Value
-from .node import Answer, Interface, RequestService
+from .node import Answer, Entity, RequestService
 from .parameters import ParameterError, ParameterSpec, Values
 from ..payload.command_sources import DEFAULT, source_name, SourceSettings
 
-SOURCE = Interface(
+SOURCE = Entity(
     'source', String, "only with `sources`: the source that holds the device, `''` for none")
-RELEASE = Interface('release', Trigger, 'the source gives the device back; the answer names the '
-                    'next holder')
+RELEASE = Entity('release', Trigger, 'the source gives the device back; the answer names the '
+                 'next holder')
 # Their values in the diagnostics, with their meanings for the pages.
 HOLDER_VALUES = {
     'holder': 'only with `sources`: the source that holds the device, or `none`',

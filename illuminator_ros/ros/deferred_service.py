@@ -18,8 +18,8 @@ from .throttled_log import NodeLog
 
 # Sends a response; callable once, from any thread. Untyped: messages of ROS have no types.
 Respond = Callable[[Any], None]
-# Takes a request and the function that sends the response.
-Take = Callable[[Any, Respond], None]
+# Handles a request, given the function that sends the response.
+Handler = Callable[[Any, Respond], None]
 
 
 class DeferredService:
@@ -30,13 +30,14 @@ class DeferredService:
     returns a future, and the ``send_response`` of this service waits for its result. With a
     coroutine in place of the future, rclpy 7.1 would spin at full load while it waits.
 
-    :param take: called with the request, and with the function that sends the response.
+    :param handle: called with the request, and with the function that sends the response.
     """
 
     def __init__(
-        self, node: Node, type_: type[Any], name: str, take: Take, qos: QoSProfile, log: NodeLog,
+        self, node: Node, type_: type[Any], name: str, handle: Handler, qos: QoSProfile,
+        log: NodeLog,
     ) -> None:
-        self.take = take
+        self.handle = handle
         self._node = node
         self._log = log
         service = node.create_service(type_, name, self, qos_profile=qos)
@@ -44,10 +45,10 @@ class DeferredService:
         setattr(service, 'send_response', self._send)  # noqa: B010 - mypy forbids an assignment
 
     def __call__(self, request: Any, response: Any) -> Future[Any]:
-        """Take a request; return the future of its response."""
+        """Handle a request; return the future of its response."""
         future: Future[Any] = Future()
         try:
-            self.take(request, future.set_result)
+            self.handle(request, future.set_result)
         except Exception as error:
             # The client gets an answer after internal errors, too.
             self._log.error(f'internal error: {error!r}', 'service')

@@ -16,9 +16,9 @@ from typing import Any, Generic, Protocol, TypeVar
 from rclpy.node import Node
 
 from .diagnostics_publisher import DiagnosticsSource
-from .node import NodeInterface
+from .node import NodeEntities
 from .node_manager import NodeRequest
-from .payload import Host
+from .payload import BridgeContext
 from .throttled_log import NodeLog
 from ..payload.command_sources import describe
 from ..payload.device_events import (
@@ -38,7 +38,7 @@ class DeviceNode(Protocol):
 
     source: DiagnosticsSource
 
-    def take(self, event: Any) -> None:
+    def handle(self, event: Any) -> None:
         """Publish an event of the device, which is of a class of its payload."""
 
     def release(self) -> None:
@@ -64,7 +64,7 @@ class DeviceNodes(Generic[K, N]):
     """
 
     def __init__(
-        self, host: Host, kind: str, first: N, make: Callable[[Node, NodeLog], N],
+        self, host: BridgeContext, kind: str, first: N, make: Callable[[Node, NodeLog], N],
         bind: Callable[[N, K, float], None],
     ) -> None:
         self.first = first
@@ -122,13 +122,13 @@ class DeviceNodes(Generic[K, N]):
         self._bind_node(node, key, now)
         self._host.diagnostics.add(node.source)
 
-    def take(self, event: DeviceEvent[K]) -> bool:
+    def handle(self, event: DeviceEvent[K]) -> bool:
         """Take an event of a device; return whether a node serves the device."""
         node = self._nodes.get(event.key)
         if isinstance(event, DeviceForgotten):
             self._forget(event.key)
         elif node is not None:
-            node.take(event)
+            node.handle(event)
         return node is not None
 
     def _forget(self, key: K) -> None:
@@ -152,7 +152,7 @@ class DeviceNodes(Generic[K, N]):
 
 
 def publish_event(
-    event: DeviceEvent[Any], kind: str, log: NodeLog, interface: NodeInterface,
+    event: DeviceEvent[Any], kind: str, log: NodeLog, interface: NodeEntities,
 ) -> None:
     """
     Write the log line of an event, and publish ``~/connected`` or ``~/source``; ignore others.

@@ -17,7 +17,7 @@ from rclpy.exceptions import InvalidHandle
 from rclpy.node import Node
 from rclpy.qos import QoSProfile, ReliabilityPolicy
 
-from .deferred_service import DeferredService, Respond, Take
+from .deferred_service import DeferredService, Handler, Respond
 from .link_call import LinkCalls, MAX_PENDING
 from .qos import STATE_QOS
 from .throttled_log import NodeLog
@@ -37,7 +37,7 @@ SWITCH_QOS = QoSProfile(depth=10, reliability=ReliabilityPolicy.RELIABLE)
 SERVICE_QOS = QoSProfile(depth=1000, reliability=ReliabilityPolicy.RELIABLE)
 
 
-class Interface(NamedTuple):
+class Entity(NamedTuple):
     """
     A topic or service ``~/name``; the tables of the pages are written from it.
 
@@ -53,7 +53,7 @@ class Interface(NamedTuple):
     meaning: str
     qos: QoSProfile | None = None
 
-    def of(self, prefix: str) -> Interface:
+    def of(self, prefix: str) -> Entity:
         """Return the same topic or service of a source, with the prefix of its names."""
         return self._replace(name=f'{prefix}{self.name}')
 
@@ -69,7 +69,7 @@ class RequestService:
         answered at once.
     """
 
-    endpoint: Interface
+    endpoint: Entity
     start: Callable[[Any, float, Answer], None]
     limit: int = MAX_PENDING
 
@@ -91,13 +91,13 @@ class CommandTopic(Generic[T]):
     """
     A topic that the node subscribes to.
 
-    :param take: called in the link's thread with a value and the time (s); of the values of a
-        stream that come faster than the link takes them only the newest.
+    :param receive: called in the link's thread with a value and the time (s); of the values of a
+        stream that come faster than the link handles them only the newest.
     :param read: returns the value of a message, in any thread; a ValueError is logged.
     """
 
-    endpoint: Interface
-    take: Callable[[T, float], None]
+    endpoint: Entity
+    receive: Callable[[T, float], None]
     # Untyped: of the class that the endpoint names.
     read: Callable[[Any], T] = finite_data
 
@@ -106,12 +106,12 @@ class CommandTopic(Generic[T]):
 AnyCommandTopic = CommandTopic[Any]
 
 
-class NodeInterface:
+class NodeEntities:
     """The topics and services of one node, as tables give them."""
 
     def __init__(
         self, node: Node, link: Link, log: NodeLog, *,
-        publications: Iterable[Interface] = (), services: Iterable[RequestService] = (),
+        publications: Iterable[Entity] = (), services: Iterable[RequestService] = (),
         commands: Iterable[AnyCommandTopic] = (),
     ) -> None:
         self._publishers = {
@@ -120,7 +120,7 @@ class NodeInterface:
         self._types = {one.name: one.type for one in publications}
         for service in services:
             calls, endpoint = LinkCalls(link, log, service.limit), service.endpoint
-            DeferredService(node, endpoint.type, f'~/{endpoint.name}', _taker(service, calls),
+            DeferredService(node, endpoint.type, f'~/{endpoint.name}', _handler(service, calls),
                             SERVICE_QOS, log)
         for command in commands:
             endpoint = command.endpoint
@@ -155,10 +155,10 @@ class NodeInterface:
             self.publish(name, make())
 
 
-def _taker(service: RequestService, calls: LinkCalls) -> Take:
+def _handler(service: RequestService, calls: LinkCalls) -> Handler:
     response = service.endpoint.type.Response
 
-    def take(request: Any, respond: Respond) -> None:
+    def handle(request: Any, respond: Respond) -> None:
         def start(now: float, answer: Respond) -> None:
             service.start(request, now, lambda success, message: answer(
                 response(success=success, message=message)))
@@ -166,7 +166,7 @@ def _taker(service: RequestService, calls: LinkCalls) -> Take:
         calls.ask(start, respond, lambda reason: response(success=False, message=reason),
                   kind=getattr(request, 'data', None))
 
-    return take
+    return handle
 
 
 class _TopicCalls(Generic[T]):
@@ -187,7 +187,7 @@ class _TopicCalls(Generic[T]):
             self._log.stream_failed(f'~/{endpoint.name}: ignored: {error}', endpoint.name)
             return
         if endpoint.qos is SWITCH_QOS:
-            self._link.call(functools.partial(self._command.take, value))
+            self._link.call(functools.partial(self._command.receive, value))
             return
         with self._lock:
             called = bool(self._waiting)
@@ -198,4 +198,4 @@ class _TopicCalls(Generic[T]):
     def _deliver(self, now: float) -> None:
         with self._lock:
             value = self._waiting.pop()
-        self._command.take(value, now)
+        self._command.receive(value, now)

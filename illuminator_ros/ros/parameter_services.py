@@ -26,7 +26,7 @@ from rclpy.node import Node
 from rclpy.parameter import Parameter
 from rclpy.qos import qos_profile_services_default, QoSProfile
 
-from .deferred_service import DeferredService, Respond, Take
+from .deferred_service import DeferredService, Handler, Respond
 from .ignored_parameters import did_you_mean
 from .link_call import LinkCalls
 from .parameters import ChangeableParameters, DeviceParameters, Values
@@ -81,7 +81,7 @@ class ParameterServices:
         qos = QoSProfile(depth=QUEUE_DEPTH,
                          reliability=qos_profile_services_default.reliability)
 
-        def serve(type_: type[Any], name: str, take: Take) -> None:
+        def serve(type_: type[Any], name: str, take: Handler) -> None:
             DeferredService(node, type_, f'~/{name}', take, qos, log)
 
         reads: tuple[tuple[type[Any], str, str, Callable[[str], object]], ...] = (

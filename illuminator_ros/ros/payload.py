@@ -24,7 +24,7 @@ from ..mavlink.link import Link
 ShutdownReport = Callable[[Hashable, int | None, str], None]
 
 
-class Host(NamedTuple):
+class BridgeContext(NamedTuple):
     """
     The services that the bridge offers to the ROS half of one payload.
 
@@ -94,7 +94,7 @@ class RosPayload:
     node_name: str
     make_client: Callable[[CommandSender, Values], Payload]
     # Untyped: the client is the one that make_client has returned.
-    serve: Callable[[Any, Host], ServedPayload]
+    serve: Callable[[Any, BridgeContext], ServedPayload]
     parameters: tuple[ParameterSpec, ...] = ()
     device_parameters: tuple[ParameterSpec, ...] = ()
     summary: str = ''

@@ -99,7 +99,7 @@ class ConsoleCommand(Generic[T_contra, R_co]):
         """Return the word that a line begins with."""
         return self.usage.partition(' ')[0]
 
-    def takes(self, count: int) -> bool:
+    def accepts(self, count: int) -> bool:
         """Return whether it takes so many arguments."""
         arguments = self.usage.split()[1:]
         return sum(one[0] != '[' for one in arguments) <= count <= len(arguments)
@@ -396,10 +396,10 @@ class SimulatedComponent(Generic[D]):
 
     def receive(self, source: Address, message: Message, now: float) -> None:
         """Receive a command or a message for this component, or a broadcast one."""
-        self._take(source, message, now)
+        self._receive(source, message, now)
         self._set_due()
 
-    def _take(self, source: Address, message: Message, now: float) -> None:
+    def _receive(self, source: Address, message: Message, now: float) -> None:
         behaviour = self.device.behaviour
         if now < self._silent_until:
             return

@@ -54,8 +54,8 @@ def pointed(mounts: MountOrientations, now: float = 0.0, device_id: int = 154) -
 def test_beam_points_where_the_gimbal_points_whatever_the_vehicle_does(
         gimbal: Vector, body: Vector, in_earth: bool) -> None:
     mounts = MountOrientations()
-    mounts.take(AUTOPILOT, vehicle(*body), 0.0)
-    assert mounts.take(GIMBAL, status(gimbal, EARTH if in_earth else VEHICLE), 0.0)
+    mounts.receive(AUTOPILOT, vehicle(*body), 0.0)
+    assert mounts.receive(GIMBAL, status(gimbal, EARTH if in_earth else VEHICLE), 0.0)
 
     # From the gimbal's axes to NED, then to those of the vehicle's body, FRD.
     in_ned = Rotation.from_euler('ZYX', gimbal[::-1])
@@ -78,7 +78,7 @@ def test_beam_points_where_the_gimbal_points_whatever_the_vehicle_does(
 def test_vehicle_without_attitude_counts_as_level_and_its_heading_must_be_known(
         message: GimbalDeviceAttitudeStatus, direction: Vector | None) -> None:
     mounts = MountOrientations()
-    mounts.take(GIMBAL, message, 0.0)
+    mounts.receive(GIMBAL, message, 0.0)
 
     assert pointed(mounts) == (None if direction is None else approx(direction, abs=1e-9))
 
@@ -86,18 +86,18 @@ def test_vehicle_without_attitude_counts_as_level_and_its_heading_must_be_known(
 @pytest.mark.parametrize('value', [NAN, math.inf, -math.inf])
 def test_attitude_of_the_vehicle_that_is_not_a_rotation_is_ignored(value: float) -> None:
     mounts = MountOrientations()
-    mounts.take(GIMBAL, status((0.0, 0.0, 0.5)), 0.0)
+    mounts.receive(GIMBAL, status((0.0, 0.0, 0.5)), 0.0)
     for body in ((value, 0.0, 0.0), (0.0, value, 0.0), (0.0, 0.0, value)):
-        mounts.take(AUTOPILOT, vehicle(*body), 0.0)
+        mounts.receive(AUTOPILOT, vehicle(*body), 0.0)
         assert pointed(mounts) == approx((math.cos(0.5), -math.sin(0.5), 0.0))
 
 
 def test_direction_ends_with_the_attitude_and_belongs_to_one_gimbal() -> None:
     mounts = MountOrientations()
-    mounts.take(GIMBAL, status((0.0, 0.0, 0.0)), 0.0)
-    mounts.take(AUTOPILOT, status((0.0, -1.0, 0.0), number=2), 1.0)
+    mounts.receive(GIMBAL, status((0.0, 0.0, 0.0)), 0.0)
+    mounts.receive(AUTOPILOT, status((0.0, -1.0, 0.0), number=2), 1.0)
     # Of another component than the autopilot.
-    mounts.take(GIMBAL, vehicle(1.0, 1.0, 1.0), 1.0)
+    mounts.receive(GIMBAL, vehicle(1.0, 1.0, 1.0), 1.0)
 
     assert pointed(mounts, 1.9) == approx((1, 0, 0))
     assert pointed(mounts, ATTITUDE_LIFETIME) is None
@@ -108,7 +108,7 @@ def test_direction_ends_with_the_attitude_and_belongs_to_one_gimbal() -> None:
 
 def test_forged_gimbals_take_no_memory_without_end() -> None:
     mounts = MountOrientations()
-    taken = [mounts.take(Address(system, 154), status((0.0, 0.0, 0.0)), 0.0)
+    taken = [mounts.receive(Address(system, 154), status((0.0, 0.0, 0.0)), 0.0)
              for system in range(1, 100)]
 
     assert taken.count(True) == MAX_MOUNTS

@@ -67,7 +67,7 @@ def test_the_uptime_tells_which_status_is_late_and_which_the_first_of_a_restart(
             order.lost()
         else:
             at, uptime = one
-            found += LETTERS[order.take(status(uptime), 1000.0 + at, lambda status: False)]
+            found += LETTERS[order.add(status(uptime), 1000.0 + at, lambda status: False)]
     assert found == places
 
 
@@ -84,7 +84,7 @@ def test_a_copy_by_a_second_path_that_contradicts_the_newest_status_is_late(
     statuses: list[tuple[float, dict[str, Any]]], places: str,
 ) -> None:
     order = StatusOrder()
-    assert ''.join(LETTERS[order.take(status(**fields), 1000.0 + at, lambda status: False)]
+    assert ''.join(LETTERS[order.add(status(**fields), 1000.0 + at, lambda status: False)]
                    for at, fields in statuses) == places
 
 
@@ -94,7 +94,7 @@ def test_a_copy_counts_if_a_command_expects_it_or_the_light_has_restarted() -> N
             (0.0, 1, OFF, False, Order.NEWEST), (1.0, 1, ON, False, Order.NEWEST),
             (1.1, 1, OFF, True, Order.NEWEST), (1.2, 1, ON, False, Order.LATE),
             (1.3, 0, OFF, False, Order.RESTARTED), (1.4, 1, ON, False, Order.NEWEST)):
-        assert order.take(
+        assert order.add(
             status(uptime, **fields), 1000.0 + at,
             lambda status, is_expected=is_expected: is_expected) is place  # type: ignore[misc]
 
@@ -128,8 +128,8 @@ def test_a_state_that_goes_back_and_forth_four_times_in_10_s_is_changing(
     changing = ChangingStates()
     found = None
     for number, fields in enumerate(states):
-        changing.take(status(number, **fields), 1000.0 + number * interval,
-                      is_commanded=number in commanded)
+        changing.add(status(number, **fields), 1000.0 + number * interval,
+                     is_commanded=number in commanded)
         if changing.are_changing and found is None:
             found = number + 1
             assert changing.until == pytest.approx(1000.0 + number * interval + CALM_TIME)
@@ -140,9 +140,9 @@ def test_states_count_as_changing_until_10_s_of_calm_though_commands_of_ours_are
 ) -> None:
     changing = ChangingStates()
     for number in range(20):
-        changing.take(status(number, **(ON if number % 2 else OFF)), 1000.0 + number,
-                      is_commanded=number > 8)
+        changing.add(status(number, **(ON if number % 2 else OFF)), 1000.0 + number,
+                     is_commanded=number > 8)
     assert changing.until == 1019.0 + CALM_TIME
     for number in range(5):
-        changing.take(status(20 + number, **ON), 1020.0 + number, is_commanded=False)
+        changing.add(status(20 + number, **ON), 1020.0 + number, is_commanded=False)
     assert changing.until == 1019.0 + CALM_TIME

@@ -40,10 +40,10 @@ def test_a_newer_message_replaces_its_whole_group_and_the_urgent_group_is_first(
 
     assert not queue.hold(SOURCE, heartbeat(18), 0.0)
     assert queue.dropped == 3
-    assert [message for _, message in queue.take(0.0)] == [position(3)]
+    assert [message for _, message in queue.pop(0.0)] == [position(3)]
     # The other group has its turn, though the urgent one has a message again.
     queue.hold(SOURCE, position(4), 0.0)
-    assert [[message for _, message in queue.take(0.0)] for _ in range(2)] == [
+    assert [[message for _, message in queue.pop(0.0)] for _ in range(2)] == [
         [*pair(2)], [position(4)]]
     assert not queue
 
@@ -53,7 +53,7 @@ def test_a_pair_replaces_the_second_half_that_was_held_alone() -> None:
     for message in (pair(1)[1], *pair(2)):
         queue.hold(SOURCE, message, 0.0)
 
-    assert [message for _, message in queue.take(0.0)] == [*pair(2)]
+    assert [message for _, message in queue.pop(0.0)] == [*pair(2)]
     assert queue.dropped == 1
 
 
@@ -68,7 +68,7 @@ def test_setpoints_replace_those_for_their_own_gimbal_only_and_gimbals_take_turn
     for turn in range(6):
         for device, system in devices:
             queue.hold(SOURCE, rate(device, turn, system), 0.0)
-        [(_, sent)] = queue.take(0.0)
+        [(_, sent)] = queue.pop(0.0)
         assert isinstance(sent, GimbalManagerSetAttitude)
         found.append((sent.gimbal_device_id, sent.target_system, sent.angular_velocity_z))
 

@@ -38,7 +38,7 @@ def frame(message_id: int, name: str, source: Address = LIGHT, payload: bytes = 
 def taken(queue: ForwardQueue, now: float = 0.0) -> list[str]:
     """Return the names of all frames that the queue still sends, in order."""
     names = []
-    while data := queue.take(now):
+    while data := queue.pop(now):
         names.append(data.decode().strip())
     assert not queue
     return names
@@ -122,7 +122,7 @@ def test_each_frame_is_taken_or_counted_as_dropped_and_the_size_is_right(
     put, got = Counter[int](), Counter[int]()
     for number, (takes, message_id, source, size) in enumerate(steps):
         if takes:
-            if data := queue.take(0.05 * number):
+            if data := queue.pop(0.05 * number):
                 got[int(data.split()[0])] += 1
         else:
             queue.put(frame(message_id, f'{message_id} {number}'.ljust(size), source),

@@ -27,7 +27,7 @@ def test_state_and_events_follow_from_the_inputs(
     status = link_state.LinkStatus('label', 0.0)
     for now, initial in enumerate(inputs):
         (input_,) = (one for one in link_state.LinkInput if one.value[0] == initial)
-        status.take(input_, float(now), 'name', 'reason')
+        status.transition(input_, float(now), 'name', 'reason')
     reported = [str(event).split(':')[0].removeprefix('link ') for event in status.events]
     assert (status.state, reported) == (state, events)
     assert state.is_open == (status.reason == '')

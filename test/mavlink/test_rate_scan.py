@@ -28,14 +28,14 @@ def test_each_rate_has_its_time_again_and_again_and_many_bytes_end_it_sooner() -
 
     assert scan.next_rate(SHARE - 0.1) is None
     assert scan.next_rate(SHARE) == 2
-    scan.take(bytes(ENOUGH - 1))
+    scan.feed(bytes(ENOUGH - 1))
     assert scan.next_rate(SHARE + 0.1) is None
-    scan.take(b'\0')
+    scan.feed(b'\0')
     assert [scan.next_rate(SHARE + 0.1), scan.next_rate(2 * SHARE + 0.1)] == [3, 1]
 
 
 def test_a_port_of_another_protocol_keeps_its_rate() -> None:
     scan = RateScan((1, 2), SHARE, 0.0)
-    scan.take(NMEA)
+    scan.feed(NMEA)
 
     assert scan.next_rate(100.0) is None

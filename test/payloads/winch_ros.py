@@ -8,19 +8,19 @@ from __future__ import annotations
 from illuminator_ros.payload.requests import Result
 from illuminator_ros.ros import monitor_view as shared
 from illuminator_ros.ros.monitor_view import Device, Key, Request, Topic
-from illuminator_ros.ros.node import CommandTopic, Interface, NodeInterface, SWITCH_QOS
-from illuminator_ros.ros.payload import Host, RosPayload, ServedPayload
+from illuminator_ros.ros.node import CommandTopic, Entity, NodeEntities, SWITCH_QOS
+from illuminator_ros.ros.payload import BridgeContext, RosPayload, ServedPayload
 from payloads.winch import WinchClient
 from std_msgs.msg import Float32
 
-LINE_LENGTH = Interface('line_length', Float32, 'length of the line that is out, m')
-RELEASE = Interface('cmd/release', Float32, 'length of line to release, m', SWITCH_QOS)
+LINE_LENGTH = Entity('line_length', Float32, 'length of the line that is out, m')
+RELEASE = Entity('cmd/release', Float32, 'length of line to release, m', SWITCH_QOS)
 
 
 class WinchNode(ServedPayload):
     """Serves all winches of a link with one node; at the end the winch stays as it is."""
 
-    def __init__(self, client: WinchClient, host: Host) -> None:
+    def __init__(self, client: WinchClient, host: BridgeContext) -> None:
         def release(length: float, now: float) -> None:
             for winch in client.winches.values():
                 winch.release(length, now, released)
@@ -28,7 +28,7 @@ class WinchNode(ServedPayload):
         def released(result: Result, now: float) -> None:
             host.log.info(f'~/cmd/release: {result.message}', 'release')
 
-        interface = NodeInterface(
+        interface = NodeEntities(
             host.node, host.link, host.log, publications=[LINE_LENGTH],
             commands=[CommandTopic(RELEASE, release)])
         client.events.subscribe(

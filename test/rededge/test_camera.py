@@ -355,7 +355,7 @@ def test_from_the_beginning_of_the_end_requests_are_answered_and_nothing_is_sent
     rig.component.close(rig.now, ENDING)
     rig.client.ping(rig.now, rig.take_result)
     rig.capture()
-    rig.client.feeder.orientation.take_attitude(
+    rig.client.feeder.orientation.receive_attitude(
         Input.ATTITUDE, Quaternion(), (0.0, 0.0, 0.0), Stamp(1, 0.0), rig.now)
     rig.run(0.6)
 

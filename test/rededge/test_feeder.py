@@ -55,7 +55,7 @@ class Rig:
         return Stamp(round((self.clock + self.now - age) * 1e9), age, self.simulated)
 
     def fix(self, position: Position = HERE, age: float = 0.0) -> list[Message]:
-        self.feeder.take_fix(position, self.stamp(age), self.now)
+        self.feeder.receive_fix(position, self.stamp(age), self.now)
         return self.take()
 
     def fix_sent(self) -> GpsRawInt:
@@ -66,21 +66,22 @@ class Rig:
 
     def velocity(self, *velocity: float, age: float = 0.0, name: Input = Input.VELOCITY,
                  body: Quaternion = ENU) -> None:
-        self.feeder.take_velocity(
+        self.feeder.receive_velocity(
             name, (velocity[0], velocity[1], velocity[2]), self.stamp(age), self.now, body)
 
     def imu(self, orientation: Quaternion | None = LEVEL, age: float = 0.0,
             name: Input = Input.IMU) -> list[Message]:
-        self.feeder.orientation.take_attitude(name, orientation, RATES, self.stamp(age), self.now)
+        self.feeder.orientation.receive_attitude(
+            name, orientation, RATES, self.stamp(age), self.now)
         return self.take()
 
     def mount(self, orientation: Quaternion = NADIR, age: float = 0.0,
               frame_id: str = 'base_link') -> list[Message]:
-        self.feeder.orientation.take_mount(orientation, frame_id, self.stamp(age), self.now)
+        self.feeder.orientation.receive_mount(orientation, frame_id, self.stamp(age), self.now)
         return self.take()
 
     def reference(self, utc: float, age: float = 0.0) -> None:
-        self.feeder.take_time_reference(round(utc * 1e9), self.stamp(age), self.now)
+        self.feeder.receive_time_reference(round(utc * 1e9), self.stamp(age), self.now)
 
     def image_time(self, utc: float) -> int:
         """Return the ROS time of an image, ns."""
@@ -174,7 +175,7 @@ def test_fixes_stamped_in_whole_seconds_are_mostly_refused_with_the_reason() -> 
 def test_speed_and_satellites_are_sent_while_they_are_fresh_re_15_re_30() -> None:
     rig = Rig()
     rig.velocity(3.0, 4.0, 0.0)
-    rig.feeder.take_satellites(9, rig.now)
+    rig.feeder.receive_satellites(9, rig.now)
     for after, speed, satellites in ((0.9, 500, 9), (0.2, 65535, 255)):
         rig.run(after)
         sent = rig.fix_sent()
@@ -393,7 +394,7 @@ def test_satellites_are_sent_each_second_for_the_web_page_if_that_is_asked_for_r
     rig = Rig(send_gps_status=asked)
     sent = []
     for _ in range(12):
-        rig.feeder.take_satellites(9, rig.now)
+        rig.feeder.receive_satellites(9, rig.now)
         sent += rig.run(0.1)
     assert classes(sent).count(GpsStatus) == expected
 

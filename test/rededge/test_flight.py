@@ -64,17 +64,17 @@ class Rig:
 
     def fix(self, time: float) -> None:
         truth, feeder, now = self.flight.truth(time), self.client.feeder, self.link.now
-        feeder.take_velocity(Input.VELOCITY, truth.velocity, self.stamp(time), now)
+        feeder.receive_velocity(Input.VELOCITY, truth.velocity, self.stamp(time), now)
         if time not in self.flight.outage:
-            feeder.take_fix(
+            feeder.receive_fix(
                 Position(0, truth.latitude, truth.longitude, truth.altitude + GEOID),
                 self.stamp(time), now)
 
     def attitude(self, time: float) -> None:
         truth, feeder, now = self.flight.truth(time), self.client.feeder, self.link.now
-        feeder.orientation.take_attitude(
+        feeder.orientation.receive_attitude(
             Input.IMU, enu_flu(truth.vehicle), UNKNOWN, self.stamp(time), now)
-        feeder.orientation.take_mount(
+        feeder.orientation.receive_mount(
             flip(truth.vehicle.inverse() * truth.camera * LENS), 'base_link',
             self.stamp(time), now)
 

@@ -28,7 +28,7 @@ from rclpy.parameter import parameter_dict_from_yaml_file
 from rclpy.qos import DurabilityPolicy, ReliabilityPolicy
 from support.embedded import refusal
 from support.gimbals import FakeManager, served_gimbals
-from support.graph import Interface, interface
+from support.graph import Entity, interface
 from support.light import Address, eventually, ServedLight
 from support.ports import free_port
 from support.processes import ended, python, ROOT
@@ -113,7 +113,7 @@ each_node = pytest.mark.parametrize('name', NODES)
 class Running:
     """The interfaces of all nodes, their diagnostics, and the QoS of their publishers."""
 
-    interfaces: dict[str, Interface]
+    interfaces: dict[str, Entity]
     reported: dict[str, set[str]]
     qos: dict[str, tuple[ReliabilityPolicy, DurabilityPolicy]]
 

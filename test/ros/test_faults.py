@@ -126,7 +126,8 @@ def test_parameter_service_that_fails_inside_answers_empty(ros: Ros, light: Serv
 
 
 @pytest.mark.parametrize(('owner', 'method'), [
-    (EventPublisher, 'take'), (DiagnosticsPublisher, 'poll'), (DiagnosticsPublisher, 'snapshot')])
+    (EventPublisher, 'handle'), (DiagnosticsPublisher, 'poll'),
+    (DiagnosticsPublisher, 'snapshot')])
 def test_publishing_goes_on_after_it_has_failed(
     ros: Ros, light: ServedLight, owner: type, method: str,
 ) -> None:

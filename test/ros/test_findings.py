@@ -263,7 +263,7 @@ def test_each_flag_is_logged_when_it_is_set_and_cleared_and_not_more_often_than_
 ) -> None:
     log = FlagLog()
     hot = (WARN, 'thermal throttling: dimmed because it is hot')
-    assert [log.take(flags, now) for flags, now in (
+    assert [log.note(flags, now) for flags, now in (
         (1, 0.0), (1, 1.0), (0, 2.0), (1, 3.0), (0, FLAG_PAUSE), (8, FLAG_PAUSE),
         (0x18, 2 * FLAG_PAUSE))] == [
         [hot], [], [], [], [(OK, 'thermal throttling cleared')], [(WARN, 'unknown flags 0x8')],

@@ -13,8 +13,8 @@ from illuminator_ros.ros.deferred_service import DeferredService
 from illuminator_ros.ros.link_call import LinkCalls, MAX_PENDING
 from illuminator_ros.ros.node import (
     CommandTopic,
-    Interface,
-    NodeInterface,
+    Entity,
+    NodeEntities,
     RequestService,
     SWITCH_QOS,
 )
@@ -64,14 +64,14 @@ def test_off_is_asked_however_many_requests_of_an_on_wait(ros: Ros) -> None:
     node = Node('switched', context=ros.context)
     # Any: a link that calls functions at once.
     link: Any = Mock(call=lambda function: function(0.0))
-    NodeInterface(node, link, Mock(), services=[RequestService(
-        Interface('enable', SetBool, ''),
+    NodeEntities(node, link, Mock(), services=[RequestService(
+        Entity('enable', SetBool, ''),
         lambda request, now, answer: asked.append(request.data))])
     [enable] = [one.callback for one in node.services if one.service_name == '/switched/enable']
     assert isinstance(enable, DeferredService)
 
     for on in [True] * (MAX_PENDING + 1) + [False]:
-        enable.take(SetBool.Request(data=on), Mock())
+        enable.handle(SetBool.Request(data=on), Mock())
     node.destroy_node()
 
     assert asked == [True] * MAX_PENDING + [False]
@@ -89,12 +89,12 @@ def test_single_messages_and_requests_keep_their_order_and_a_stream_only_its_new
     def take(value: object, now: float) -> None:
         taken.append(value)
 
-    NodeInterface(
+    NodeEntities(
         node, link, Mock(),
-        services=[RequestService(Interface('enable', SetBool, ''),
+        services=[RequestService(Entity('enable', SetBool, ''),
                                  lambda request, now, answer: taken.append('service'))],
-        commands=[CommandTopic(Interface('cmd/enable', Bool, '', SWITCH_QOS), take),
-                  CommandTopic(Interface('cmd/brightness', Float32, ''), take)])
+        commands=[CommandTopic(Entity('cmd/enable', Bool, '', SWITCH_QOS), take),
+                  CommandTopic(Entity('cmd/brightness', Float32, ''), take)])
     callbacks: dict[str, Any] = {
         one.topic_name: one.callback for one in node.subscriptions}
     switch, stream = (callbacks[f'/busy/cmd/{name}'] for name in ('enable', 'brightness'))
@@ -103,7 +103,7 @@ def test_single_messages_and_requests_keep_their_order_and_a_stream_only_its_new
 
     stream(Float32(data=1.0))
     switch(Bool(data=False))
-    service.take(SetBool.Request(data=True), Mock())
+    service.handle(SetBool.Request(data=True), Mock())
     stream(Float32(data=2.0))
     switch(Bool(data=False))
     for call in calls:

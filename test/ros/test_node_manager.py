@@ -14,7 +14,7 @@ from illuminator_ros.ros.device_nodes import DeviceNodes
 from illuminator_ros.ros.diagnostics_publisher import DiagnosticsSource
 from illuminator_ros.ros.node_manager import NodeManager, NodeRequest
 from illuminator_ros.ros.parameters import ParameterError
-from illuminator_ros.ros.payload import Host
+from illuminator_ros.ros.payload import BridgeContext
 from illuminator_ros.ros.payload_node import PayloadNode
 from illuminator_ros.ros.throttled_log import NodeLog
 import pytest
@@ -119,7 +119,7 @@ class Served:
         self.source = DiagnosticsSource(
             node.get_fully_qualified_name(), lambda now: lambda link: ())
 
-    def take(self, event: object) -> None:
+    def handle(self, event: object) -> None:
         """Publish nothing."""
 
     def release(self) -> None:
@@ -140,12 +140,12 @@ def test_device_found_again_while_its_node_is_made_has_one_node_and_one_diagnost
     def make(node: Node, log: NodeLog) -> Served:
         made.append(Served(node))
         if len(made) == 1:
-            nodes.take(DeviceForgotten(7))
+            nodes.handle(DeviceForgotten(7))
             nodes.serve(7, 'further')
         return made[-1]
 
     nodes = DeviceNodes[int, Served](
-        cast(Host, SimpleNamespace(
+        cast(BridgeContext, SimpleNamespace(
             node=first, nodes=pool, log=NodeLog(first.get_logger()),
             link=SimpleNamespace(clock=lambda: 0.0, call=turns.append),
             diagnostics=SimpleNamespace(add=sources.add, remove=sources.discard))),

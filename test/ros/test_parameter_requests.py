@@ -66,7 +66,7 @@ class Served:
         [service] = [one for one in self.node.services
                      if one.service_name == f'/served/{name}']
         assert isinstance(service.callback, DeferredService)
-        service.callback.take(request, self.answers.append)
+        service.callback.handle(request, self.answers.append)
 
     def set_parameters(self, *values: tuple[str, object], atomically: bool = False) -> None:
         """Request a set."""

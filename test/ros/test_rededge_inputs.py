@@ -127,7 +127,7 @@ def test_an_input_most_of_whose_messages_are_refused_is_a_warning_with_the_reaso
                     Schedule())
     here = Position(0, 47.0, 8.0, 500.0)
     for refused in range(9):
-        feeder.take_fix(here, Stamp(EPOCH, 0.0), 0.0)
+        feeder.receive_fix(here, Stamp(EPOCH, 0.0), 0.0)
         found = [text for _, text in input_findings(feeder.snapshot(0.0), {}) if '~/fix' in text]
         assert found == ([] if refused < 6 else [
             f'~/fix: {refused} of the last 10 messages were refused: its stamp is not newer than '

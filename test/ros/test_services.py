@@ -12,7 +12,7 @@ import socket
 import threading
 
 from illuminator_ros.mavlink.dialect import mavlink
-from illuminator_ros.ros.deferred_service import DeferredService, Respond, Take
+from illuminator_ros.ros.deferred_service import DeferredService, Handler, Respond
 from illuminator_ros.ros.node import SERVICE_QOS
 from illuminator_ros.ros.throttled_log import NodeLog
 import pytest
@@ -138,7 +138,7 @@ def node(ros: Ros) -> Iterator[Node]:
     node.destroy_node()
 
 
-def serve(node: Node, take: Take) -> None:
+def serve(node: Node, take: Handler) -> None:
     """Add the service ``~/slow``."""
     DeferredService(node, Trigger, '~/slow', take, SERVICE_QOS, NodeLog(node.get_logger()))
 

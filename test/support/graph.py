@@ -16,7 +16,7 @@ Lookup = Callable[[str, str], list[tuple[str, list[str]]]]
 
 
 @dataclass(frozen=True)
-class Interface:
+class Entity:
     """Names and types of the topics and services of a node."""
 
     publishers: dict[str, str]
@@ -25,13 +25,13 @@ class Interface:
     clients: dict[str, str]
 
 
-def interface(ros: Ros, node: str, last: Sequence[str]) -> Interface:
+def interface(ros: Ros, node: str, last: Sequence[str]) -> Entity:
     """
     Return the interface of a node in the root namespace.
 
     :param last: the names whose discovery completes it.
     """
-    def found() -> Interface | None:
+    def found() -> Entity | None:
         graph = ros.node
         lookups: tuple[Lookup, ...] = (
             graph.get_publisher_names_and_types_by_node,
@@ -42,7 +42,7 @@ def interface(ros: Ros, node: str, last: Sequence[str]) -> Interface:
             return None
         parts: Any = [{name: types[0] for name, types in lookup(node, '/')}
                       for lookup in lookups]
-        return Interface(*parts) if set(last) <= set().union(*parts) else None
+        return Entity(*parts) if set(last) <= set().union(*parts) else None
 
     interface = eventually(found)
     assert interface is not None

@@ -48,7 +48,7 @@ class Port:
             self.now += 0.25
             present = self.rates[-1][1] if self.rates else URL.baud
             if self._data and self.now % 1 == 0:
-                self.silent.take(self._data if present == self._rate or not self._rate else
+                self.silent.feed(self._data if present == self._rate or not self._rate else
                                  bytes(byte >> 1 | 0x80 for byte in self._data))
             self.silent.poll(self.frames, self.now)
         return self.silent.reason

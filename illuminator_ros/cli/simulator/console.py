@@ -93,7 +93,7 @@ def execute(line: str, components: Sequence[AnySimulated], now: float) -> str:
     if not targets:
         return f'no command or component {name!r}; help lists the commands'
     _, command = targets[0]
-    if not command.takes(len(rest)):
+    if not command.accepts(len(rest)):
         return f'usage: {command.usage}'
     try:
         answers = [_execute(*one, rest, now) for one in targets]

@@ -31,10 +31,10 @@ from ...ros.command_sources import prefixes, release_services, SOURCE
 from ...ros.conversions import GEOID_SEPARATION, quaternion_message
 from ...ros.device_nodes import publish_event
 from ...ros.diagnostics_publisher import DiagnosticsSource, MakeReports
-from ...ros.node import Interface
+from ...ros.node import Entity
 from ...ros.parameter_services import ParameterServices
 from ...ros.parameters import ChangeableParameters, given_parameters
-from ...ros.payload import Host
+from ...ros.payload import BridgeContext
 from ...ros.qos import STREAM_QOS
 from ...ros.throttled_log import NodeLog
 from ...ros.transforms import TransformPublisher
@@ -42,46 +42,46 @@ from ...ros.transforms import TransformPublisher
 T = TypeVar('T')
 
 PUBLICATIONS = (
-    Interface('connected', Bool, 'manager and device are heard'),
-    Interface('attitude', QuaternionStamped,
-              'axes ahead, left and up (FLU); `frame_id` names the yaw frame', STREAM_QOS),
-    Interface('angular_velocity', Vector3Stamped, 'rates of roll, pitch and yaw, rad/s; not '
-              'published where the device does not measure them', STREAM_QOS),
-    Interface('angles', Vector3Stamped, 'roll, pitch, yaw of the attitude, rad', STREAM_QOS),
-    Interface('yaw_lock', Bool, 'yaw is held against the earth'),
-    Interface('in_control', Bool, 'this node has primary control'),
-    Interface('controller', String,
-              'the components in control, such as `primary 1/195, secondary none`, or `unknown`'),
+    Entity('connected', Bool, 'manager and device are heard'),
+    Entity('attitude', QuaternionStamped,
+           'axes ahead, left and up (FLU); `frame_id` names the yaw frame', STREAM_QOS),
+    Entity('angular_velocity', Vector3Stamped, 'rates of roll, pitch and yaw, rad/s; not '
+           'published where the device does not measure them', STREAM_QOS),
+    Entity('angles', Vector3Stamped, 'roll, pitch, yaw of the attitude, rad', STREAM_QOS),
+    Entity('yaw_lock', Bool, 'yaw is held against the earth'),
+    Entity('in_control', Bool, 'this node has primary control'),
+    Entity('controller', String,
+           'the components in control, such as `primary 1/195, secondary none`, or `unknown`'),
 )
 # The request of each service to the gimbal; its message is the second argument.
-REQUESTS: dict[Interface, Callable[[Gimbal, Any, float, Done], None]] = {
-    Interface('take_control', Trigger, 'take primary control'):
+REQUESTS: dict[Entity, Callable[[Gimbal, Any, float, Done], None]] = {
+    Entity('take_control', Trigger, 'take primary control'):
         lambda gimbal, _, *asked: gimbal.take_control(*asked),
-    Interface('release_control', Trigger, 'stop, and release all control that this node has once '
-              'the gimbal stands'):
+    Entity('release_control', Trigger, 'stop, and release all control that this node has once '
+           'the gimbal stands'):
         lambda gimbal, _, *asked: gimbal.release_control(*asked),
-    Interface('neutral', Trigger, 'turn to the neutral position'):
+    Entity('neutral', Trigger, 'turn to the neutral position'):
         lambda gimbal, _, *asked: gimbal.request(NEUTRAL, *asked),
-    Interface('retract', Trigger, 'turn to the retracted position'):
+    Entity('retract', Trigger, 'turn to the retracted position'):
         lambda gimbal, _, *asked: gimbal.request(RETRACT, *asked),
-    Interface('clear_roi', Trigger, 'no longer point at a place'):
+    Entity('clear_roi', Trigger, 'no longer point at a place'):
         lambda gimbal, _, *asked: gimbal.request(None, *asked),
-    Interface('set_yaw_lock', SetBool, 'stop, and hold yaw against the earth or let it follow the '
-              'vehicle; refused where the gimbal lacks it'):
+    Entity('set_yaw_lock', SetBool, 'stop, and hold yaw against the earth or let it follow the '
+           'vehicle; refused where the gimbal lacks it'):
         lambda gimbal, message, *asked: gimbal.request(YAW_LOCKS[message.data], *asked),
 }
-CMD_ATTITUDE = Interface(
+CMD_ATTITUDE = Entity(
     'cmd/attitude', QuaternionStamped,
     'an attitude; `frame_id` names the yaw frame, any other is refused', ros_node.SWITCH_QOS)
-CMD_ANGLES = Interface(
+CMD_ANGLES = Entity(
     'cmd/angles', Vector3Stamped, 'the same as roll, pitch and yaw, rad; NaN leaves an axis where '
     'it was sent last, else where it is. Refused beyond pi, and pitch beyond pi/2',
     ros_node.SWITCH_QOS)
-CMD_RATE = Interface(
+CMD_RATE = Entity(
     'cmd/rate', Vector3Stamped, 'rates of roll, pitch and yaw, rad/s; `frame_id` is not read. '
     'Refused beyond 2 pi. When no message comes for `setpoint_timeout`, zero is sent until an '
     'attitude shows that the gimbal stands')
-CMD_ROI = Interface(
+CMD_ROI = Entity(
     'cmd/roi', NavSatFix, 'a place to point at (MAV_CMD_DO_SET_ROI_LOCATION); its altitude is '
     'above the ellipsoid. Set `geoid_separation`: until then the diagnostics warn while the '
     'gimbal points at a place', ros_node.SWITCH_QOS)
@@ -97,7 +97,7 @@ class GimbalNode:
     """
 
     def __init__(
-        self, node: Node, host: Host, log: NodeLog, client: GimbalClient,
+        self, node: Node, host: BridgeContext, log: NodeLog, client: GimbalClient,
         why_none: Callable[[], str], transforms: TransformPublisher | None = None,
         changeable: ChangeableParameters | None = None,
     ) -> None:
@@ -115,7 +115,7 @@ class GimbalNode:
         self._errors = 0
         self._geoid_is_known = GEOID_SEPARATION.name in given_parameters(host.node)
         sources = client.settings.sources
-        self._interface = ros_node.NodeInterface(
+        self._interface = ros_node.NodeEntities(
             node, host.link, log, publications=(*PUBLICATIONS, *([SOURCE] if sources else [])),
             services=(
                 *(ros_node.RequestService(one, functools.partial(self._request, one))
@@ -141,7 +141,7 @@ class GimbalNode:
             if snapshot.holder is not None:
                 self._interface.publish('source', snapshot.holder)
             for other in snapshot.managers[1:]:
-                self.take(events.SecondManager(key, snapshot.managers[0], other))
+                self.handle(events.SecondManager(key, snapshot.managers[0], other))
 
     def release(self) -> None:
         """Serve the gimbal no longer, since it was forgotten."""
@@ -165,7 +165,7 @@ class GimbalNode:
 
     # Events
 
-    def take(self, event: events.GimbalEvent) -> None:
+    def handle(self, event: events.GimbalEvent) -> None:
         """Publish an event of the gimbal."""
         name, warn = f'gimbal {event.key}', self._log.warning
         match event:
@@ -236,7 +236,7 @@ class GimbalNode:
             answer(False, self.absence(now))
 
     def _request(
-        self, service: Interface, message: Any, now: float, answer: ros_node.Answer,
+        self, service: Entity, message: Any, now: float, answer: ros_node.Answer,
     ) -> None:
         gimbal = self._gimbal()
         if gimbal is None:
@@ -256,11 +256,11 @@ class GimbalNode:
         separation: float = self._host.values['geoid_separation']
 
         def topic(
-            plain: Interface, send: Callable[..., None], read: Callable[[Any], T],
+            plain: Entity, send: Callable[..., None], read: Callable[[Any], T],
         ) -> ros_node.CommandTopic[T]:
             endpoint = plain.of(prefix)
 
-            def take(value: T, now: float) -> None:
+            def receive(value: T, now: float) -> None:
                 if (gimbal := self._gimbal()) is None:
                     self._refused(endpoint.name, self.absence(now))
                 else:
@@ -273,7 +273,7 @@ class GimbalNode:
                     # Once: the condition never ends.
                     self._log.write_conditions([NO_GEOID], 'geoid')
 
-            return ros_node.CommandTopic(endpoint, take, read)
+            return ros_node.CommandTopic(endpoint, receive, read)
 
         def move(gimbal: Gimbal, value: Move, now: float, done: Done, *, source: str) -> None:
             gimbal.request(value, now, done, is_call=False, source=source)

@@ -23,7 +23,7 @@ from ...ros.command_sources import SOURCE_PARAMETERS, source_settings
 from ...ros.conversions import GEOID_SEPARATION
 from ...ros.device_nodes import DeviceNodes
 from ...ros.parameters import by_name, ChangeableParameters, ParameterSpec, Values
-from ...ros.payload import Host, RosPayload, ServedPayload, ShutdownReport
+from ...ros.payload import BridgeContext, RosPayload, ServedPayload, ShutdownReport
 from ...ros.transforms import PUBLISH_TF, TransformPublisher
 
 GIMBAL_PARAMETERS = (
@@ -61,7 +61,7 @@ class Gimbals(ServedPayload):
     """
 
     def __init__(
-        self, client: GimbalClient, host: Host, why_none: Callable[[], str] = lambda: '',
+        self, client: GimbalClient, host: BridgeContext, why_none: Callable[[], str] = lambda: '',
     ) -> None:
         self._client = client
         self._host = host
@@ -80,7 +80,7 @@ class Gimbals(ServedPayload):
         self._client.change_settings(settings(values), now)
 
     def _take(self, event: GimbalEvent) -> None:
-        if not self._nodes.take(event) and isinstance(event, DeviceConnected):
+        if not self._nodes.handle(event) and isinstance(event, DeviceConnected):
             self._serve(event)
 
     def _serve(self, event: DeviceConnected[GimbalKey]) -> None:
@@ -88,7 +88,7 @@ class Gimbals(ServedPayload):
         key, nodes = event.key, self._nodes
         if nodes.first_is_free and self._host.values['gimbal_device_id'] in (0, key.device_id):
             nodes.bind(nodes.first, key, self._host.link.clock())
-            nodes.first.take(event)
+            nodes.first.handle(event)
         else:
             name = f'{self._host.node.get_name()}_{key.address.system}_{key.device_id}'
             if nodes.has_name(name):

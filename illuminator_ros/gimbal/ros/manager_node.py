@@ -42,7 +42,7 @@ from ...ros.conversions import (
 )
 from ...ros.diagnostics import ERROR, Finding, Report, Value, WARN
 from ...ros.diagnostics_publisher import DiagnosticsSource, MakeReports
-from ...ros.node import AnyCommandTopic, CommandTopic, Interface, NodeInterface
+from ...ros.node import AnyCommandTopic, CommandTopic, Entity, NodeEntities
 from ...ros.parameters import (
     by_name,
     given_parameters,
@@ -50,7 +50,7 @@ from ...ros.parameters import (
     ParameterSpec,
     Values,
 )
-from ...ros.payload import Host, RosPayload, ServedPayload, ShutdownReport
+from ...ros.payload import BridgeContext, RosPayload, ServedPayload, ShutdownReport
 from ...ros.qos import STREAM_QOS
 
 # The name of ROS in the lists of players.
@@ -59,16 +59,16 @@ ROS = 'ros'
 VEHICLE_RATE_LIMIT, VEHICLE_SPEED_LIMIT = 100.0, 10e3
 _RANGES = ((0.0, 0.0), (-math.pi / 2, math.pi / 2), (-math.pi, math.pi))
 
-DEVICE_SETPOINT = Interface(
+DEVICE_SETPOINT = Entity(
     'device/setpoint', QuaternionStamped, 'the attitude for the driver of a gimbal without '
     'MAVLink', STREAM_QOS)
-DEVICE_ATTITUDE = Interface(
+DEVICE_ATTITUDE = Entity(
     'device/attitude', QuaternionStamped, 'the attitude that the driver measures')
-IMU = Interface('imu', Imu, 'attitude of the vehicle, FLU in ENU')
-ODOMETRY = Interface('odometry', Odometry, 'attitude and velocity of the vehicle; the twist is in '
-                     'the axes of the body')
-FIX = Interface('fix', NavSatFix, 'position of the vehicle, for regions of interest; ignored '
-                'without a fix')
+IMU = Entity('imu', Imu, 'attitude of the vehicle, FLU in ENU')
+ODOMETRY = Entity('odometry', Odometry, 'attitude and velocity of the vehicle; the twist is in '
+                  'the axes of the body')
+FIX = Entity('fix', NavSatFix, 'position of the vehicle, for regions of interest; ignored '
+             'without a fix')
 MANAGER_PARAMETERS = (
     ParameterSpec('policy', Policy.HOLD.value, 'when a player takes control from another one',
                   choices=tuple(policy.value for policy in Policy), restricts=True),
@@ -149,7 +149,7 @@ class ManagerNode(ServedPayload):
     :raises ParameterError: if a parameter is wrong.
     """
 
-    def __init__(self, both: ManagerWithClient, host: Host) -> None:
+    def __init__(self, both: ManagerWithClient, host: BridgeContext) -> None:
         self._manager = manager = both.manager
         self._host = host
         self._log = host.log
@@ -158,7 +158,7 @@ class ManagerNode(ServedPayload):
         # Takes the results of the end of the process, None before.
         self._report: ShutdownReport | None = None
         self._gimbals = Gimbals(both.client, host, lambda: manager.tracker.inactive_reason)
-        self._interface = NodeInterface(
+        self._interface = NodeEntities(
             host.node, host.link, host.log,
             publications=() if manager.tracker.has_mavlink else (DEVICE_SETPOINT,),
             commands=tuple(self._topics()))

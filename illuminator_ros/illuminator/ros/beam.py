@@ -17,7 +17,7 @@ from ..events import LightEvent, StatusReceived
 from ..model import Mode, Status
 from ...payload.device_events import DeviceDisconnected
 from ...payload.rotation import Quaternion
-from ...ros.node import Interface
+from ...ros.node import Entity
 from ...ros.qos import STATE_QOS
 from ...ros.transforms import TransformPublisher
 
@@ -38,11 +38,11 @@ LIFETIME = 5
 MOVE_INTERVAL = 0.1
 
 
-def beam_topic() -> Interface:
+def beam_topic() -> Entity:
     """Return the topic; its type is imported only where the beam is shown."""
     from visualization_msgs.msg import Marker
 
-    return Interface(
+    return Entity(
         'beam', Marker, 'only with `beam_range`: [the beam](beam.md), for RViz and Foxglove')
 
 
@@ -122,7 +122,7 @@ class BeamFrame:
         self._is_fixed: bool | None = None
         self._device_id = 0
 
-    def take(self, event: LightEvent) -> None:
+    def handle(self, event: LightEvent) -> None:
         """Take an event of the light."""
         if isinstance(event, StatusReceived) and self._is_fixed is None:
             self._device_id = self._mounted_on or event.status.gimbal_device_id
@@ -170,7 +170,7 @@ class BeamPublisher:
         marker.points = [PointMessage(x=x, y=y, z=z)
                          for x, y, z in cone(geometry.beam_range, geometry.beam_angle)]
 
-    def take(self, event: LightEvent) -> None:
+    def handle(self, event: LightEvent) -> None:
         """Take an event of the light."""
         if isinstance(event, StatusReceived):
             self.device_id = self._mounted_on or event.status.gimbal_device_id

@@ -71,7 +71,7 @@ class FlagLog:
         # By flag, the name in its last line, '' if that reported it as cleared, and the time, s.
         self._reported: dict[int, tuple[str, float]] = {}
 
-    def take(self, flags: int, now: float) -> list[diagnostics.Finding]:
+    def note(self, flags: int, now: float) -> list[diagnostics.Finding]:
         """
         Return the lines to log, of level OK for a flag that was cleared.
 

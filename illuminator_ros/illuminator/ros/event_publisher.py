@@ -22,29 +22,29 @@ from ...payload.command_sources import DEFAULT
 from ...payload.device_events import DeviceConnected, DeviceDisconnected, DeviceHeld
 from ...ros.device_nodes import publish_event
 from ...ros.diagnostics import ERROR, WARN
-from ...ros.node import Interface, NodeInterface
+from ...ros.node import Entity, NodeEntities
 from ...ros.parameters import DeviceParameters
 from ...ros.qos import STREAM_QOS
 from ...ros.throttled_log import NodeLog
 
 # One value of each status, by topic. ``enabled`` is first, since callers wait for it.
-STATUS_TOPICS: dict[Interface, Callable[[model.Status], object]] = {
-    Interface('enabled', Bool, 'the light is on'): operator.attrgetter('enabled'),
-    Interface('brightness', Float32, '%'): operator.attrgetter('brightness'),
-    Interface('mode', String, '`unknown`, `internal_control`, `external_sync`'):
+STATUS_TOPICS: dict[Entity, Callable[[model.Status], object]] = {
+    Entity('enabled', Bool, 'the light is on'): operator.attrgetter('enabled'),
+    Entity('brightness', Float32, '%'): operator.attrgetter('brightness'),
+    Entity('mode', String, '`unknown`, `internal_control`, `external_sync`'):
         operator.attrgetter('mode.label'),
-    Interface('strobe_period', Float32, 's, 0 = no strobe'): operator.attrgetter('strobe_period'),
-    Interface('strobe_duty_cycle', Float32, '%'): operator.attrgetter('strobe_duty_cycle'),
-    Interface('error_flags', UInt32, 'ILLUMINATOR_ERROR_FLAGS as sent: 1 thermal throttling, '
-              '2 over-temperature shutdown, 4 thermistor failure'):
+    Entity('strobe_period', Float32, 's, 0 = no strobe'): operator.attrgetter('strobe_period'),
+    Entity('strobe_duty_cycle', Float32, '%'): operator.attrgetter('strobe_duty_cycle'),
+    Entity('error_flags', UInt32, 'ILLUMINATOR_ERROR_FLAGS as sent: 1 thermal throttling, '
+           '2 over-temperature shutdown, 4 thermistor failure'):
         operator.attrgetter('error_flags'),
-    Interface('uptime', Float64, 's'): lambda status: status.uptime_ms / 1000.0,
+    Entity('uptime', Float64, 's'): lambda status: status.uptime_ms / 1000.0,
 }
 PUBLICATIONS = (
-    Interface('connected', Bool, 'the bridge hears the light; on change'),
+    Entity('connected', Bool, 'the bridge hears the light; on change'),
     *STATUS_TOPICS,
-    Interface('temperature', Temperature, 'degC; not published if the light does not measure it '
-              'or its sensor failed', STREAM_QOS),
+    Entity('temperature', Temperature, 'degC; not published if the light does not measure it '
+           'or its sensor failed', STREAM_QOS),
 )
 # Events that may change a level.
 _DIAGNOSED = (DeviceConnected, DeviceDisconnected, events.LightIdentified, DeviceHeld,
@@ -66,7 +66,7 @@ class EventPublisher:
     """
 
     def __init__(
-        self, node: Node, interface: NodeInterface, parameters: DeviceParameters, log: NodeLog, *,
+        self, node: Node, interface: NodeEntities, parameters: DeviceParameters, log: NodeLog, *,
         limits: model.SafetyLimits, frame_id: str, check_diagnostics: Callable[[], None],
         sender_of: Callable[[Address, int, float | None], Address | None],
     ) -> None:
@@ -95,7 +95,7 @@ class EventPublisher:
         self._parameters.respecify(device_parameters(limits))
         self._fit()
 
-    def take(self, event: events.LightEvent) -> None:
+    def handle(self, event: events.LightEvent) -> None:
         """Publish an event."""
         if isinstance(event, events.StatusReceived):
             self._status_received(event)
@@ -177,7 +177,7 @@ class EventPublisher:
         if event.status.strobe_range != self._strobe_range:
             self._strobe_range = event.status.strobe_range
             self._fit()
-        for level, text in self._flags.take(event.status.error_flags, event.received_at):
+        for level, text in self._flags.note(event.status.error_flags, event.received_at):
             self._log.write(_SEVERITIES.get(level, logging.INFO), f'light {event.key}: {text}',
                             'flags')
         self._check_diagnostics()

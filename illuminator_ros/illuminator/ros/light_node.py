@@ -30,16 +30,16 @@ from ...ros.diagnostics import DISCOVERY_GRACE
 from ...ros.diagnostics_publisher import DiagnosticsSource, MakeReports
 from ...ros.parameter_services import ParameterServices
 from ...ros.parameters import ChangeableParameters, DeviceParameters, ParameterError
-from ...ros.payload import Host
+from ...ros.payload import BridgeContext
 from ...ros.throttled_log import NodeLog
 from ...ros.transforms import TransformPublisher
 
-ENABLE = ros_node.Interface('enable', SetBool, 'switch the light on or off')
-REFRESH = ros_node.Interface('refresh', Trigger, 'request identity and status again')
-CMD_ENABLE = ros_node.Interface(
+ENABLE = ros_node.Entity('enable', SetBool, 'switch the light on or off')
+REFRESH = ros_node.Entity('refresh', Trigger, 'request identity and status again')
+CMD_ENABLE = ros_node.Entity(
     'cmd/enable', Bool, 'the same as the service, for joysticks and behaviour trees',
     ros_node.SWITCH_QOS)
-CMD_BRIGHTNESS = ros_node.Interface(
+CMD_BRIGHTNESS = ros_node.Entity(
     'cmd/brightness', Float32,
     'a stream of setpoints, %: the newest wins, with one command in flight, whatever the rate')
 # Refreshes that may wait for their answers: each is two messages of the light.
@@ -63,7 +63,7 @@ class LightNode:
     """
 
     def __init__(
-        self, node: Node, host: Host, log: NodeLog, client: IlluminatorClient,
+        self, node: Node, host: BridgeContext, log: NodeLog, client: IlluminatorClient,
         geometry: BeamGeometry, limits: SafetyLimits, *,
         services: tuple[ros_node.RequestService, ...] = (),
         commands: tuple[ros_node.AnyCommandTopic, ...] = (),
@@ -81,7 +81,7 @@ class LightNode:
         parameters = DeviceParameters(node, device_parameters(limits), log)
         self._overrides = _checked(parameters.overrides(), limits)
         sources = client.settings.sources
-        interface = ros_node.NodeInterface(
+        interface = ros_node.NodeEntities(
             node, host.link, log, publications=(*PUBLICATIONS, *([SOURCE] if sources else [])),
             services=(
                 *(self._enable_service(*way) for way in prefixes(sources).items()),
@@ -118,7 +118,7 @@ class LightNode:
         light = self._client.lights.get(address)
         if light is not None:
             for event in light.snapshot(now).events():
-                self.take(event)
+                self.handle(event)
             if self._overrides:
                 light.require(self._overrides, now)
 
@@ -128,13 +128,13 @@ class LightNode:
             self._host.frame_log.assign(self.address, None)
         self.address = None
 
-    def take(self, event: LightEvent) -> None:
+    def handle(self, event: LightEvent) -> None:
         """Publish an event of the light."""
-        self._publishers.take(event)
+        self._publishers.handle(event)
         if self._beam is not None:
-            self._beam.take(event)
+            self._beam.handle(event)
         if self._frame is not None:
-            self._frame.take(event)
+            self._frame.handle(event)
 
     def limits_changed(self) -> None:
         """Show the limits of the client in the descriptions of the parameters."""

@@ -22,15 +22,15 @@ from ...mavlink.messages import Address
 from ...payload.device_events import DeviceConnected
 from ...payload.requests import Done, Result
 from ...ros.device_nodes import DeviceNodes
-from ...ros.node import Answer, CommandTopic, Interface, RequestService, SWITCH_QOS
+from ...ros.node import Answer, CommandTopic, Entity, RequestService, SWITCH_QOS
 from ...ros.parameters import ChangeableParameters, Values
-from ...ros.payload import Host, RosPayload, ServedPayload, ShutdownReport
+from ...ros.payload import BridgeContext, RosPayload, ServedPayload, ShutdownReport
 from ...ros.transforms import TransformPublisher
 
-ENABLE_ALL = Interface(
+ENABLE_ALL = Entity(
     'enable_all', SetBool, 'first node only: switch all connected lights; the answer names each '
     'outcome, and is `true` if all succeeded')
-CMD_ENABLE_ALL = Interface(
+CMD_ENABLE_ALL = Entity(
     'cmd/enable_all', Bool, 'the same as the service `~/enable_all`', SWITCH_QOS)
 # s from the first light to the warnings on unused names: lights that start together are heard by
 # then.
@@ -44,7 +44,7 @@ class Lights(ServedPayload):
     :raises ParameterError: if a parameter is wrong.
     """
 
-    def __init__(self, client: IlluminatorClient, host: Host) -> None:
+    def __init__(self, client: IlluminatorClient, host: BridgeContext) -> None:
         self._client = client
         self._host = host
         self._selection = parameters.Selection(host.values)
@@ -68,7 +68,7 @@ class Lights(ServedPayload):
             host.log.warning(f'max_brightness is {limit:g} %: it is a percentage, not a fraction')
         self._second_reported = False
         self._names_due = math.inf
-        client.events.subscribe(self._take)
+        client.events.subscribe(self._handle)
         client.mount_moved.subscribe(self._mount_moved)
 
     def _mount_moved(self, system: int) -> None:
@@ -76,11 +76,11 @@ class Lights(ServedPayload):
             if node.address and node.address.system == system:
                 node.mount_moved()
 
-    def _take(self, event: events.LightEvent) -> None:
+    def _handle(self, event: events.LightEvent) -> None:
         if isinstance(event, events.LightRestarted):
             # Its sequence numbers have restarted, which is not a loss.
             self._host.link.lines.reset_loss(event.key)
-        if not self._nodes.take(event) and isinstance(
+        if not self._nodes.handle(event) and isinstance(
                 event, DeviceConnected | events.StatusReceived):
             self._serve(event.key)
 

@@ -296,7 +296,7 @@ class StreamChannel(Channel):
             frames: list[bytes] = []
             size = 0
             while (size < FORWARD_SIZE and self.free_at <= now + FORWARD_AHEAD
-                    and (frame := self._forwarded.take(now))):
+                    and (frame := self._forwarded.pop(now))):
                 frames.append(frame)
                 size += len(frame)
                 self.free_at = max(now, self.free_at) + len(frame) / (FORWARD_SHARE * self.rate)

@@ -43,7 +43,7 @@ from ...payload.rotation import Vector
 from ...ros.conversions import GEOID_SEPARATION, quaternion_message
 from ...ros.device_nodes import ABSENCE_DELAY, publish_event
 from ...ros.diagnostics_publisher import DiagnosticsSource, MakeReports
-from ...ros.node import Answer, Interface, NodeInterface, RequestService
+from ...ros.node import Answer, Entity, NodeEntities, RequestService
 from ...ros.parameter_services import ParameterServices
 from ...ros.parameters import (
     by_name,
@@ -54,7 +54,7 @@ from ...ros.parameters import (
     ParameterSpec,
     Values,
 )
-from ...ros.payload import Host, RosPayload, ServedPayload
+from ...ros.payload import BridgeContext, RosPayload, ServedPayload
 from ...ros.qos import STREAM_QOS
 from ...ros.transforms import PUBLISH_TF, TransformPublisher
 
@@ -68,18 +68,18 @@ DISCOVERY_TIME = 2.0
 COUNT_INTERVAL = 1.0
 
 PUBLICATIONS = (
-    Interface('connected', Bool, "the camera's heartbeat is heard"),
-    Interface('image/fix', NavSatFix, 'position of an image; its altitude is above the ellipsoid',
-              STREAM_QOS),
-    Interface('image/attitude', QuaternionStamped,
-              'orientation of the camera in that image, in `map` (ENU)', STREAM_QOS),
-    Interface('image/index', UInt32, 'its number, as the camera counts captures by MAVLink',
-              STREAM_QOS),
+    Entity('connected', Bool, "the camera's heartbeat is heard"),
+    Entity('image/fix', NavSatFix, 'position of an image; its altitude is above the ellipsoid',
+           STREAM_QOS),
+    Entity('image/attitude', QuaternionStamped,
+           'orientation of the camera in that image, in `map` (ENU)', STREAM_QOS),
+    Entity('image/index', UInt32, 'its number, as the camera counts captures by MAVLink',
+           STREAM_QOS),
 )
-PING = Interface('ping', Trigger, 'round trip through the camera; the message has the time in ms')
+PING = Entity('ping', Trigger, 'round trip through the camera; the message has the time in ms')
 CAPTURES = {
-    Interface('capture', Trigger, 'take an image'): Shot.SURVEY,
-    Interface('capture_panel', Trigger, 'take an image of the calibration panel'): Shot.PANEL,
+    Entity('capture', Trigger, 'take an image'): Shot.SURVEY,
+    Entity('capture_panel', Trigger, 'take an image of the calibration panel'): Shot.PANEL,
 }
 PARAMETERS = (
     ParameterSpec('position_source', 'raw', 'messages that carry the position: GPS_RAW_INT, or '
@@ -114,7 +114,7 @@ class CameraNode(ServedPayload):
     :raises ParameterError: if a parameter is wrong.
     """
 
-    def __init__(self, client: RedEdgeClient, host: Host) -> None:
+    def __init__(self, client: RedEdgeClient, host: BridgeContext) -> None:
         self._client = client
         self._host = host
         # Untyped: rclpy types it as a Clock, which lacks ``ros_time_is_active``.
@@ -127,7 +127,7 @@ class CameraNode(ServedPayload):
         self._topics = {one: host.node.resolve_topic_name(f'~/{one.value}') for one in Input}
         self._graph: dict[Input, InputTopic] = {}
         self._count_due = -math.inf
-        self._interface = NodeInterface(
+        self._interface = NodeEntities(
             host.node, host.link, host.log, publications=PUBLICATIONS,
             services=(
                 RequestService(PING, self._ping),
@@ -152,7 +152,7 @@ class CameraNode(ServedPayload):
                 change=self._change_parameters))
         host.diagnostics.add(DiagnosticsSource(
             host.node.get_fully_qualified_name(), self._take_snapshot))
-        client.events.subscribe(self._take)
+        client.events.subscribe(self._handle)
 
     # Requests
 
@@ -252,7 +252,7 @@ class CameraNode(ServedPayload):
 
     # Events
 
-    def _take(self, event: CameraEvent) -> None:
+    def _handle(self, event: CameraEvent) -> None:
         if isinstance(event, ImageTaken):
             self._publish(event.feedback)
         else:

@@ -25,7 +25,7 @@ from ..input_states import Input, Stamp, UNKNOWN
 from ...mavlink.link import Link
 from ...payload.rotation import Quaternion, Vector
 from ...ros.conversions import NO_VALUE, read_orientation, read_quaternion, read_vector
-from ...ros.node import AnyCommandTopic, CommandTopic, Interface
+from ...ros.node import AnyCommandTopic, CommandTopic, Entity
 
 # s; a greater change relative to a steady clock is a jump. Simulated time may run fast and in
 # steps, so its limit is higher.
@@ -34,7 +34,7 @@ SIMULATED_JUMP = 5.0
 
 
 TOPICS = {
-    name: Interface(name.value, type_, meaning) for name, type_, meaning in (
+    name: Entity(name.value, type_, meaning) for name, type_, meaning in (
         (Input.FIX, NavSatFix,
          'required: position; its altitude is above the WGS84 ellipsoid'),
         (Input.VELOCITY, TwistStamped,
@@ -70,9 +70,9 @@ class StampReader:
         self._handle = self._clock.create_jump_callback(
             JumpThreshold(min_forward=Duration(seconds=SIMULATED_JUMP),
                           min_backward=Duration(nanoseconds=-1), on_clock_change=True),
-            post_callback=self._take_jump)
+            post_callback=self._handle_jump)
 
-    def _take_jump(self, jump: TimeJump) -> None:
+    def _handle_jump(self, jump: TimeJump) -> None:
         self._jumped()
 
     def read(self, header: Header) -> Stamp:
@@ -117,24 +117,24 @@ def subscriptions(node: Node, link: Link, feeder: Feeder) -> Iterable[AnyCommand
         return CommandTopic(TOPICS[name], lambda taken, now: take(*taken, now), read)
 
     return (
-        topic(Input.FIX, lambda one: (position(one),), feeder.take_fix),
+        topic(Input.FIX, lambda one: (position(one),), feeder.receive_fix),
         topic(Input.VELOCITY, lambda one: (read_vector(one.twist.linear),),
-              functools.partial(feeder.take_velocity, Input.VELOCITY)),
+              functools.partial(feeder.receive_velocity, Input.VELOCITY)),
         topic(Input.VELOCITY_WITH_COVARIANCE, lambda one: (read_vector(one.twist.twist.linear),),
-              functools.partial(feeder.take_velocity, Input.VELOCITY_WITH_COVARIANCE)),
+              functools.partial(feeder.receive_velocity, Input.VELOCITY_WITH_COVARIANCE)),
         topic(Input.ODOMETRY, lambda one: (
                   read_vector(one.twist.twist.linear), read_quaternion(one.pose.pose.orientation)),
-              lambda velocity, body, stamp, now: feeder.take_velocity(
+              lambda velocity, body, stamp, now: feeder.receive_velocity(
                   Input.ODOMETRY, velocity, stamp, now, body)),
-        CommandTopic(TOPICS[Input.SATELLITES], feeder.take_satellites),
+        CommandTopic(TOPICS[Input.SATELLITES], feeder.receive_satellites),
         topic(Input.IMU, orientation_and_rates,
-              functools.partial(feeder.orientation.take_attitude, Input.IMU)),
+              functools.partial(feeder.orientation.receive_attitude, Input.IMU)),
         topic(Input.ATTITUDE, lambda one: (read_quaternion(one.quaternion), UNKNOWN),
-              functools.partial(feeder.orientation.take_attitude, Input.ATTITUDE)),
+              functools.partial(feeder.orientation.receive_attitude, Input.ATTITUDE)),
         topic(Input.MOUNT,
               lambda one: (read_quaternion(one.quaternion), one.header.frame_id),
-              feeder.orientation.take_mount),
+              feeder.orientation.receive_mount),
         topic(Input.TIME_REFERENCE,
               lambda one: (one.time_ref.sec * 1_000_000_000 + one.time_ref.nanosec,),
-              feeder.take_time_reference),
+              feeder.receive_time_reference),
     )
