@@ -19,9 +19,16 @@ import xml.etree.ElementTree as ET
 
 from illuminator_ros.cli.payloads import PAYLOADS
 from illuminator_ros.gimbal import simulated_manager
+from illuminator_ros.gimbal.gimbal_reports import GIMBAL_MESSAGE
+from illuminator_ros.gimbal.managed_device import DEVICE_INFORMATION
+from illuminator_ros.gimbal.rate_stop import STILL_TURNING, ZERO_RATE
+from illuminator_ros.illuminator.light_queries import MESSAGE
+from illuminator_ros.illuminator.rules import REQUIRED
 from illuminator_ros.illuminator.simulated_properties import PROFILES
-from illuminator_ros.mavlink.retries import POLICIES
+from illuminator_ros.mavlink.retries import CLOSING, COMMAND, CONNECTION, REJECTED, RESOURCE
+from illuminator_ros.payload.attempt import STATUS, STILL_UNCONFIRMED, UNCONFIRMED
 from illuminator_ros.rededge.conversions import FIELDS
+from illuminator_ros.rededge.pings import PING
 from illuminator_ros.rededge.simulated import COLUMNS
 
 if TYPE_CHECKING:
@@ -57,7 +64,10 @@ def tool_tables() -> Tables:
         ('design', 'tried again'): [
             [one.subject, f'{one.first:g}', f'{one.longest:g}',
              '' if one.tries == math.inf else f'{one.tries:g}']
-            for one in POLICIES],
+            for one in (
+                CONNECTION, COMMAND, REJECTED, STATUS, UNCONFIRMED, STILL_UNCONFIRMED, CLOSING,
+                REQUIRED, MESSAGE, GIMBAL_MESSAGE, DEVICE_INFORMATION, ZERO_RATE, STILL_TURNING,
+                PING, RESOURCE)],
         ('ros', 'argument of `bridge.launch.xml`'): launch_arguments('bridge.launch.xml'),
         ('simulator', 'profile'): [
             [f'`{name}`', profile.description] for name, profile in PROFILES.items()],

@@ -11,6 +11,7 @@ import math
 
 from .events import GimbalEvent, GimbalKey
 from .gimbal import Gimbal, GimbalSettings
+from .gimbal_reports import GIMBAL_MESSAGE
 from .messages import (
     GimbalDeviceInformation,
     GimbalManagerInformation,
@@ -24,7 +25,7 @@ from ..mavlink.command_sender import Command, CommandSender, request_message
 from ..mavlink.component import Payload
 from ..mavlink.dialect import mavlink
 from ..mavlink.messages import Address, Heartbeat, Message
-from ..mavlink.retries import GIMBAL_MESSAGE, Retries
+from ..mavlink.retries import Retries
 from ..payload.discovery import Discovery, FORGET_AFTER
 from ..payload.listeners import Listeners
 from ..payload.messages import GimbalDeviceAttitudeStatus

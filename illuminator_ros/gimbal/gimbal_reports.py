@@ -21,7 +21,7 @@ from ..mavlink.command_sender import (
 )
 from ..mavlink.dialect import mavlink, short_names
 from ..mavlink.messages import Address, result_name
-from ..mavlink.retries import GIMBAL_MESSAGE, Retries
+from ..mavlink.retries import Retries, RetryPolicy
 from ..payload.device_events import DeviceConnected, DeviceDisconnected
 from ..payload.liveness import Liveness
 from ..payload.messages import GimbalDeviceAttitudeStatus
@@ -29,6 +29,7 @@ from ..payload.mount_attitude import MountAttitude, YawFrame
 from ..payload.requests import Result
 from ..payload.rotation import Quaternion
 
+GIMBAL_MESSAGE = RetryPolicy('a message of a gimbal or its manager', 1.0, 60.0)
 # s of silence after which a manager or a device is lost.
 SILENCE_LIMIT = 3.0
 # s since the last GIMBAL_MANAGER_STATUS after which it is requested (ArduPilot does not stream it,

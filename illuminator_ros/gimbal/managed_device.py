@@ -14,7 +14,7 @@ from .messages import GimbalDeviceInformation, rates_of
 from .vehicle_state import VehicleState
 from ..mavlink.command_sender import CommandResult, CommandSender, request_message
 from ..mavlink.dialect import mavlink
-from ..mavlink.retries import DEVICE_INFORMATION, Retries
+from ..mavlink.retries import Retries, RetryPolicy
 from ..payload.messages import GimbalDeviceAttitudeStatus
 from ..payload.mount_attitude import (
     heading_of,
@@ -26,6 +26,7 @@ from ..payload.mount_attitude import (
 )
 from ..payload.rotation import Vector
 
+DEVICE_INFORMATION = RetryPolicy('GIMBAL_DEVICE_INFORMATION, by `gimbal_manager`', 0.5, 5.0)
 # Requests for GIMBAL_DEVICE_INFORMATION without the message after which the manager announces the
 # gimbal without it; and the longest time of one, s, which a device may prolong with progress, and
 # command_timeout too.

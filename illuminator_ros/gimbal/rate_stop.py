@@ -10,10 +10,12 @@ import math
 
 from .axes import TURNING
 from .messages import rates_of
-from ..mavlink.retries import Retries, STILL_TURNING, ZERO_RATE
+from ..mavlink.retries import Retries, RetryPolicy
 from ..payload.messages import GimbalDeviceAttitudeStatus
 from ..payload.mount_attitude import MountAttitude
 
+ZERO_RATE = RetryPolicy('a rate of zero, until the gimbal stands', 0.1, 0.1, 10)
+STILL_TURNING = RetryPolicy('a rate of zero after these', 1.0, 1.0)
 # s; the least time between two attitudes that show whether a device turns, since one may be a copy
 # of the other; and from a zero to the first attitude that counts. Many devices send one in 0.1 s.
 ATTITUDE_SPACING = 0.09
@@ -61,9 +63,9 @@ class RateStop:
     The message may be lost, and nothing else would end the rate: its user is gone, the process
     ends, another manager has the device, or the link was lost. No I/O; times are s.
 
-    :param told: called with False when :data:`~..mavlink.retries.ZERO_RATE` is over and no
+    :param told: called with False when :data:`ZERO_RATE` is over and no
         attitude has shown that the device stands, with True each time when one shows that.
-    :param lasts: whether it then goes on with :data:`~..mavlink.retries.STILL_TURNING`, and sends
+    :param lasts: whether it then goes on with :data:`STILL_TURNING`, and sends
         the message again if the device turns within :data:`LATE_TIME` by a rate that was late.
     :ivar is_running: whether the device may turn at the rate, or the rate may be late.
     :ivar begun: when the rate ended.

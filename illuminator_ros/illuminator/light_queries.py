@@ -20,12 +20,14 @@ from ..mavlink.command_sender import (
 )
 from ..mavlink.dialect import mavlink
 from ..mavlink.messages import ComponentInformationBasic
-from ..mavlink.retries import MESSAGE, Retries
+from ..mavlink.retries import Retries, RetryPolicy
 from ..payload.attempt import Target
 from ..payload.identity import Identity
 from ..payload.liveness import Liveness
 from ..payload.requests import Done, Result
 
+MESSAGE = RetryPolicy('a message that a light acknowledges or refuses, and does not send',
+                      0.5, 0.5, 3)
 # s without a status after which the light is asked for one, and between the requests.
 STATUS_TIMEOUT = 2.5
 # s from the first request until the identity counts as unknown.

@@ -18,10 +18,11 @@ from .settings import LightSettings
 from .silence import Silence
 from .twin import Failure, Twin
 from ..mavlink.command_sender import format_seconds
-from ..mavlink.retries import REQUIRED, UNCONFIRMED
-from ..payload.attempt import Target
+from ..mavlink.retries import RetryPolicy
+from ..payload.attempt import Target, UNCONFIRMED
 from ..payload.requests import Request, Requests, Result, WEAK, Why
 
+REQUIRED = RetryPolicy('a restored configuration, overrides and limits', 2.0, 60.0)
 # s to wait for the first status before a complete set of overrides is sent without one.
 FIRST_STATUS_TIMEOUT = 3.0
 ENDED = Result(False, '', superseded=True)

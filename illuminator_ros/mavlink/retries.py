@@ -68,24 +68,6 @@ class Retries:
 COMMAND = RetryPolicy(
     'a command without an acknowledgement (`command_timeout`, `command_retries`)', 0.25, 1.0, 4)
 REJECTED = RetryPolicy('a command that was temporarily rejected', 0.1, 0.8)
-STATUS = RetryPolicy('the request for a status, after one that does not show the change',
-                     0.05, 0.25)
-UNCONFIRMED = RetryPolicy('an automatic OFF that no status shows, and a command that may be '
-                          'confused with an earlier one', 0.25, 0.25, 10)
-STILL_UNCONFIRMED = RetryPolicy('an automatic OFF after these', 2.0, 2.0)
 CLOSING = RetryPolicy('a command while the process ends, which has less than a second', 0.1, 0.1)
-REQUIRED = RetryPolicy('a restored configuration, overrides and limits', 2.0, 60.0)
-MESSAGE = RetryPolicy('a message that a light acknowledges or refuses, and does not send',
-                      0.5, 0.5, 3)
-GIMBAL_MESSAGE = RetryPolicy('a message of a gimbal or its manager', 1.0, 60.0)
-DEVICE_INFORMATION = RetryPolicy('GIMBAL_DEVICE_INFORMATION, by `gimbal_manager`', 0.5, 5.0)
-ZERO_RATE = RetryPolicy('a rate of zero, until the gimbal stands', 0.1, 0.1, 10)
-STILL_TURNING = RetryPolicy('a rate of zero after these', 1.0, 1.0)
-PING = RetryPolicy('a PING that a service call asks for', 1.0, 1.0, 2)
 CONNECTION = RetryPolicy('the opening of a link, with half of the wait at random', 0.05, 0.5)
 RESOURCE = RetryPolicy('a node or a thread for which the system has no room', 0.5, 0.5)
-
-# In the order of the table in doc/links.md.
-POLICIES = (CONNECTION, COMMAND, REJECTED, STATUS, UNCONFIRMED, STILL_UNCONFIRMED, CLOSING,
-            REQUIRED, MESSAGE, GIMBAL_MESSAGE, DEVICE_INFORMATION, ZERO_RATE, STILL_TURNING, PING,
-            RESOURCE)

@@ -36,8 +36,13 @@ from ..mavlink.command_sender import (
 )
 from ..mavlink.dialect import MAV_RESULT_COMMAND_UNSUPPORTED_MAV_FRAME, mavlink
 from ..mavlink.messages import Address, result_name
-from ..mavlink.retries import CLOSING, Retries, STATUS, STILL_UNCONFIRMED, UNCONFIRMED
+from ..mavlink.retries import CLOSING, Retries, RetryPolicy
 
+STATUS = RetryPolicy('the request for a status, after one that does not show the change',
+                     0.05, 0.25)
+UNCONFIRMED = RetryPolicy('an automatic OFF that no status shows, and a command that may be '
+                          'confused with an earlier one', 0.25, 0.25, 10)
+STILL_UNCONFIRMED = RetryPolicy('an automatic OFF after these', 2.0, 2.0)
 # s from the acknowledgement, or the last try, or the end of the fence, to the status that shows
 # the change.
 CONFIRMATION_TIMEOUT = 1.0

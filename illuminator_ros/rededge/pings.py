@@ -12,8 +12,9 @@ from typing import NamedTuple
 from . import messages as rededge
 from ..mavlink.command_sender import CommandSender
 from ..mavlink.messages import target_of
-from ..mavlink.retries import PING
+from ..mavlink.retries import RetryPolicy
 
+PING = RetryPolicy('a PING that a service call asks for', 1.0, 1.0, 2)
 # s between PINGs.
 PING_INTERVAL = 2.0
 

@@ -10,10 +10,9 @@ import math
 
 from illuminator_ros.gimbal.manager_state import ManagerState
 from illuminator_ros.gimbal.messages import GimbalDeviceSetAttitude, GimbalManagerStatus, rates_of
-from illuminator_ros.gimbal.rate_stop import ATTITUDE_SPACING
+from illuminator_ros.gimbal.rate_stop import ATTITUDE_SPACING, ZERO_RATE
 from illuminator_ros.gimbal.setpoint_mixer import RateStopped
 from illuminator_ros.mavlink.messages import Address
-from illuminator_ros.mavlink.retries import ZERO_RATE
 from illuminator_ros.payload.mount_attitude import STILL
 from illuminator_ros.payload.rotation import Quaternion
 import pytest

@@ -8,13 +8,12 @@ from __future__ import annotations
 import functools
 from typing import Any
 
-from illuminator_ros.illuminator.light_queries import SETTLING_TIME
+from illuminator_ros.illuminator.light_queries import MESSAGE, SETTLING_TIME
 from illuminator_ros.illuminator.messages import STATUS_ID
 from illuminator_ros.illuminator.settings import LightSettings
 from illuminator_ros.illuminator.simulated_properties import IlluminatorProperties
 from illuminator_ros.mavlink import messages as mav
 from illuminator_ros.mavlink.dialect import decode, encode, mavlink
-from illuminator_ros.mavlink.retries import MESSAGE
 from illuminator_ros.payload.identity import Identity, text
 import pytest
 from support.back_to_back import Pair
