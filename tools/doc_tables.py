@@ -166,13 +166,12 @@ def ros_tables() -> Tables:
             (*gimbal_node.PUBLICATIONS, SOURCE),
             '`gimbal: link` and `gimbal: device`; [their values](#values-of-diagnostics)'),
         ('gimbal', 'accepted'): endpoints(
-            (*setpoints, *gimbal_node.REQUESTS)),
+            (*setpoints, gimbal_node.FIX, *gimbal_node.REQUESTS)),
         ('gimbal', 'of a source'): of_a_source(setpoints, RELEASE),
         ('gimbal_manager', 'published by the manager'): published(
             [manager_node.DEVICE_SETPOINT], '`gimbal_manager: manager`'),
         ('gimbal_manager', 'subscribed by the manager'): endpoints((
-            manager_node.DEVICE_ATTITUDE, manager_node.IMU, manager_node.ODOMETRY,
-            manager_node.FIX)),
+            manager_node.DEVICE_ATTITUDE, manager_node.IMU, manager_node.ODOMETRY)),
         ('rededge', 'subscribed'): endpoints(TOPICS.values()),
         ('rededge', 'published'): published(
             camera.PUBLICATIONS,

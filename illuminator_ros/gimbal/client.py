@@ -5,7 +5,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping
+from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass, field
 import math
 
@@ -21,6 +21,7 @@ from .messages import (
     rates_of,
     REMOVE_SENDER,
 )
+from .vehicle_state import VehicleState
 from ..mavlink.command_sender import Command, CommandSender, request_message
 from ..mavlink.component import Payload
 from ..mavlink.dialect import mavlink
@@ -28,7 +29,7 @@ from ..mavlink.messages import Address, Heartbeat, Message
 from ..mavlink.retries import Retries
 from ..payload.discovery import Discovery, FORGET_AFTER
 from ..payload.listeners import Listeners
-from ..payload.messages import GimbalDeviceAttitudeStatus
+from ..payload.messages import Attitude, GimbalDeviceAttitudeStatus, GlobalPositionInt
 
 # The most gimbals, so that memory is bounded. The gimbal with the configured id is kept, too.
 MAX_GIMBALS = 32
@@ -58,17 +59,23 @@ class GimbalClient(Payload):
     the capability bits of managers are optional.
 
     :param commands: the command sender of the component that carries this payload.
+    :param vehicle: that carries all gimbals, if it is known here.
+    :param is_measured: returns whether attitudes are measured, which no message says, given s.
     :ivar events: the events of all gimbals.
     :ivar discovery: the gimbals that were announced.
     :ivar gimbals: in the order in which they were found.
     """
 
     messages = (Heartbeat, GimbalManagerInformation, GimbalManagerStatus, GimbalDeviceInformation,
-                GimbalDeviceAttitudeStatus)
+                GimbalDeviceAttitudeStatus, Attitude, GlobalPositionInt)
     sends = (GimbalManagerSetAttitude,)
     streams = (sends,)
 
-    def __init__(self, commands: CommandSender, settings: GimbalSettings) -> None:
+    def __init__(
+        self, commands: CommandSender, settings: GimbalSettings,
+        vehicle: VehicleState | None = None,
+        is_measured: Callable[[float], bool] = lambda now: True,
+    ) -> None:
         self.events: Listeners[GimbalEvent] = Listeners()
         self.discovery = Discovery[GimbalKey, Gimbal](
             commands.schedule, self.events.emit,
@@ -76,6 +83,10 @@ class GimbalClient(Payload):
         self.gimbals: Mapping[GimbalKey, Gimbal] = self.discovery.devices
         self.settings = settings
         self._commands = commands
+        self.is_measured = is_measured
+        self._vehicle = vehicle
+        # By system id.
+        self._vehicles: dict[int, VehicleState] = {}
         self._components: dict[Address, _Component] = {}
         self._next_query = -math.inf
 
@@ -122,6 +133,10 @@ class GimbalClient(Payload):
                         one.reports.lacks_information_of(source)
                         for one in self.gimbals.values()):
                     component.query.stop()
+        elif isinstance(message, Attitude | GlobalPositionInt):
+            if (source.component == mavlink.MAV_COMP_ID_AUTOPILOT1
+                    and (vehicle := self._vehicles.get(source.system))):
+                vehicle.take(message, now)
         elif (isinstance(message, GimbalDeviceInformation)
                 and (gimbal := self._sender(source, message.gimbal_device_id, now))):
             gimbal.reports.device.take_information(message)
@@ -157,6 +172,10 @@ class GimbalClient(Payload):
                 for one in own:
                     one.reports.device.without_id.hear(now)
         return found
+
+    def vehicle(self, key: GimbalKey) -> VehicleState:
+        """Return the vehicle that carries a gimbal."""
+        return self._vehicle or self._vehicles.setdefault(key.address.system, VehicleState())
 
     # Discovery
 

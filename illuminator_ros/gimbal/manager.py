@@ -191,7 +191,7 @@ class GimbalManager(Payload):
                 # Clients may give up, so they need not request it again.
                 self._is_awaited = False
                 self._report(information)
-            if not self.tracker.has_mavlink and now >= self._measured_at + MEASURED_AGE:
+            if not self.is_measured(now):
                 # The setpoint of a device that reports no attitude is its attitude.
                 sent = self.setpoints.sent
                 self._take_attitude(self._measured(
@@ -240,6 +240,10 @@ class GimbalManager(Payload):
         self._measured_at = now
         self._take_attitude(self._measured(to_mavlink(*value), value[1], now), now)
         self._commands.schedule.by(self.poll, now)
+
+    def is_measured(self, now: float) -> bool:
+        """Return whether the attitudes of the device are measured."""
+        return self.tracker.has_mavlink or now < self._measured_at + MEASURED_AGE
 
     def _measured(
         self, q: Sequence[float], frame: YawFrame, now: float,

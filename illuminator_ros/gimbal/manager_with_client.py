@@ -70,7 +70,8 @@ class ManagerWithClient(Payload):
         own = CommandSender(
             commands.address, commands.timeout, commands.retries, commands.clock_fault,
             Mailbox(wake), schedule=commands.schedule)
-        self.client = GimbalClient(own, client)
+        self.client = GimbalClient(
+            own, client, self.manager.vehicle, self.manager.is_measured)
         # It is given no messages: it would drop those of its own address.
         self._component = Component(own, [self.client])
         self._received = CommandReceiver(commands.address)

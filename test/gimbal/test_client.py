@@ -18,6 +18,7 @@ from illuminator_ros.payload.device_events import (
     DeviceForgotten,
     DeviceFound,
 )
+from illuminator_ros.payload.messages import GeoPoint, GlobalPositionInt
 import pytest
 from support.entries import entries
 from support.gimbals import ALL, AUTOPILOT, DEVICE, FakeManager, keys, NAN, OTHER, Rig
@@ -346,3 +347,14 @@ def test_a_gimbal_whose_attitudes_come_rarely_as_configured_is_not_lost_between_
 
     assert len(rig.all_of(DeviceConnected)) == 1
     assert rig.all_of(DeviceDisconnected) == []
+
+
+def test_position_of_the_vehicle_is_that_of_the_autopilot_of_its_system() -> None:
+    rig = Rig(FakeManager()).run(1.0)
+    position = rig.client.vehicle(rig.gimbal.key).position
+    for sender, latitude in ((AUTOPILOT, 47), (OTHER, 48), (Address(2, 1), 49)):
+        rig.receive(sender, GlobalPositionInt(
+            0, latitude * 10**7, 85 * 10**6, 500_000, 0, 0, 0, 0, 0))
+
+    assert position.get(rig.now) == GeoPoint(47.0, 8.5, 500.0)
+    assert position.get(rig.now + 1.0) is None

@@ -30,7 +30,7 @@ from illuminator_ros.gimbal.ros.gimbals import GIMBAL_PARAMETERS  # noqa: E402, 
 from illuminator_ros.illuminator.ros.parameters import LIGHT_PARAMETERS  # noqa: E402
 from illuminator_ros.ros.parameters import LINK_PARAMETERS  # noqa: E402
 from rclpy.qos import ReliabilityPolicy  # noqa: E402
-from sensor_msgs.msg import NavSatFix  # noqa: E402
+from sensor_msgs.msg import NavSatFix, NavSatStatus  # noqa: E402
 from std_msgs.msg import Bool, Header, String  # noqa: E402
 from std_srvs.srv import SetBool, Trigger  # noqa: E402
 from support.gimbals import FakeManager, NAN, OTHER, OURS, Rig, served_gimbals  # noqa: E402
@@ -220,6 +220,50 @@ def test_place_to_point_at_is_converted_from_the_ellipsoid_and_cleared_by_a_serv
     program.wait_for('~/cmd/roi: ignored: latitude 91')
 
 
+# The target
+
+def test_gimbal_is_on_target_while_it_shows_the_angles_that_were_asked_for(
+        ros: Ros, gimbal: FakeManager) -> None:
+    take_control(ros, gimbal)
+    on_target = ros.subscribe(Bool, '/gimbal/on_target')
+    on_target.wait_value(False)
+
+    publish(ros, 'cmd/angles', Vector3Stamped(
+        header=VEHICLE, vector=Vector3(**dict(zip('xyz', ROS_ANGLES, strict=True)))))
+    on_target.wait_value(True)
+    gimbal.q = to_mavlink(Quaternion(), YawFrame.VEHICLE)
+    on_target.wait_value(False)
+
+    assert 'degrees off' in off_target(report(ros, 'in control'))
+    gimbal.primary = OTHER
+    assert 'no control of gimbal' in off_target(report(ros, 'connected'))
+
+
+def test_gimbal_is_on_target_of_a_place_only_while_the_position_of_the_vehicle_is_known(
+        ros: Ros, gimbal: FakeManager) -> None:
+    take_control(ros, gimbal)
+    on_target, roi = (ros.subscribe(*one) for one in (
+        (Bool, '/gimbal/on_target'), (NavSatFix, '/gimbal/roi')))
+    assert math.isnan(roi.wait(lambda one: one.status.status < 0).latitude)
+    # The place is 45 degrees down in the north.
+    gimbal.flags = mavlink.GIMBAL_DEVICE_FLAGS_YAW_IN_EARTH_FRAME
+    gimbal.q = to_mavlink(
+        Quaternion.from_euler(0.0, math.radians(45), math.radians(90)), YawFrame.EARTH)
+
+    place = NavSatFix(latitude=47.0009, longitude=8.5, altitude=500.0)
+    publish(ros, 'cmd/roi', place)
+    roi.wait(lambda one: (one.status.status, one.latitude, one.longitude, one.altitude) == (
+        0, place.latitude, place.longitude, place.altitude))
+    on_target.wait_value(False)
+    with repeated(ros.publisher(NavSatFix, '/gimbal/fix', '/gimbal'), NavSatFix(
+            status=NavSatStatus(status=0), latitude=47.0, longitude=8.5, altitude=600.0)):
+        on_target.wait_value(True)
+    on_target.wait_value(False)
+
+    assert trigger(ros, 'clear_roi').success
+    roi.wait(lambda one: one.status.status < 0)
+
+
 # Setpoints
 
 @pytest.mark.parametrize(('header', 'frame'), [
@@ -329,6 +373,11 @@ def report(ros: Ros, wanted: str) -> DiagnosticStatus:
     return found
 
 
+def off_target(status: DiagnosticStatus) -> str:
+    """Return why the gimbal is not on target."""
+    return str({one.key: one.value for one in status.values}['off_target'])
+
+
 def logged(program: Program, flags: str) -> str:
     """Return the level of the line about failure flags."""
     text = f'gimbal 1/154: failure flags: {flags}'
@@ -374,7 +423,9 @@ def test_a_place_without_a_geoid_separation_is_a_warning_while_the_gimbal_points
         if parameters:
             own_ros.synchronize('/gimbal')
         else:
-            assert report(own_ros, text).level == DiagnosticStatus.WARN
+            status = report(own_ros, text)
+            assert status.level == DiagnosticStatus.WARN
+            assert off_target(status) == 'geoid_separation is not set'
         assert trigger(own_ros, 'clear_roi').success
         assert report(own_ros, 'in control').level == DiagnosticStatus.OK
         assert program.count(text) == (not parameters)

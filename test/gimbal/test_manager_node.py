@@ -20,9 +20,8 @@ pytest.importorskip('rclpy')
 
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus  # noqa: E402, I100
 from geometry_msgs import msg as geometry  # noqa: E402
-from illuminator_ros.gimbal.ros.conversions import read_place  # noqa: E402
+from illuminator_ros.gimbal.ros.conversions import read_fix, read_place  # noqa: E402
 from illuminator_ros.gimbal.ros.manager_node import (  # noqa: E402
-    _read_fix,
     _read_imu,
     _read_odometry,
     MANAGER_PARAMETERS,
@@ -295,11 +294,11 @@ def test_wrong_parameters_are_named(name: str, value: object) -> None:
 def test_gm_8_a_position_of_the_vehicle_needs_a_fix() -> None:
     fix = NavSatFix(latitude=47.0, longitude=8.0, altitude=500.0)
     fix.status.status = NavSatStatus.STATUS_FIX
-    assert _read_fix(fix, 50.0) == (47.0, 8.0, 450.0)
+    assert read_fix(fix, 50.0) == (47.0, 8.0, 450.0)
 
     fix.status.status = NavSatStatus.STATUS_NO_FIX
     with pytest.raises(ValueError, match='no fix'):
-        _read_fix(fix, 50.0)
+        read_fix(fix, 50.0)
 
 
 @pytest.mark.parametrize('value', [1e39, -math.inf])

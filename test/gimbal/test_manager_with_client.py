@@ -180,3 +180,14 @@ def test_gm_18_another_manager_with_our_own_address_makes_ours_inactive() -> Non
 
     assert rig.manager.tracker.state is ManagerState.INACTIVE
     assert rig.manager.tracker.other == OURS
+
+
+def test_setpoint_that_is_reported_as_the_attitude_is_not_measured() -> None:
+    rig = Rig(device_id=1)
+    is_measured = rig.both.client.is_measured
+
+    assert not is_measured(rig.now)
+    rig.manager.take_attitude((Quaternion(), YawFrame.VEHICLE), rig.now)
+    assert is_measured(rig.now)
+    assert not is_measured(rig.now + 1.0)
+    assert Rig().both.client.is_measured(0.0)

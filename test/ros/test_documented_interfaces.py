@@ -55,8 +55,8 @@ OF_EVERY_NODE = re.compile('parameter|logger|type_description|rosout|/clock$')
 # Services that an operator does not need, and topics that each node has.
 INTERNAL = {'get_logger_levels', 'set_logger_levels', 'get_type_description'}
 OF_OPERATOR = {'/clock', '/parameter_events', '/rosout'}
-OF_DRIVER = {f'/gimbal_manager/{topic}' for topic in (
-    'device/attitude', 'device/setpoint', 'fix', 'imu', 'odometry')}
+OF_DRIVER = {'/gimbal/fix', *(f'/gimbal_manager/{topic}' for topic in (
+    'device/attitude', 'device/setpoint', 'fix', 'imu', 'odometry'))}
 QOS = {'state': (ReliabilityPolicy.RELIABLE, DurabilityPolicy.TRANSIENT_LOCAL),
        'stream': (ReliabilityPolicy.RELIABLE, DurabilityPolicy.VOLATILE)}
 STATUSES = {
@@ -230,8 +230,8 @@ def test_policy_permits_the_operator_all_that_the_node_offers_but_its_internals(
     running: Running, name: str,
 ) -> None:
     offered, operator = running.interfaces[name], NODES[name].operator
-    # The vehicle and the driver of the gimbal use the topics of the manager.
-    others = OF_OPERATOR | (OF_DRIVER if name == 'gimbal_manager' else set())
+    # The vehicle and the driver of a gimbal use these.
+    others = OF_OPERATOR | OF_DRIVER
 
     assert {*permitted(name, operator, 'topic', 'subscribe')} - OF_OPERATOR == (
         set(offered.publishers) - others)

@@ -69,6 +69,7 @@ def test_frames_of_gimbal_and_beam_agree_with_attitude_and_marker_in_either_yaw_
         attitude = own_ros.subscribe(QuaternionStamped, '/gimbal/attitude', STREAM).wait()
         marker = own_ros.subscribe(Marker, '/illuminator/beam').wait(
             lambda one: bool(one.action == Marker.ADD))
+        line = own_ros.subscribe(Marker, '/gimbal/line_of_sight').wait()
         pose, beam = frame(moving, 'gimbal'), frame(moving, 'illuminator_beam')
 
     parents = {one.child_frame_id: one.header.frame_id
@@ -80,6 +81,7 @@ def test_frames_of_gimbal_and_beam_agree_with_attitude_and_marker_in_either_yaw_
         rotation(marker.pose.orientation)) == pytest.approx(0, abs=1e-3)
     assert beam.header.frame_id == marker.header.frame_id
     assert beam.header.stamp.sec > 0
+    assert (line.header.frame_id, line.type) == (pose.child_frame_id, Marker.ARROW)
 
 
 def test_gimbal_whose_yaw_relative_to_the_vehicle_is_unknown_has_no_frame(

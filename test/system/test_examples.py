@@ -5,7 +5,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Iterator
 import contextlib
 import csv
 import math
@@ -139,6 +139,52 @@ def test_the_search_looks_in_each_direction_with_the_light_on_and_releases_the_g
 
         assert (program.wait(), program.log, light.enabled) == (0, '', False)
         own_ros.subscribe(Bool, '/gimbal/in_control').wait_value(False)
+
+
+HERE, SPOT = (47.397742, 8.545594, 535.5), ('47.3987', '8.5466', '500.0')
+
+
+@contextlib.contextmanager
+def pointing(
+    ros: Ros, folder: Path, port: int, *devices: SimulatedDevice, **changes: str,
+) -> Iterator[Program]:
+    """Run point_at.py for SPOT in a namespace, with a bridge that serves devices."""
+    namespace = ['-r', '__ns:=/uav1']
+    with (node(ros, 'bridge', port, *namespace, payloads='[illuminator, gimbal]',
+               geoid_separation=47.5),
+          served(port, *devices),
+          ended(example(ros, 'point_at', folder, *SPOT, '--ros-args', *namespace,
+                        **changes)) as program):
+        yield program
+
+
+def test_place_is_lit_once_the_gimbal_is_on_target_until_the_program_ends(
+        own_ros: Ros, tmp_path: Path) -> None:
+    port, light = free_port(), SimulatedIlluminator(IlluminatorProperties())
+    gimbal = SimulatedManager(ManagerProperties())
+    fixes = own_ros.node.create_publisher(NavSatFix, '/uav1/gimbal/fix', 10)
+    latitude, longitude, altitude = HERE
+    with (repeated(fixes, NavSatFix(
+            status=NavSatStatus(status=NavSatStatus.STATUS_FIX), latitude=latitude,
+            longitude=longitude, altitude=altitude), 0.05),
+          pointing(own_ros, tmp_path, port, light, gimbal, TIMEOUT='60.0') as program):
+        own_ros.subscribe(Bool, '/uav1/gimbal/on_target').wait_value(True)
+        eventually(lambda: light.enabled)
+        assert points_to(gimbal, 15.2, -35.3)
+
+        assert (program.end(signal.SIGINT), program.log, light.enabled) == (0, '', False)
+        own_ros.subscribe(Bool, '/uav1/gimbal/in_control').wait_value(False)
+
+
+def test_place_is_not_lit_where_the_position_of_the_vehicle_is_unknown(
+        own_ros: Ros, tmp_path: Path) -> None:
+    port, light = free_port(), SimulatedIlluminator(IlluminatorProperties())
+    with pointing(own_ros, tmp_path, port, light, SimulatedManager(ManagerProperties()),
+                  TIMEOUT='3.0') as program:
+        assert program.wait() == 1
+        assert program.log == (
+            'not on target within 3 s: the position of the vehicle is unknown\n')
+        assert not light.enabled
 
 
 def points_to(gimbal: SimulatedManager, down: float, left: float) -> bool:

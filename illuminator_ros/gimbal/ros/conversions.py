@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import math
 
 from geometry_msgs.msg import QuaternionStamped, Vector3, Vector3Stamped
-from sensor_msgs.msg import NavSatFix
+from sensor_msgs.msg import NavSatFix, NavSatStatus
 from std_msgs.msg import Header
 
 from ..axes import RATE_LIMIT
@@ -114,6 +114,17 @@ def read_place(message: NavSatFix, geoid_separation: float) -> GeoPoint:
         raise ValueError('latitude {:g}, longitude {:g}, altitude {:g} is not a place'.format(
             *place))
     return GeoPoint(place[0], place[1], place[2] - geoid_separation)
+
+
+def read_fix(message: NavSatFix, geoid_separation: float) -> GeoPoint:
+    """
+    Return the position that a message has.
+
+    :raises ValueError: if it has no fix; see :func:`read_place` for the rest.
+    """
+    if message.status.status < NavSatStatus.STATUS_FIX:
+        raise ValueError(f'no fix (status {message.status.status})')
+    return read_place(message, geoid_separation)
 
 
 def vector_message(header: Header, vector: Vector) -> Vector3Stamped:

@@ -48,6 +48,7 @@ DEVICE_VALUES = {
     'yaw_frame': '`earth` or `vehicle`',
     **dict.fromkeys((f'{axis}_rad' for axis in AXES), 'angles of the attitude'),
     'vehicle_heading_rad': 'if it is known',
+    'off_target': 'why `~/on_target` is false, or `none`',
     'capabilities': 'GIMBAL_DEVICE_CAP_FLAGS by name',
     **dict.fromkeys((f'{axis}_{end}_rad' for axis in AXES for end in ('min', 'max')),
                     'range of an axis'),
@@ -87,6 +88,7 @@ def reports(
     link: diagnostics.LinkDiagnostics, *, gimbal: GimbalSnapshot | None,
     heard: Mapping[GimbalKey, str], without_id: Sequence[Address], known: str,
     limit_reached: bool, interval: float, started: float, geoid_is_known: bool,
+    off_target: str,
 ) -> list[diagnostics.Report]:
     """
     Return the reports of a node.
@@ -96,6 +98,7 @@ def reports(
     :param interval: the requested s between attitudes, 0 for the device's own interval.
     :param started: when the node was started, s on the link's clock.
     :param geoid_is_known: whether ``geoid_separation`` is set.
+    :param off_target: why it is not on target, '' if it is.
     """
     manager = gimbal.managers[0] if gimbal else None
     made = [diagnostics.link_report(
@@ -109,21 +112,26 @@ def reports(
         made.append(diagnostics.Report(
             'device', hardware_id, device_findings(
                 gimbal, link.taken_at, interval, geoid_is_known=geoid_is_known), fine,
-            lambda: _values(gimbal, link.taken_at)))
+            lambda: {**_values(gimbal, link.taken_at), 'off_target': off_target or 'none'}))
     return made
+
+
+def attitude_limit(interval: float) -> float:
+    """Return the age beyond which an attitude is out of date, given the requested interval, s."""
+    return max(ATTITUDE_SILENCE, 3 * interval)
 
 
 def device_findings(
     gimbal: GimbalSnapshot, now: float, interval: float, *, geoid_is_known: bool,
 ) -> list[diagnostics.Finding]:
     """Return the findings on a gimbal."""
-    attitude_limit = max(ATTITUDE_SILENCE, 3 * interval)
+    limit_of_attitudes = attitude_limit(interval)
     findings: list[diagnostics.Finding] = []
     if gimbal.unstopped_since is not None and now - gimbal.unstopped_since > STOP_TIME:
         ago = f'{format_seconds(now - gimbal.unstopped_since)} after the end of its rate'
         findings.append(
             (diagnostics.ERROR, f'turns {ago}')
-            if gimbal.turns and now - gimbal.attitude_at <= attitude_limit else
+            if gimbal.turns and now - gimbal.attitude_at <= limit_of_attitudes else
             (diagnostics.WARN, f'its motion is unknown {ago}: no attitude comes'))
     if gimbal.unreachable:
         return [(diagnostics.ERROR, gimbal.unreachable), *findings]
@@ -134,7 +142,7 @@ def device_findings(
             diagnostics.WARN, f'managers {", ".join(map(str, others))} announce the gimbal too: '
             f'only {gimbal.managers[0]} is used'))
     for name, at, limit in (
-            ('GIMBAL_DEVICE_ATTITUDE_STATUS', gimbal.attitude_at, attitude_limit),
+            ('GIMBAL_DEVICE_ATTITUDE_STATUS', gimbal.attitude_at, limit_of_attitudes),
             ('GIMBAL_MANAGER_STATUS', gimbal.status_at, STATUS_SILENCE)):
         if now - at > limit:
             since = f' for {format_seconds(now - at)}' if math.isfinite(at) else ''

@@ -17,6 +17,7 @@ from std_srvs.srv import SetBool, Trigger
 
 from . import conversions
 from .diagnostics import controller, NO_GEOID, reports, why_no_gimbal
+from .target import ON_TARGET, ROI, TargetPublisher
 from .. import events
 from ..client import GimbalClient
 from ..commands import Attitude, Control, Move, NEUTRAL, Rates, RETRACT, YAW_LOCKS
@@ -28,12 +29,12 @@ from ...payload.mount_attitude import YawFrame
 from ...payload.requests import Done, Result
 from ...ros import node as ros_node
 from ...ros.command_sources import prefixes, release_services, SOURCE
-from ...ros.conversions import GEOID_SEPARATION, quaternion_message
+from ...ros.conversions import quaternion_message
 from ...ros.device_nodes import publish_event
 from ...ros.diagnostics_publisher import DiagnosticsSource, MakeReports
 from ...ros.node import Entity
 from ...ros.parameter_services import ParameterServices
-from ...ros.parameters import ChangeableParameters, given_parameters
+from ...ros.parameters import ChangeableParameters
 from ...ros.payload import BridgeContext
 from ...ros.qos import STREAM_QOS
 from ...ros.throttled_log import NodeLog
@@ -52,6 +53,8 @@ PUBLICATIONS = (
     Entity('in_control', Bool, 'this node has primary control'),
     Entity('controller', String,
            'the components in control, such as `primary 1/195, secondary none`, or `unknown`'),
+    ON_TARGET,
+    ROI,
 )
 # The request of each service to the gimbal; its message is the second argument.
 REQUESTS: dict[Entity, Callable[[Gimbal, Any, float, Done], None]] = {
@@ -87,6 +90,11 @@ CMD_ROI = Entity(
     'gimbal points at a place', ros_node.SWITCH_QOS)
 
 
+FIX = Entity(
+    'fix', NavSatFix, 'position of the vehicle, for places, where its autopilot sends none; '
+    'ignored without a fix')
+
+
 class GimbalNode:
     """
     Serves one gimbal with a node; all methods are for the link's thread.
@@ -113,7 +121,6 @@ class GimbalNode:
         self._started = host.link.clock()
         self._yaw_lock: bool | None = None
         self._errors = 0
-        self._geoid_is_known = GEOID_SEPARATION.name in given_parameters(host.node)
         sources = client.settings.sources
         self._interface = ros_node.NodeEntities(
             node, host.link, log, publications=(*PUBLICATIONS, *([SOURCE] if sources else [])),
@@ -121,13 +128,15 @@ class GimbalNode:
                 *(ros_node.RequestService(one, functools.partial(self._request, one))
                   for one in REQUESTS),
                 *release_services(sources, self._release)),
-            commands=(topic for way in prefixes(sources).items()
-                      for topic in self._command_topics(*way)))
+            commands=(self._fix_topic(), *(topic for way in prefixes(sources).items()
+                                           for topic in self._command_topics(*way))))
         ParameterServices(node, host.link, log, changeable=changeable)
         if sources:
             self._interface.publish('source', '')
         self._interface.publish('connected', False)
         self._publish_control(None, False)
+        self._target = TargetPublisher(
+            node, self._interface, client, host, self._frame if transforms else '')
         self.source = DiagnosticsSource(node.get_fully_qualified_name(), self._take_snapshot)
 
     def bind(self, key: events.GimbalKey, now: float) -> None:
@@ -148,6 +157,11 @@ class GimbalNode:
         if self.key:
             self._host.frame_log.assign(self.key.address, None)
         self.key = None
+        self._target.update(None, self._host.link.clock())
+
+    def poll(self, now: float) -> None:
+        """Follow what changes without an event: the age of the attitude and of the position."""
+        self._target.update(self._gimbal(), now)
 
     def absence(self, now: float) -> str:
         """Return why there is no gimbal, for people."""
@@ -167,6 +181,7 @@ class GimbalNode:
 
     def handle(self, event: events.GimbalEvent) -> None:
         """Publish an event of the gimbal."""
+        self.poll(self._host.link.clock())
         name, warn = f'gimbal {event.key}', self._log.warning
         match event:
             case events.AttitudeReceived():
@@ -249,6 +264,7 @@ class GimbalNode:
         else:
             REQUESTS[service](gimbal, message, now, lambda result, now: answer(
                 result.success, result.message))
+            self.poll(now)
 
     # Setpoints
 
@@ -265,11 +281,13 @@ class GimbalNode:
                     self._refused(endpoint.name, self.absence(now))
                 else:
                     send(gimbal, value, now, functools.partial(sent, value), source=source)
+                    self.poll(now)
 
             def sent(value: T, result: Result, now: float) -> None:
                 if not (result.success or result.superseded):
                     self._refused(endpoint.name, result.message)
-                elif result.success and isinstance(value, GeoPoint) and not self._geoid_is_known:
+                elif result.success and isinstance(value, GeoPoint) and not (
+                        self._target.geoid_is_known):
                     # Once: the condition never ends.
                     self._log.write_conditions([NO_GEOID], 'geoid')
 
@@ -286,6 +304,16 @@ class GimbalNode:
             topic(CMD_RATE, move, lambda message: Rates(conversions.read_rates(message))),
             topic(CMD_ROI, move, lambda message: conversions.read_place(message, separation)))
 
+    def _fix_topic(self) -> ros_node.AnyCommandTopic:
+        separation: float = self._host.values['geoid_separation']
+
+        def receive(position: GeoPoint, now: float) -> None:
+            if self.key:
+                self._client.vehicle(self.key).position.set(position, now)
+
+        return ros_node.CommandTopic(
+            FIX, receive, lambda message: conversions.read_fix(message, separation))
+
     def _refused(self, topic: str, reason: str) -> None:
         if reason:
             self._log.stream_failed(f'~/{topic}: ignored: {reason}', topic)
@@ -300,4 +328,4 @@ class GimbalNode:
             known=self._why_none(),
             limit_reached=self._client.discovery.limit_reached,
             interval=self._client.settings.attitude_interval, started=self._started,
-            geoid_is_known=self._geoid_is_known)
+            geoid_is_known=self._target.geoid_is_known, off_target=self._target.off_target)

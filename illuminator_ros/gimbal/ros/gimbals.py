@@ -12,6 +12,7 @@ import re
 
 from .conversions import FRAME_PARAMETERS
 from .gimbal_node import GimbalNode
+from .target import TARGET_TOLERANCE
 from ..client import GimbalClient
 from ..events import GimbalEvent, GimbalKey
 from ..gimbal import GimbalSettings
@@ -33,6 +34,7 @@ GIMBAL_PARAMETERS = (
                   'take control of a gimbal that no component controls when it connects'),
     ParameterSpec('setpoint_timeout', 0.5, 'silence of ~/cmd/rate after which zero is sent', 's',
                   STEP_LIMIT, 60.0, restricts=True, changeable=True),
+    TARGET_TOLERANCE,
     *FRAME_PARAMETERS,
     PUBLISH_TF,
     GEOID_SEPARATION,
@@ -104,6 +106,8 @@ class Gimbals(ServedPayload):
     def poll(self, now: float) -> None:
         """See :meth:`ServedPayload.poll`."""
         self._nodes.poll(now)
+        for node in self._nodes:
+            node.poll(now)
 
     def shut_down(self, now: float, report: ShutdownReport) -> None:
         """See :meth:`ServedPayload.shut_down`: release all gimbals under our control."""

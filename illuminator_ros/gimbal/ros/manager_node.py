@@ -10,10 +10,10 @@ import math
 
 from geometry_msgs.msg import QuaternionStamped
 from nav_msgs.msg import Odometry
-from sensor_msgs.msg import Imu, NavSatFix, NavSatStatus
+from sensor_msgs.msg import Imu
 from std_msgs.msg import Header
 
-from .conversions import Frames, read_place
+from .conversions import Frames
 from .gimbals import GIMBAL_PARAMETERS, Gimbals, settings
 from ..axes import other_signs, Range
 from ..manager import (
@@ -30,7 +30,6 @@ from ..setpoint_mixer import AnglesClipped, RateStopped, ReferenceLost, Setpoint
 from ...mavlink.command_sender import CommandSender
 from ...mavlink.messages import Address
 from ...payload.arbitration import Cause, Policy
-from ...payload.messages import GeoPoint
 from ...payload.mount_attitude import AXES, from_mavlink
 from ...payload.rotation import enu_ned, ned_frd, Quaternion, Vector
 from ...ros.conversions import (
@@ -67,8 +66,6 @@ DEVICE_ATTITUDE = Entity(
 IMU = Entity('imu', Imu, 'attitude of the vehicle, FLU in ENU')
 ODOMETRY = Entity('odometry', Odometry, 'attitude and velocity of the vehicle; the twist is in '
                   'the axes of the body')
-FIX = Entity('fix', NavSatFix, 'position of the vehicle, for regions of interest; ignored '
-             'without a fix')
 MANAGER_PARAMETERS = (
     ParameterSpec('policy', Policy.HOLD.value, 'when a player takes control from another one',
                   choices=tuple(policy.value for policy in Policy), restricts=True),
@@ -167,12 +164,9 @@ class ManagerNode(ServedPayload):
         manager.events.subscribe(self._take)
 
     def _topics(self) -> list[AnyCommandTopic]:
-        separation: float = self._host.values['geoid_separation']
         topics: list[AnyCommandTopic] = [
             CommandTopic(IMU, self._take_imu, _read_imu),
-            CommandTopic(ODOMETRY, self._take_odometry, _read_odometry),
-            CommandTopic(FIX, self._manager.vehicle.position.set,
-                         lambda message: _read_fix(message, separation))]
+            CommandTopic(ODOMETRY, self._take_odometry, _read_odometry)]
         if not self._manager.tracker.has_mavlink:
             topics.append(CommandTopic(
                 DEVICE_ATTITUDE, self._manager.take_attitude, self._frames.read_attitude))
@@ -330,13 +324,6 @@ def _within(value: float, limit: float) -> float:
     if abs(value) > limit:
         raise ValueError(f'a twist of {value:g} is beyond {limit:g}')
     return value
-
-
-def _read_fix(message: NavSatFix, geoid_separation: float) -> GeoPoint:
-    """Return the place of a message; ValueError if it has no fix."""
-    if message.status.status < NavSatStatus.STATUS_FIX:
-        raise ValueError(f'no fix (status {message.status.status})')
-    return read_place(message, geoid_separation)
 
 
 def _make(commands: CommandSender, values: Values) -> ManagerWithClient:
