@@ -69,7 +69,7 @@ class LightControl:
 
     def step(self, now: float) -> None:
         """Decide what the light should be, send it, and go on with what is under way."""
-        self._rules.put_due(now, may_go_off=self.may_go_off(now))
+        self._rules.put_due(now, self.silence_due(now))
         live = self._requests.live()
         if not live and not self.is_busy:
             return
@@ -331,7 +331,8 @@ class LightControl:
 
     def silence_due(self, now: float) -> float:
         """Return when ``off_after_silence`` switches the light off, infinity for never."""
-        return self._rules.silence_due if self.may_go_off(now) else math.inf
+        due = self._rules.silence_due
+        return due if due < math.inf and self.may_go_off(now) else math.inf
 
     def due(self, now: float) -> float:
         """Return when a command, or the OFF of a silence, is due, s."""

@@ -66,15 +66,15 @@ class Rules:
         """Return when ``off_after_silence`` switches off a light that may be on, s."""
         return max(self.silence.ends_at, self._off_due)
 
-    def put_due(self, now: float, *, may_go_off: bool) -> None:
+    def put_due(self, now: float, silence_due: float) -> None:
         """
         Put the OFFs that are due; the light must be connected.
 
-        :param may_go_off: whether it is or may go on, and no OFF is under way.
+        :param silence_due: when the OFF of a silence is due, s; infinity for never.
         """
         if not self._requests.are_calling:
             self.silence.calling_since = -math.inf
-        if may_go_off and now >= self.silence_due:
+        if now >= silence_due:
             self._put_off(Why.SILENCE, 'off_after_silence '
                           f'({format_seconds(self.silence.limit)})', now)
         if self.wants_off is not None and (self._twin.enabled or self.wants_off):
