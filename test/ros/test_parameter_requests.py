@@ -170,15 +170,15 @@ def test_parameters_of_the_device_are_set_by_the_executor_before_the_next_reques
     assert served.values('brightness') == [70.0]
 
 
-@pytest.mark.parametrize('request_', [
-    ('get_parameters', srv.GetParameters.Request(names=['limit'] * (MAX_NAMES + 1)), 'values'),
-    ('describe_parameters', srv.DescribeParameters.Request(names=['limit'] * (MAX_NAMES + 1)),
-     'descriptors')], ids=lambda value: value[0])
-def test_long_list_of_names_is_answered_with_an_empty_one(
-    served: Served, request_: tuple[str, Any, str],
+@pytest.mark.parametrize('names', [['limit'] * (MAX_NAMES + 1), ['limit', 'banana']],
+                         ids=['too many', 'unknown'])
+@pytest.mark.parametrize(('name', 'type_', 'field'), [
+    ('get_parameters', srv.GetParameters, 'values'),
+    ('get_parameter_types', srv.GetParameterTypes, 'types'),
+    ('describe_parameters', srv.DescribeParameters, 'descriptors')])
+def test_list_of_names_that_is_long_or_has_an_unknown_one_is_answered_with_an_empty_one(
+    served: Served, names: list[str], name: str, type_: Any, field: str,
 ) -> None:
-    name, request, field = request_
-
-    served.request(name, request)
+    served.request(name, type_.Request(names=names))
 
     assert list(getattr(served.answers[0], field)) == []

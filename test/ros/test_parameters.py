@@ -10,7 +10,6 @@ from illuminator_ros.illuminator.ros.parameters import LIGHT_PARAMETERS
 from illuminator_ros.ros.parameters import LINK_PARAMETERS
 import pytest
 from rcl_interfaces.msg import ParameterType
-from rcl_interfaces.srv import DescribeParameters, GetParameters, GetParameterTypes
 from support.light import CONFIGURE, params, ServedLight
 from support.ros import Parameters, Ros, running_bridge
 
@@ -39,19 +38,6 @@ def test_parameters_of_the_light_are_described_and_not_listed_before_its_first_s
     assert not set(DEVICE) & set(alone.names())
     assert [one.type for one in alone.describe(*DEVICE)] == [STRING, DOUBLE, DOUBLE, DOUBLE]
     assert alone.get('connection_url', 'component_id') == ['memory://none', 193]
-
-
-@pytest.mark.parametrize(('service', 'type_', 'field'), [
-    ('get_parameters', GetParameters, 'values'),
-    ('get_parameter_types', GetParameterTypes, 'types'),
-    ('describe_parameters', DescribeParameters, 'descriptors'),
-])
-def test_unknown_name_gets_an_empty_answer(
-    parameters: Parameters, service: str, type_: Any, field: str,
-) -> None:
-    response = parameters.start(type_, service, names=['frame_id', 'banana']).result()
-
-    assert list(getattr(response, field)) == []
 
 
 @pytest.mark.parametrize(('name', 'unit', 'high', 'constraint'), [

@@ -11,16 +11,11 @@ from rcl_interfaces.msg import Parameter, ParameterType, ParameterValue
 from rcl_interfaces.srv import SetParameters, SetParametersAtomically
 from support.light import CONFIGURE, params, ServedLight
 from support.ros import Parameters, Ros
-from support.slow import CLOCK
 
 START: dict[str, Any] = {
     'mode': 'internal_control', 'brightness': 80.0, 'strobe_period': 0.0, 'strobe_duty_cycle': 0.0}
 FOUR = {'mode': 'external_sync', 'brightness': 40.0, 'strobe_period': 0.5,
         'strobe_duty_cycle': 25.0}
-# s; rqt_reconfigure gives up after 1.0 s.
-LIMIT = 0.9
-
-
 @pytest.fixture(autouse=True)
 def start(ros: Ros, light: ServedLight, parameters: Parameters) -> None:
     """Have every test begin with the same configuration."""
@@ -121,18 +116,3 @@ def test_refusal_by_the_light_is_reported_by_name_and_changes_nothing(
     event = events.wait(lambda event: any(
         p.name == 'brightness' for p in event.changed_parameters))
     assert [p.value.double_value for p in event.changed_parameters] == [31.0]
-
-
-@pytest.mark.parametrize('atomically', [False, True])
-def test_set_that_the_light_does_not_answer_is_refused_within_0_9_s(
-    light: ServedLight, parameters: Parameters, atomically: bool,
-) -> None:
-    light.fake.results[CONFIGURE] = None
-    call = parameters.start_set(atomically=atomically, brightness=30.0)
-    light.wait_for(CONFIGURE)
-
-    CLOCK.forward(LIMIT)
-
-    response = call.result()
-    assert not (response.result if atomically else response.results[0]).successful
-    assert parameters.get('brightness') == [80.0]

@@ -5,25 +5,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 import os
 import re
 import socket
-import threading
 
 from illuminator_ros.mavlink.dialect import mavlink
-from illuminator_ros.ros.deferred_service import DeferredService, Handler, Respond
-from illuminator_ros.ros.node import SERVICE_QOS
-from illuminator_ros.ros.throttled_log import NodeLog
 import pytest
-from rclpy.executors import SingleThreadedExecutor
-from rclpy.node import Node
 from std_msgs.msg import Float32, Float64
 from std_srvs.srv import Trigger
 from support.embedded import embedded_bridge
 from support.light import ON_OFF, ServedLight
 from support.processes import Program
-from support.recording import Call
 from support.ros import Parameters, Ros, running_bridge
 from support.slow import pass_time_until
 from support.waiting import Log
@@ -121,62 +113,6 @@ def test_requests_fail_at_once_and_say_why_while_the_link_is_not_open(
             # It is this process.
             assert message.endswith(
                 f'(process {os.getpid()}) (doc/routers.md: several programs on one link)')
-
-
-@pytest.fixture
-def node(ros: Ros) -> Iterator[Node]:
-    """Yield a node of an executor of rclpy."""
-    node = Node('served', context=ros.context)
-    node.create_service(Trigger, '~/fast', lambda request, response: response)
-    executor = SingleThreadedExecutor(context=ros.context)
-    executor.add_node(node)
-    thread = threading.Thread(target=executor.spin)
-    thread.start()
-    yield node
-    executor.shutdown()
-    thread.join()
-    node.destroy_node()
-
-
-def serve(node: Node, take: Handler) -> None:
-    """Add the service ``~/slow``."""
-    DeferredService(node, Trigger, '~/slow', take, SERVICE_QOS, NodeLog(node.get_logger()))
-
-
-def calls(ros: Ros, node: Node, name: str, count: int = 1) -> list[Call]:
-    """Call a service of a node once by each of so many clients."""
-    return [ros.start(Trigger, f'{node.get_fully_qualified_name()}/{name}', Trigger.Request())
-            for _ in range(count)]
-
-
-def test_requests_that_wait_delay_no_other_service_and_are_answered_in_any_order(
-    ros: Ros, node: Node,
-) -> None:
-    waiting: Log[Respond] = Log()
-    serve(node, lambda request, respond: waiting.append(respond))
-    asked = calls(ros, node, 'slow', 3)
-    waiting.wait_for(lambda one: True, count=3)
-
-    [fast] = calls(ros, node, 'fast')
-    fast.result()
-    assert not any(one.answered for one in asked)
-    for number, respond in reversed(list(enumerate(waiting))):
-        respond(Trigger.Response(message=str(number)))
-
-    assert sorted(one.result().message for one in asked) == ['0', '1', '2']
-
-
-def test_request_that_causes_an_internal_error_is_answered_and_logged(
-    ros: Ros, node: Node, capfd: pytest.CaptureFixture[str],
-) -> None:
-    def take(request: Trigger.Request, respond: Respond) -> None:
-        raise LookupError('no such thing')
-
-    serve(node, take)
-    [asked] = calls(ros, node, 'slow')
-
-    assert asked.result() == Trigger.Response()
-    assert "internal error: LookupError('no such thing')" in ''.join(capfd.readouterr())
 
 
 def test_requests_that_wait_at_the_end_of_the_process_are_answered(
