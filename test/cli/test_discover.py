@@ -235,15 +235,6 @@ def test_noise_and_silence_have_their_likely_causes(tmp_path: Path) -> None:
     assert Line(tmp_path).listen()['trouble'].startswith('nothing is received: check the power')
 
 
-def test_noise_that_begins_long_frames_delays_no_valid_frame(tmp_path: Path) -> None:
-    codec, line = Codec(), Line(tmp_path)
-    beginning = b'\xfd\xff\0\0' + frames(codec, (LIGHT, LIGHT_BEAT))[4:10]
-    report = line.listen(lambda: beginning + frames(codec, (LIGHT, LIGHT_BEAT)))
-
-    assert [one['address'] for one in report['components']] == ['1/243']
-    assert report['components'][0]['frames_per_s'] > 1.6
-
-
 def test_a_port_that_is_lost_says_so_and_keeps_what_was_heard(tmp_path: Path) -> None:
     line = Line(tmp_path)
     line.device.write(frames(Codec(), (LIGHT, LIGHT_BEAT)))

@@ -29,28 +29,12 @@ def pauses(count: int, jitter: float = 1.0, spent: float = 0.0) -> list[float]:
     return found
 
 
-def test_pauses_double_from_an_immediate_first_try_to_half_a_second() -> None:
-    assert pauses(6) == [0.0, 0.05, 0.1, 0.2, 0.4, 0.5, 0.5]
-    assert pauses(5000)[-1] == 0.5
-    assert pauses(50, spent=60.0)[-1] == 0.05
-
-
 @given(st.integers(1, 50), st.floats(0, 1), st.floats(0, CONNECT_TIMEOUT))
 def test_tries_begin_within_a_second_of_each_other_and_never_without_pause(
         failures: int, jitter: float, spent: float) -> None:
     longest, pause = pauses(failures)[-1], pauses(failures, jitter, spent)[-1]
     assert 0.025 <= pause <= longest * (0.5 + 0.5 * jitter)
     assert spent + pause < 1.0
-
-
-def test_two_bridges_without_given_jitter_pause_differently() -> None:
-    backoffs = [Backoff(), Backoff()]
-    found = [[] for _ in backoffs]  # type: list[list[float]]
-    for backoff, of_one in zip(backoffs, found, strict=True):
-        for _ in range(10):
-            backoff.failed()
-            of_one.append(backoff.pause(0.0))
-    assert found[0] != found[1]
 
 
 def test_pause_is_none_after_success_and_short_after_an_answer() -> None:

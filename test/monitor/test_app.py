@@ -3,20 +3,15 @@
 
 """The screen of the monitor, on terminals of every size and kind, its keys and its labels."""
 
-import asyncio
-from typing import cast
 
 from illuminator_ros.cli.monitor.app import (
     ALWAYS,
     COMMON_KEYS,
-    INTERVAL,
-    MonitorApp,
     QUESTION_LIFETIME,
 )
-from illuminator_ros.cli.monitor.ros_graph import Graph, TREND_POLLS
-from illuminator_ros.ros.monitor_view import Diagnosis, DONE, FAILED, NEWS_LIFETIME, TREND_SIZE
+from illuminator_ros.ros.monitor_view import Diagnosis, DONE, FAILED, NEWS_LIFETIME
 import pytest
-from support.monitor import camera, diagnosed, FakeGraph, gimbal, light, NOW, Screen, show
+from support.monitor import camera, diagnosed, gimbal, light, NOW, Screen, show
 from textual.color import Color
 from textual.events import AppBlur, AppFocus, Paste
 from textual.widgets import DataTable
@@ -74,18 +69,6 @@ def test_values_of_a_lost_light_are_dimmed_but_not_its_name_state_and_level() ->
                 for cell in (name, state, level, report)] == [False, False, False, True]
 
     show(test, light(enabled=True, connected=False))
-
-
-def test_poll_before_the_screen_exists_is_shown_on_it() -> None:
-    app = MonitorApp(cast(Graph, FakeGraph(light())))
-    app.poll()
-
-    async def run() -> None:
-        async with app.run_test(size=(132, 40)) as pilot:
-            await pilot.pause()
-            assert '/bow' in Screen(app, pilot, FakeGraph()).text
-
-    asyncio.run(run())
 
 
 def test_last_request_is_shown_with_its_answer_and_age() -> None:
@@ -149,14 +132,6 @@ def test_selection_moves_and_stops_at_the_ends() -> None:
         (selected, 'refresh') for _, selected in steps]
 
 
-def test_selection_follows_a_click() -> None:
-    async def test(screen: Screen) -> None:
-        await screen.click('/c')
-        await screen.press('r')
-
-    assert show(test, *map(light, ('/a', '/b', '/c'))).asked == [('/c', 'refresh')]
-
-
 def test_selection_stays_with_its_device_and_moves_up_when_that_is_cleared() -> None:
     async def test(screen: Screen) -> None:
         await screen.press('end')
@@ -189,15 +164,6 @@ def test_light_is_switched_on_only_after_a_second_key_within_the_time() -> None:
         await screen.press('enter')
 
     assert show(test, light()).asked == [('/bow', 'on')]
-
-
-def test_question_is_dropped_when_its_device_is_no_longer_selected() -> None:
-    async def test(screen: Screen) -> None:
-        await screen.press('space')
-        await screen.click('/stern')
-        await screen.press('enter')
-
-    assert show(test, light(), light('/stern')).asked == []
 
 
 def test_light_is_switched_on_and_off_by_clicks_on_labels() -> None:
@@ -322,20 +288,6 @@ def test_selected_row_stays_visible_when_the_list_gets_shorter() -> None:
     show(test, *(light(f'/l{number:02}') for number in range(12)), size=(80, 25))
 
 
-def test_selected_row_may_be_scrolled_out_of_the_list() -> None:
-    async def test(screen: Screen) -> None:
-        for _ in range(3):
-            # Until the buttons have their places.
-            await screen.wait()
-        screen.app.query_one(DataTable).scroll_to(y=10, animate=False, immediate=True)
-        for _ in range(3):
-            await screen.wait()
-        assert 'above: /l00 off WARN' in screen.text
-        assert screen.app.query_one(DataTable).scroll_offset.y == 10
-
-    show(test, *(light(f'/l{number:02}') for number in range(40)), size=(80, 40))
-
-
 def test_80_columns_and_24_rows_show_all_of_twelve_devices_and_the_level_of_the_selected() -> None:
     async def test(screen: Screen) -> None:
         await screen.press('end')
@@ -411,17 +363,6 @@ def test_labels_of_keys_are_not_keys_of_others() -> None:
         assert own & common == set()
 
 
-def test_row_of_the_selected_device_alone_is_highlighted() -> None:
-    async def test(screen: Screen) -> None:
-        await screen.press('down')
-        table = screen.app.query_one(DataTable)
-        backgrounds = {row: next(segment.style.bgcolor for segment in table.render_line(row)
-                                 if segment.style is not None) for row in (1, 2, 3)}
-        assert backgrounds[1] == backgrounds[3] != backgrounds[2]
-
-    show(test, *map(light, ('/a', '/b', '/c')))
-
-
 @pytest.mark.parametrize('touch', [False, True])
 def test_night_is_red_on_black_whatever_is_shown(touch: bool) -> None:
     async def test(screen: Screen) -> None:
@@ -479,28 +420,3 @@ def test_view_that_may_only_look_has_no_buttons_to_operate_a_device() -> None:
         await screen.press('a')
 
     assert show(test, light(), may_request=False).requests == []
-
-
-def test_answers_are_taken_between_the_keys() -> None:
-    async def test(screen: Screen) -> None:
-        while not screen.graph.answers_polled:
-            await screen.settle()
-
-    show(test, light())
-
-
-def test_trend_is_that_of_2_minutes() -> None:
-    assert INTERVAL * TREND_POLLS * TREND_SIZE == 120
-
-
-def test_outcome_of_a_request_has_its_colour() -> None:
-    one = light()
-    one.action = ('on', DONE, 'confirmed', NOW)
-
-    async def test(screen: Screen) -> None:
-        styles = {segment.text: segment.style
-                  for segment in screen.app.query_one('#details').render_line(1)}
-        assert 'done' in styles
-        assert styles['done'] != styles[': confirmed']
-
-    show(test, one)

@@ -66,21 +66,6 @@ def test_open_link_tells_its_name_and_counts_frames_and_bytes_both_ways(
     assert traffic.bytes_sent == traffic.frames_sent * len(sent)
 
 
-def test_frames_are_logged_in_a_line_each_at_debug_level_only(
-        run: Run, other: OpenChannel, caplog: pytest.LogCaptureFixture) -> None:
-    for level in (logging.INFO, logging.DEBUG):
-        caplog.set_level(level, 'illuminator_ros')
-        link = run(LiveLink(URL))
-        link.wait_open()
-        other.broadcast(heartbeat_frame())
-        link.endpoint.wait_heard()
-        link.stop()
-        lines = [record.getMessage() for record in caplog.records]
-        for said in ('received from 1/243: HEARTBEAT type=MAV_TYPE_ILLUMINATOR ',
-                     'sent from 1/193: HEARTBEAT '):
-            assert any(line.startswith(said) for line in lines) == (level == logging.DEBUG)
-
-
 # Exceptions of the endpoint and of listeners: each is logged, and the link continues
 
 class Fault(Exception):

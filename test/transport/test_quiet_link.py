@@ -10,11 +10,8 @@ from typing import Any
 
 from illuminator_ros.mavlink import component
 from illuminator_ros.mavlink.frame import Decoder, Frame
-from illuminator_ros.mavlink.link_thread import FAULT_PAUSE
 from illuminator_ros.mavlink.messages import Address, CommandLong
-from illuminator_ros.mavlink.receiver import STALL
 from illuminator_ros.mavlink.signing import stamp_of, ticks
-from illuminator_ros.mavlink.transport.udp import PEER_EXPIRY
 import pytest
 from support.frames import heartbeat_frame, raw_v2
 from support.live_link import BRIDGE, LiveLink, Run, Talker
@@ -28,9 +25,6 @@ PEER = ('127.0.0.1', 14550)
 AUTOPILOT = Address(7, 1)
 ATTITUDE = 30
 BEAT, NOISE = heartbeat_frame(), b'noise' + heartbeat_frame()[:-1] + b'x'
-FALSE_START = b'\xfe\xfa\x00\x01\x01\x6e'
-
-
 def foreign_frame(sequence: int, source: Address = AUTOPILOT) -> bytes:
     """Return a frame with a message that the endpoint does not handle."""
     return raw_v2(ATTITUDE, bytes(range(1, 29)), sequence=sequence & 0xFF, source=source)
@@ -69,36 +63,6 @@ def test_heartbeat_is_sent_once_a_second_while_a_peer_is_heard() -> None:
     assert times == pytest.approx([0.0, 1.0, 2.0, 3.0, 4.0, 5.0])
 
 
-class Unlogged(SimulatedLink):
-    """A simulated link that survives faults, as a link does."""
-
-    def log_fault(self) -> None:
-        pass
-
-
-def test_endpoint_that_always_fails_is_polled_only_after_pauses() -> None:
-    polls: list[float] = []
-
-    def fail(now: float) -> None:
-        polls.append(now)
-        raise RuntimeError
-
-    endpoint = Talker()
-    endpoint.schedule.at(fail, 0.0)
-    Unlogged(endpoint, lambda data, peer: None, now=0.0).run(1.0)
-    assert len(polls) > 2
-    assert len(polls) <= 1.0 / FAULT_PAUSE + 2
-
-
-def test_frame_behind_a_false_start_is_received_when_that_is_given_up() -> None:
-    link, endpoint = simulated()
-    link.receive((BEAT + FALSE_START + BEAT, PEER))
-    link.run(STALL - 0.01)
-    assert len(endpoint.heard) == 1
-    link.run(0.02)
-    assert len(endpoint.heard) == 2
-
-
 def test_frames_that_came_while_the_process_was_stopped_precede_the_deadlines() -> None:
     link, endpoint = simulated()
     heard_at_poll: list[int] = []
@@ -111,19 +75,6 @@ def test_frames_that_came_while_the_process_was_stopped_precede_the_deadlines() 
     link.meanwhile.append(stop)
     link.run(0.01)
     assert heard_at_poll == [1]
-
-
-def test_foreign_frames_keep_a_peer_and_are_counted() -> None:
-    link, endpoint = simulated()
-    for second in range(3 * int(PEER_EXPIRY)):
-        link.run(1.0)
-        link.receive((foreign_frame(second), PEER))
-    assert (link.state().peers, link.udp.peers(link.now)) == (1, (PEER,))
-    for sequence in (30, 33, 34, 34):
-        link.receive((foreign_frame(sequence), PEER))
-    counter = link.state().traffic.sources[AUTOPILOT]
-    assert (counter.received, counter.lost, counter.duplicate) == (34, 2, 1)
-    assert (link.state().traffic.frames_received, len(endpoint.heard)) == (34, 0)
 
 
 def test_a_signer_whose_clock_is_behind_gets_heartbeats_and_nothing_else() -> None:
