@@ -13,6 +13,7 @@ from types import SimpleNamespace
 from typing import Any, NamedTuple
 from unittest.mock import Mock
 
+from illuminator_ros.gimbal.client import MAX_COMPONENTS, MAX_GIMBALS
 from illuminator_ros.gimbal.manager_state import MAX_OTHER_DEVICES
 from illuminator_ros.illuminator.mount_orientation import MAX_MOUNTS, MountOrientations
 from illuminator_ros.illuminator.settings import LightSettings
@@ -50,6 +51,7 @@ from support.entries import stores
 from support.fake_light import status_message
 from support.frames import frame_of, LIGHT, only
 from support.gimbal_manager import ManagerRig
+from support.gimbals import FakeManager, Rig
 from support.network import FakeSelector, Leaf, Network, Router
 from support.signers import checker, signed_frame
 from support.simulated_link import SimulatedLink
@@ -61,6 +63,7 @@ COUNT = 1500
 SMALL = 40
 COMMAND = CommandLong(*OURS, 1000, 0, 0, 0, 0, 0, 0, 0, 0)
 FEEDBACK = CameraFeedback(0, 1, 0, 1, 0, 0, 0, 0, 0, 0, 0, 0, 3)
+MANAGER = FakeManager(device_id=1)
 ATTITUDE = GimbalDeviceAttitudeStatus(0, 0, 0, 0, (1, 0, 0, 0), 0, 0, 0, 0, 0, 0, 0)
 
 
@@ -167,6 +170,16 @@ def camera(message: Message) -> object:
     commands = CommandSender(OURS)
     return linked(Component(commands, [RedEdgeClient(commands, CameraSettings())]),
                   *(frame_of(message, 0, source) for source in senders()), mavlink_version=1)
+
+
+def gimbals(*messages: Message) -> object:
+    rig = Rig()
+    for source in senders():
+        for message in messages:
+            rig.receive(source, message)
+    rig.sent.clear()
+    rig.events.clear()
+    return rig.component
 
 
 def simulator(message: Message) -> object:
@@ -284,6 +297,10 @@ ROWS = {
     'heartbeats of players': Row(functools.partial(players, heartbeat(6)), OTHERS),
     'gimbal devices': Row(
         functools.partial(players, ATTITUDE), {'StateTracker.other_devices': MAX_OTHER_DEVICES}),
+    'gimbals of managers': Row(
+        functools.partial(gimbals, heartbeat(26), MANAGER.status(), MANAGER.information()),
+        {'GimbalClient.gimbals': MAX_GIMBALS, 'GimbalClient.components': MAX_COMPONENTS},
+        {**OTHERS, **SENT}),
     'mounts': Row(
         functools.partial(mounts, ATTITUDE), {'MountOrientations.mounts': MAX_MOUNTS}),
     'vehicles with mounts': Row(

@@ -11,7 +11,6 @@ from hypothesis import given
 from hypothesis import strategies as st
 from illuminator_ros.illuminator.mount_orientation import (
     ATTITUDE_LIFETIME,
-    MAX_MOUNTS,
     MountOrientations,
 )
 from illuminator_ros.mavlink.dialect import mavlink
@@ -104,11 +103,3 @@ def test_direction_ends_with_the_attitude_and_belongs_to_one_gimbal() -> None:
     assert pointed(mounts, 1.9, device_id=2) == approx((math.cos(1), 0, -math.sin(1)))
     assert pointed(mounts, 1.9, device_id=171) is None
     assert mounts.direction(2, 154, 1.0) is None
-
-
-def test_forged_gimbals_take_no_memory_without_end() -> None:
-    mounts = MountOrientations()
-    taken = [mounts.receive(Address(system, 154), status((0.0, 0.0, 0.0)), 0.0)
-             for system in range(1, 100)]
-
-    assert taken.count(True) == MAX_MOUNTS

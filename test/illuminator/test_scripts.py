@@ -434,6 +434,9 @@ def test_the_state_of_the_light_follows_from_the_script(name: str) -> None:
     assert brightness is None or stage.light.fields['brightness'] == brightness
     assert [one.result.message[:len(text)] for one, text in zip(
         stage.answers, answers, strict=False)] == [*answers]
+    # Only what a status has confirmed is a success.
+    assert [result.message for one in stage.answers for result in one.results
+            if result.success is not (', confirmed by' in result.message)] == []
 
 
 # The script and the options -> the events of rules and wishes.
@@ -444,6 +447,7 @@ def test_the_state_of_the_light_follows_from_the_script(name: str) -> None:
      ['AutomaticSwitch off_after_silence', 'AutomaticSwitch failed']),
     ('safety off, 1, autonomy on, is ON_OFF refused, release safety, 1', {},
      ['DesiredStateFailed autonomy']),
+    ('safety off, 1, autonomy on, is ON_OFF lost, release safety, 0.2, operator off, 1', {}, []),
     # A setpoint that an OFF replaces has not failed.
     (LEARN + 'is CONFIGURE lost obeyed, default dims 30, default calls off, 3', SWITCH, [])])
 def test_an_automatic_off_and_a_wish_that_fails_are_reported(

@@ -10,18 +10,15 @@ import sys
 import threading
 
 from diagnostic_msgs.msg import DiagnosticArray
-from illuminator_ros.mavlink.dialect import mavlink
 import pytest
-from rcl_interfaces.srv import GetParameters
 from rclpy.qos import QoSProfile, ReliabilityPolicy
 from std_msgs.msg import Bool, Float32
-from std_srvs.srv import SetBool, Trigger
+from std_srvs.srv import SetBool
 from support import ros
 from support.embedded import embedded_bridge
-from support.light import Address, eventually, free_port, ServedLight
+from support.light import eventually, free_port, ServedLight
 from support.processes import ended, Program, python, start_interpreter
-from support.recording import Call
-from support.slow import CLOCK, pass_time_until, time_passes
+from support.slow import CLOCK, pass_time_until
 
 BRIDGE = 'illuminator_ros.bridge'
 
@@ -48,36 +45,6 @@ def served(own_ros: ros.Ros, port: int) -> Iterator[tuple[Program, ServedLight]]
     with ros.running_bridge(own_ros.domain, port) as bridge, ServedLight(port) as light:
         ros.Parameters(own_ros).wait(brightness=100.0)
         yield bridge, light
-
-
-def test_refreshes_beyond_the_limit_are_refused_at_once(
-    own_ros: ros.Ros, served: tuple[Program, ServedLight],
-) -> None:
-    client = own_ros.node.create_client(
-        Trigger, '/illuminator/refresh', qos_profile=QoSProfile(depth=500))
-    eventually(client.service_is_ready)
-    own_ros.catch_up()
-    served[1].fake.results[mavlink.MAV_CMD_REQUEST_MESSAGE] = None
-
-    calls = [Call(client.call_async(Trigger.Request())) for _ in range(100)]
-
-    eventually(lambda: any(call.answered for call in calls))
-    own_ros.synchronize()
-    refused = [call.result().message for call in calls if call.answered]
-    assert 0 < len(refused) < 100
-    assert all('busy' in message for message in refused)
-    served[1].behave()
-    pass_time_until(lambda: all(call.answered for call in calls), step=0.1)
-
-
-def test_long_list_of_names_gets_an_empty_answer(
-    own_ros: ros.Ros, served: tuple[Program, ServedLight],
-) -> None:
-    answer = own_ros.call(GetParameters, '/illuminator/get_parameters',
-                          GetParameters.Request(names=['brightness'] * 200_000))
-
-    assert not answer.values
-    assert own_ros.enable().success
 
 
 def test_second_bridge_of_the_same_name_is_logged_once_when_it_comes_and_when_it_goes(
@@ -174,21 +141,6 @@ def test_thread_that_cannot_be_started_is_tried_again(
             ros.Parameters(own_ros).wait(brightness=100.0)
     assert len(refused) == 2
     assert "can't start new thread for the link: too many threads" in capfd.readouterr().err
-
-
-def test_node_of_a_light_that_was_silent_for_long_is_removed(own_ros: ros.Ros, port: int) -> None:
-    with (ros.running_bridge(own_ros.domain, port, target_component=243) as bridge,
-          ServedLight(port), ServedLight(port, source=Address(1, 244)) as further):
-        bridge.wait_for('light 1/244 is served by /illuminator_1_244')
-        eventually(lambda: 'illuminator_1_244' in own_ros.node.get_node_names())
-
-        further.vanish()
-        pass_time_until(lambda: bridge.count('light 1/244 was silent for long'), step=10.0)
-
-        eventually(lambda: 'illuminator_1_244' not in own_ros.node.get_node_names())
-        # After the jumps of the clock the other light may be lost until its next status.
-        with time_passes():
-            eventually(lambda: own_ros.enable().success)
 
 
 @pytest.mark.parametrize(('type_', 'reliability', 'reason'), [
