@@ -54,10 +54,15 @@ def _by_heartbeat(
 
 def described(
     addresses: Collection[Address], heartbeats: Mapping[Address, Heartbeat],
+    known: Collection[DeviceKind],
 ) -> str:
-    """Return components with their kinds, the first few by name."""
+    """
+    Return components with their kinds, the first few by name.
+
+    :param known: the devices of payloads.
+    """
     def one(address: Address) -> str:
-        found = kinds(address, heartbeats.get(address))
+        found = kinds(address, heartbeats.get(address), known=known)
         return f'{address} ({", ".join(found) or "no HEARTBEAT"})'
 
     return listed([one(address) for address in sorted(addresses)])

@@ -42,6 +42,7 @@ from .payload_node import PayloadNode
 from .throttled_log import LogForwarder, NodeLog
 from ..mavlink.command_sender import CommandSender
 from ..mavlink.component import Component
+from ..mavlink.device_kind import DeviceKind
 from ..mavlink.link import Link
 from ..mavlink.link_state import LinkEvent
 from ..mavlink.retries import RESOURCE
@@ -96,8 +97,9 @@ class Bridge:
                         cli_args=without_node_name(arguments), use_global_arguments=False)
             for kind in kinds[1:])]
         _refuse_same_names(nodes)
+        devices = {name: one.device for name, one in types.items() if one.device}
         parameters = _link_parameters(
-            node, dict(zip(names, kinds, strict=True)), types, url)
+            node, dict(zip(names, kinds, strict=True)), devices, url)
         values = [declare_given(own, kind.parameters)
                   for own, kind in zip(nodes, kinds, strict=True)]
         signing, store = parameters.signing()
@@ -131,7 +133,7 @@ class Bridge:
             node, arguments, self.log, self._executor, self._wake)
         self._diagnostics = DiagnosticsPublisher(
             node, self.link, self._component, urls=tuple(parameters.urls),
-            period=parameters.diagnostics_period)
+            known=devices.values(), period=parameters.diagnostics_period)
         self._served: list[_Served] = []
         for own in nodes:
             self._executor.add_node(own)
@@ -314,7 +316,7 @@ class Bridge:
 
 
 def _link_parameters(
-    node: Node, payloads: Mapping[str, RosPayload], types: Mapping[str, PayloadType], url: str,
+    node: Node, payloads: Mapping[str, RosPayload], known: Mapping[str, DeviceKind], url: str,
 ) -> LinkParameters:
     """Declare the parameters of a link that carries these payloads."""
     given = given_parameters(node).get('connection_url')
@@ -323,7 +325,6 @@ def _link_parameters(
                              'give one of them only')
     kinds = [*payloads.values()]
     defaults = {**kinds[0].all_link_defaults, **({'connection_url': url} if url else {})}
-    known = {name: one.device for name, one in types.items() if one.device}
     parameters = declare_link_parameters(node, defaults, [
         devices for name, kind in payloads.items() for devices in kind.devices or (
             [frozenset({known[name].name})] if name in known else [])], known.values())

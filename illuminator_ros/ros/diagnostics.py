@@ -11,7 +11,7 @@ link's clock.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass
 import functools
 from typing import NamedTuple
@@ -22,6 +22,7 @@ from ..mavlink import link_state
 from ..mavlink.command_sender import format_seconds
 from ..mavlink.component import Component
 from ..mavlink.component_kinds import described
+from ..mavlink.device_kind import DeviceKind
 from ..mavlink.duplicate_filter import OWN
 from ..mavlink.link import Link
 from ..mavlink.message_traits import name_of
@@ -130,6 +131,7 @@ class LinkDiagnostics:
     :param values: the values of the status of each line that are the same for all devices.
     :param devices: values of single devices, by address.
     :param heartbeats: see :attr:`~..mavlink.component.Component.heartbeats`.
+    :param known: the devices of payloads.
     """
 
     lines: Sequence[link_state.LinkSnapshot]
@@ -142,6 +144,7 @@ class LinkDiagnostics:
     values: Sequence[Mapping[str, Value]]
     devices: Mapping[Address, Mapping[str, Value]]
     heartbeats: Mapping[Address, Heartbeat]
+    known: Collection[DeviceKind]
 
     @property
     def state(self) -> link_state.LinkSnapshot:
@@ -191,12 +194,14 @@ def loops(
 
 
 def link_diagnostics(
-    link: Link, component: Component, urls: Sequence[str], now: float,
+    link: Link, component: Component, urls: Sequence[str], known: Collection[DeviceKind],
+    now: float,
 ) -> LinkDiagnostics:
     """
     Return a snapshot of the link; call it in the link's thread.
 
     :param urls: of its lines.
+    :param known: the devices of payloads.
     """
     lines = link.lines.snapshots(now)
     commands, copies = component.commands, link.lines.copies(now)
@@ -229,7 +234,7 @@ def link_diagnostics(
                 for index in range(len(lines))], now, component.address,
         component.address_conflict(now), frozenset(commands.unanswering),
         commands.clock_fault(), [{**values[0], **own}, *values[1:]], devices,
-        {**component.heartbeats})
+        {**component.heartbeats}, known)
 
 
 def _line_values(
@@ -305,8 +310,9 @@ def why_nothing_is_heard(link: LinkDiagnostics, device: str) -> str:
         return (f'{", ".join(unset[:5])} heard, whose system id 0 cannot be addressed: set its '
                 'system id, such as 1')
     if frames:
-        return (f'{frames} frames from {described(link.state.traffic.sources, link.heartbeats)}, '
-                f'none from {device}: check that it is on, and that routers forward its frames')
+        heard = described(link.state.traffic.sources, link.heartbeats, link.known)
+        return (f'{frames} frames from {heard}, none from {device}: check that it is on, and that '
+                'routers forward its frames')
     if bytes_:
         return f'{bytes_} bytes received, no valid frame; check the baud rate (discover)'
     return ('nothing is received: check that the device is on, and that it, or a router, sends '

@@ -5,7 +5,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Collection, Iterable, Sequence
 from dataclasses import dataclass
 import functools
 import threading
@@ -17,6 +17,7 @@ from .diagnostics import line_reports, link_diagnostics, LinkDiagnostics, loops,
 from .executor_calls import ExecutorCalls
 from .qos import STREAM_QOS
 from ..mavlink.component import Component
+from ..mavlink.device_kind import DeviceKind
 from ..mavlink.link import Link
 
 # Makes reports of a snapshot that was taken in the link's thread; a pure function.
@@ -41,18 +42,20 @@ class DiagnosticsPublisher:
     Publishes the reports of each node when they are due, or at once when a level has changed.
 
     :param urls: the URL of each line, which is its hardware id.
+    :param known: the devices of payloads.
     :param period: s between publications of a node.
     """
 
     def __init__(
         self, node: Node, link: Link, component: Component, *, urls: Sequence[str],
-        period: float,
+        known: Collection[DeviceKind], period: float,
     ) -> None:
         self._clock = node.get_clock()
         self._publisher = node.create_publisher(DiagnosticArray, '/diagnostics', STREAM_QOS)
         self._link = link
         self._component = component
         self._urls = urls
+        self._known = known
         self._period = period
         self._lock = threading.Lock()
         # When each source is due, and the levels that were published last.
@@ -71,7 +74,7 @@ class DiagnosticsPublisher:
 
     def snapshot(self, now: float) -> LinkDiagnostics:
         """Return a snapshot of the link; call it in the link's thread."""
-        return link_diagnostics(self._link, self._component, self._urls, now)
+        return link_diagnostics(self._link, self._component, self._urls, self._known, now)
 
     def loops(self, now: float) -> Iterable[str]:
         """Return the loops between lines, for people; call it in the link's thread."""

@@ -57,10 +57,17 @@ def test_a_payload_of_another_package_adds_the_kinds_of_its_devices() -> None:
     assert kinds(address, None, [], [winch]) == []
 
 
+def test_devices_of_payloads_are_described_by_their_names() -> None:
+    heartbeats = {Address(1, 100): beat(0, 1), Address(1, 154): beat(mavlink.MAV_TYPE_GIMBAL),
+                  Address(1, 243): beat(44)}
+    assert described([*heartbeats], heartbeats, devices(PAYLOADS)) == (
+        '1/100 (MicaSense camera), 1/154 (gimbal) and 1/243 (light)')
+
+
 def test_only_the_first_components_are_described() -> None:
     heartbeats = {Address(1, component): beat(18) for component in range(10, 30, 2)}
 
-    assert described([*heartbeats, Address(1, 1)], heartbeats) == (
+    assert described([*heartbeats, Address(1, 1)], heartbeats, ()) == (
         '1/1 (no HEARTBEAT), '
         + ', '.join(f'1/{component} (onboard computer)' for component in range(10, 24, 2))
         + ' and 3 more')

@@ -65,7 +65,7 @@ class Reported:
         """Return the statuses by what they are of."""
         light = self.snapshot()
         made = reports(
-            link_diagnostics(self.link, self.client, ['udpin://'], self.link.now), light=light,
+            link_diagnostics(self.link, self.client, ['udpin://'], (), self.link.now), light=light,
             heard=heard or LightsHeard(0, (), (), False),
             hardware_id=hardware_id(light) if light else '', started=self._started)
         return {one.name: one.message('/illuminator') for one in made}
@@ -89,7 +89,7 @@ def test_each_further_line_has_a_status_and_a_loop_is_a_warning_that_names_both_
     link.lines.copies.return_value = {(0, 2): 3, (2, 2): 1, (-1, 2): 2}
     urls = ['udpin://', 'serial:///dev/light:57600', 'tcp://router:5760']
     second, third = (report.message('/illuminator') for report in line_reports(
-        link_diagnostics(link, reported.client, urls, reported.link.now)))
+        link_diagnostics(link, reported.client, urls, (), reported.link.now)))
 
     assert found(second) == (ERROR, 'not open: the device has gone')
     assert (second.name, second.hardware_id) == ('illuminator: link 2', urls[1])

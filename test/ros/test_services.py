@@ -10,15 +10,17 @@ import re
 import socket
 
 from illuminator_ros.mavlink.dialect import mavlink
+from illuminator_ros.mavlink.messages import Address, Heartbeat
 import pytest
 from std_msgs.msg import Float32, Float64
 from std_srvs.srv import Trigger
 from support.embedded import embedded_bridge
+from support.frames import frame_of
 from support.light import ON_OFF, ServedLight
 from support.processes import Program
 from support.ros import Parameters, Ros, running_bridge
 from support.slow import pass_time_until
-from support.waiting import Log
+from support.waiting import eventually, Log
 
 STATUS, INFORMATION = 440.0, 396.0
 
@@ -98,6 +100,17 @@ def test_requests_fail_at_once_and_say_why_while_no_light_was_ever_heard(
             'check that the device is on, and that it, or a router, sends to this address or '
             'line; on a serial line, that TX and RX are not swapped'}
         assert Parameters(own_ros).get('brightness') == [None]
+
+
+def test_reason_for_a_missing_light_names_the_devices_that_are_heard_instead(
+    own_ros: Ros, port: int,
+) -> None:
+    camera = Heartbeat(mavlink.MAV_TYPE_GENERIC, mavlink.MAV_AUTOPILOT_RESERVED, 0, 0, 0, 3)
+    with (running_bridge(own_ros.domain, port),
+          socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as sender):
+        sender.sendto(frame_of(camera, 0, Address(1, 100)), ('127.0.0.1', port))
+        eventually(lambda: 'frames from 1/100 (MicaSense camera), none from a light' in str(
+            no_light_messages(own_ros)))
 
 
 def test_requests_fail_at_once_and_say_why_while_the_link_is_not_open(
