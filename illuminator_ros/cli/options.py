@@ -9,9 +9,10 @@ import argparse
 from collections.abc import Mapping
 import time
 
+from ..mavlink.errors import KeyFileError
 from ..mavlink.messages import Address
 from ..mavlink.signing import Signing, SigningMode
-from ..mavlink.signing_files import KeyFileError, load_signing, TimestampStore
+from ..mavlink.signing_files import load_signing, TimestampStore
 from ..ros.ros_home import state_folder
 
 

@@ -21,6 +21,7 @@ from typing import Any
 from .messages import IlluminatorStatus
 from ..mavlink import dialect
 from ..mavlink.dialect import mavlink
+from ..mavlink.errors import InvalidValue
 
 # Values of configuration fields by name, untyped: the mode is a Mode, the others are numbers.
 Changes = Mapping[str, Any]
@@ -111,10 +112,6 @@ class StrobeRange:
         if not (period and self.known):
             return period
         return min(max(period, shortest(self.min_strobe_period)), shortest(self.max_strobe_period))
-
-
-class InvalidValue(ValueError):
-    """A value that the light must not get; the message names it and says why."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -13,11 +13,12 @@ from . import events
 from .commands import CONFIRMED
 from .decide import describe
 from .limit_watch import LimitWatch
-from .model import Changes, checked, InvalidValue, SafetyLimits, Status
+from .model import Changes, checked, SafetyLimits, Status
 from .settings import LightSettings
 from .silence import Silence
 from .twin import Failure, Twin
 from ..mavlink.command_sender import format_seconds
+from ..mavlink.errors import InvalidValue
 from ..mavlink.retries import RetryPolicy
 from ..payload.attempt import Target, UNCONFIRMED
 from ..payload.requests import Request, Requests, Result, WEAK, Why

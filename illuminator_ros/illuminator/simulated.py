@@ -20,6 +20,7 @@ from .simulated_properties import FAULTS, IlluminatorBehaviour, IlluminatorPrope
 from .thermal import ThermalModel, ThermalProperties
 from ..mavlink import messages as mav
 from ..mavlink.dialect import mavlink
+from ..mavlink.errors import InvalidValue
 from ..mavlink.messages import AnyCommand, params_of
 from ..simulation.faults import Behaviour
 from ..simulation.settings import number
@@ -169,14 +170,14 @@ class SimulatedIlluminator(SimulatedDevice):
             duty_cycle)
         try:
             if mode not in self.properties.modes:
-                raise model.InvalidValue(f'mode {mode}')
+                raise InvalidValue(f'mode {mode}')
             if period and not behaviour.measures:
-                raise model.InvalidValue('this light does not strobe')
+                raise InvalidValue('this light does not strobe')
             for name, value in (('brightness', brightness), ('strobe_period', period),
                                 ('strobe_duty_cycle', duty_cycle)):
                 if not (math.isnan(value) and behaviour.accepts_nan):
                     model.checked(name, value, strobe_range)
-        except model.InvalidValue:
+        except InvalidValue:
             accepted = behaviour.accepts_out_of_range
         else:
             accepted = True

@@ -9,10 +9,11 @@ from collections.abc import Callable, Iterable
 
 from . import events
 from .commands import SWITCHES
-from .model import checked, FIELDS, InvalidValue, Status
+from .model import checked, FIELDS, Status
 from .rules import Rules
 from .twin import Twin
 from ..mavlink.command_sender import Command
+from ..mavlink.errors import InvalidValue
 from ..payload.arbitration import Cause, HolderChanged
 from ..payload.attempt import Target
 from ..payload.device_property import Property

@@ -21,6 +21,7 @@ from typing import NamedTuple, TypeVar
 
 from . import messages
 from .dialect import mavlink
+from .errors import InvalidValue
 from .messages import Address, Message
 from .retries import CLOSING, COMMAND, REJECTED
 from .schedule import Schedule
@@ -62,7 +63,7 @@ class CommandPosition:
     :param x: latitude, deg, in a global frame; m in a local one. NaN means "not used".
     :param y: longitude, deg, or m; NaN means "not used".
     :param z: altitude, m, as the frame defines it.
-    :raises ValueError: if x or y does not fit into the message.
+    :raises InvalidValue: if x or y does not fit into the message.
     """
 
     frame: int
@@ -74,7 +75,8 @@ class CommandPosition:
         for value in self.x, self.y:
             # NaN is not above it.
             if abs(value) * self._scale > INT32_UNSET:
-                raise ValueError(f'a position of {self.x:g}, {self.y:g} does not fit COMMAND_INT')
+                raise InvalidValue(
+                    f'a position of {self.x:g}, {self.y:g} does not fit COMMAND_INT')
 
     @property
     def _scale(self) -> float:
@@ -286,7 +288,7 @@ class CommandSender:
     :ivar round_trips: the last round-trip time of each target, s, at most :data:`MAX_TARGETS`.
     :ivar answers: how many acknowledgements, but those of progress, each kind of command got
         lately, by target and MAV_CMD, at most :data:`MAX_TARGETS`.
-    :raises ValueError: if ``timeout`` or ``retries`` is out of its range.
+    :raises InvalidValue: if ``timeout`` or ``retries`` is out of its range.
     """
 
     address: Address
@@ -307,9 +309,9 @@ class CommandSender:
 
     def __post_init__(self) -> None:
         if not (math.isfinite(self.timeout) and self.timeout > 0):
-            raise ValueError(f'timeout {self.timeout} s is not above 0')
+            raise InvalidValue(f'timeout {self.timeout} s is not above 0')
         if self.retries < 0:
-            raise ValueError(f'retries {self.retries} is below 0')
+            raise InvalidValue(f'retries {self.retries} is below 0')
 
     def __len__(self) -> int:
         """Return how many commands have not ended."""

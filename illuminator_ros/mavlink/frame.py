@@ -24,6 +24,7 @@ from typing import cast, NamedTuple
 from fastcrc.crc16 import mcrf4xx
 
 from .dialect import CRC_EXTRA, mavlink
+from .errors import InvalidValue
 from .messages import Address
 
 STX_V1 = 0xFE
@@ -103,12 +104,12 @@ def encode_frame(
         MAVLink 1 needs it whole and without extension fields.
     :param sequence: 0..255.
     :param version: 1 or 2.
-    :raises ValueError: if the payload is too long, or MAVLink 1 cannot carry the message.
+    :raises InvalidValue: if the payload is too long, or MAVLink 1 cannot carry the message.
     """
     if version == 1:
         if message_id > MAX_ID_V1 or signed:
-            raise ValueError(f'MAVLink 1 carries no message {message_id}' if not signed else
-                             'MAVLink 1 frames cannot be signed')
+            raise InvalidValue(f'MAVLink 1 carries no message {message_id}' if not signed else
+                               'MAVLink 1 frames cannot be signed')
         head: tuple[int, ...] = STX_V1, len(payload), sequence, *source, message_id
     else:
         payload = payload.rstrip(b'\0') or payload[:1]

@@ -10,6 +10,7 @@ import random
 
 from .dialect import base_size, encode
 from .duplicate_filter import DuplicateFilter, OWN
+from .errors import InvalidValue
 from .frame import encode_frame, Frame
 from .messages import Address, Message
 from .signing import Signing, stamp_of
@@ -58,16 +59,16 @@ class FrameWriter:
     :param version: 1 or 2, of all frames.
     :param duplicates: remembers the frames, None where none are forwarded.
     :ivar sequences: the next sequence number of each address that was sent from.
-    :raises ValueError: if the frames must be signed and MAVLink 1 cannot.
+    :raises InvalidValue: if the frames must be signed and MAVLink 1 cannot.
     """
 
     def __init__(self, signing: Signing, version: int = 2,
                  duplicates: DuplicateFilter | None = None) -> None:
         if version not in (1, 2):
-            raise ValueError(f'MAVLink version {version} is neither 1 nor 2')
+            raise InvalidValue(f'MAVLink version {version} is neither 1 nor 2')
         if version == 1 and signing.signs:
-            raise ValueError('MAVLink 1 frames cannot be signed: switch signing off, '
-                             'or use MAVLink 2')
+            raise InvalidValue('MAVLink 1 frames cannot be signed: switch signing off, '
+                               'or use MAVLink 2')
         self.sequences: dict[Address, int] = {}
         self._signing = signing
         self._signs = signing.signs
@@ -79,7 +80,7 @@ class FrameWriter:
         """
         Return the frame of a message.
 
-        :raises ValueError: if MAVLink 1 cannot carry the message.
+        :raises InvalidValue: if MAVLink 1 cannot carry the message.
         :raises struct.error: if a value does not fit into its field.
         """
         payload = encode(message)

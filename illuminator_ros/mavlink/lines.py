@@ -15,6 +15,7 @@ import selectors
 from .component import Endpoint
 from .dialect import decode, line_of
 from .duplicate_filter import DuplicateFilter
+from .errors import InvalidValue
 from .forwarded_commands import ForwardedCommands
 from .frame import Frame, MAX_ID_V1
 from .frame_writer import FrameWriter
@@ -48,7 +49,7 @@ class Lines(LineUser):
     :param mavlink_version: 1 or 2, of the frames that are sent; both are received.
     :param wall_clock: s, Unix time, for the signing time stamps.
     :ivar forwarded_commands: the commands of others that were forwarded lately.
-    :raises ValueError: if MAVLink 1 cannot carry a message of the endpoint, or must be signed.
+    :raises InvalidValue: if MAVLink 1 cannot carry a message of the endpoint, or must be signed.
     """
 
     def __init__(
@@ -60,8 +61,8 @@ class Lines(LineUser):
     ) -> None:
         classes = dict.fromkeys((*endpoint.messages, *endpoint.sends))
         if mavlink_version == 1 and (too_high := [c.msgname for c in classes if c.id > MAX_ID_V1]):
-            raise ValueError(f'MAVLink 1 cannot carry {", ".join(too_high)}: it has no message '
-                             f'ids above {MAX_ID_V1}; use MAVLink 2')
+            raise InvalidValue(f'MAVLink 1 cannot carry {", ".join(too_high)}: it has no message '
+                               f'ids above {MAX_ID_V1}; use MAVLink 2')
         self._endpoint = endpoint
         self._classes = {cls.id: cls for cls in endpoint.messages}
         self._faults = faults

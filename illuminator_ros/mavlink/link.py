@@ -11,6 +11,7 @@ import selectors
 import time
 
 from .component import Endpoint
+from .errors import LinkThreadError
 from .lines import Lines
 from .link_state import LinkEvent, LinkInput, LinkSnapshot
 from .link_thread import FaultLog, LinkThread
@@ -20,10 +21,6 @@ from .url import Url
 
 # s between stores of the signing time stamp; the specification asks for once a minute.
 STORE_INTERVAL = 30.0
-
-
-class LinkThreadError(RuntimeError):
-    """The thread of a link cannot be started; the message names the link and says why."""
 
 
 class Link:
@@ -42,7 +39,7 @@ class Link:
     :param wall_clock: s, Unix time, for the signing time stamps.
     :param selector: waits for the transport.
     :ivar lines: for use in the link's thread.
-    :raises ValueError: if MAVLink 1 cannot carry a message of the endpoint, or must be signed.
+    :raises InvalidValue: if MAVLink 1 cannot carry a message of the endpoint, or must be signed.
     """
 
     def __init__(

@@ -19,6 +19,7 @@ from enum import Enum
 import hashlib
 import hmac
 
+from .errors import InvalidValue
 from .frame import Frame, SIGNATURE
 from .messages import Address
 
@@ -99,7 +100,7 @@ class Signing:
     :param key: 32 bytes; may be missing only where the mode is off.
     :param link_id: 0..255, our id for this link in the frames that we sign.
     :param timestamp: the last time stamp used, in ticks; from a former run.
-    :raises ValueError: if the mode needs a key and there is none of 32 bytes.
+    :raises InvalidValue: if the mode needs a key and there is none of 32 bytes.
     """
 
     mode: SigningMode = SigningMode.OFF
@@ -115,9 +116,9 @@ class Signing:
         if self.mode is SigningMode.OFF:
             return
         if not isinstance(self.key, bytes):
-            raise ValueError(f'signing needs a key of bytes, not {type(self.key).__name__}')
+            raise InvalidValue(f'signing needs a key of bytes, not {type(self.key).__name__}')
         if len(self.key) != KEY_SIZE:
-            raise ValueError(f'signing needs a key of {KEY_SIZE} bytes, not {len(self.key)}')
+            raise InvalidValue(f'signing needs a key of {KEY_SIZE} bytes, not {len(self.key)}')
         # The bridge imports hmac and hashlib when they are first used: now, not for the first
         # frame.
         self._is_equal = hmac.compare_digest

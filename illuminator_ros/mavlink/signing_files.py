@@ -15,6 +15,7 @@ from pathlib import Path
 import re
 import stat
 
+from .errors import KeyFileError
 from .signing import KEY_SIZE, MAX_TICKS, Signing, SigningMode, ticks, TICKS_PER_SECOND
 
 MIN_PASSPHRASE = 8
@@ -26,10 +27,6 @@ CLOCK_MARGIN = 45 * TICKS_PER_SECOND
 FRAMES_MARGIN = TICKS_PER_SECOND // 2
 
 _log = logging.getLogger(__name__)
-
-
-class KeyFileError(ValueError):
-    """A key file that cannot be used; the message names the file and says why, never the key."""
 
 
 def load_key(path: str) -> bytes:

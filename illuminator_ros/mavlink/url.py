@@ -16,6 +16,7 @@ from typing import Literal, NamedTuple, NoReturn
 
 from .component_kinds import AUTOPILOT
 from .device_kind import DeviceKind
+from .errors import UrlError
 from .rate_scan import RATES
 
 MAVROS_UDP_BIND_PORT = 14555
@@ -27,10 +28,6 @@ MAX_BAUD = 20_000_000
 EXAMPLES = (
     'udpin://0.0.0.0:14550', 'udpout://192.168.1.10:14550', 'udp://:14541@127.0.0.1:14540',
     'tcpout://192.168.1.10:5760', 'serial:///dev/ttyACM0:57600')
-
-
-class UrlError(ValueError):
-    """A wrong connection URL; the message quotes the URL and its wrong part."""
 
 
 class HostPort(NamedTuple):

@@ -11,6 +11,7 @@ import reprlib
 from typing import NamedTuple
 
 from .arbitration import Cause, HolderChanged
+from ..mavlink.errors import InvalidValue
 
 # The source of a request that names none.
 DEFAULT = 'default'
@@ -26,10 +27,10 @@ def source_name(text: str) -> str:
     """
     Return the name of a source.
 
-    :raises ValueError: if topics cannot have it; ``cmd`` is the prefix of plain commands.
+    :raises InvalidValue: if topics cannot have it; ``cmd`` is the prefix of plain commands.
     """
     if not re.fullmatch(r'[A-Za-z](_?[A-Za-z0-9]){0,63}', text) or text == 'cmd':
-        raise ValueError(f'{reprlib.repr(text)} is not a valid name of a source')
+        raise InvalidValue(f'{reprlib.repr(text)} is not a valid name of a source')
     return text
 
 

@@ -43,6 +43,7 @@ from .throttled_log import LogForwarder, NodeLog
 from ..mavlink.command_sender import CommandSender
 from ..mavlink.component import Component
 from ..mavlink.device_kind import DeviceKind
+from ..mavlink.errors import InvalidValue
 from ..mavlink.link import Link
 from ..mavlink.link_state import LinkEvent
 from ..mavlink.retries import RESOURCE
@@ -115,7 +116,7 @@ class Bridge:
                 first, self._component, label=label, further=dict(further),
                 on_event=self._link_event, signing=signing, store=store,
                 mavlink_version=parameters.mavlink_version)
-        except ValueError as error:
+        except InvalidValue as error:
             raise ParameterError(f'mavlink_version: {error}') from None
         self._ended = threading.Event()
         self._ending = threading.Lock()

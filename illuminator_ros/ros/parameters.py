@@ -21,10 +21,11 @@ from .rclpy_private import parameter_overrides
 from .ros_home import state_folder
 from .throttled_log import NodeLog
 from ..mavlink.device_kind import DeviceKind
+from ..mavlink.errors import KeyFileError, MavlinkError, UrlError
 from ..mavlink.messages import Address
 from ..mavlink.signing import Signing, SigningMode
-from ..mavlink.signing_files import KeyFileError, load_signing, TimestampStore
-from ..mavlink.url import AutoUrl, parse_url, resource, Url, UrlError
+from ..mavlink.signing_files import load_signing, TimestampStore
+from ..mavlink.url import AutoUrl, parse_url, resource, Url
 
 T = TypeVar('T')
 # Values of parameters by name, each of the type of its default.
@@ -39,7 +40,7 @@ _TYPES: dict[type, tuple[Parameter.Type, str]] = {
 }
 
 
-class ParameterError(ValueError):
+class ParameterError(MavlinkError, ValueError):
     """A wrong parameter; the message names it and gives the reason."""
 
 

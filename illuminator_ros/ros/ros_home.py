@@ -8,7 +8,7 @@ from __future__ import annotations
 import os
 from pathlib import Path
 
-from ..mavlink.signing_files import KeyFileError
+from ..mavlink.errors import KeyFileError
 
 
 def state_folder() -> Path:

@@ -20,6 +20,7 @@ from typing import Any, NamedTuple, TypeVar
 from .settings import integer, number, SettingValues
 from ..mavlink import messages
 from ..mavlink.dialect import mavlink, short_names
+from ..mavlink.errors import InvalidValue
 
 T = TypeVar('T')
 
@@ -193,7 +194,7 @@ class Behaviour:
 B = TypeVar('B', bound=Behaviour)
 
 
-class FaultError(ValueError):
+class FaultError(InvalidValue):
     """A fault that does not exist, or a value that it cannot have; the message says which."""
 
 

@@ -15,6 +15,7 @@ from hypothesis import strategies as st
 from illuminator_ros.illuminator import model
 from illuminator_ros.illuminator.messages import IlluminatorStatus, STATUS_ID
 from illuminator_ros.mavlink.dialect import encode
+from illuminator_ros.mavlink.errors import InvalidValue
 import pytest
 from support.fake_light import status_message
 from support.messages import decode_payload
@@ -60,7 +61,7 @@ def test_a_valid_value_is_returned_as_it_is_sent(name: str, value: Any, expected
 def test_an_invalid_value_is_refused_with_a_short_reason(
     name: str, value: Any, reason: str,
 ) -> None:
-    with pytest.raises(model.InvalidValue, match=reason) as caught:
+    with pytest.raises(InvalidValue, match=reason) as caught:
         model.checked(name, value, LIMITS)
     assert len(str(caught.value)) < 200
 

@@ -13,9 +13,9 @@ import sys
 
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from illuminator_ros.mavlink.errors import KeyFileError
 from illuminator_ros.mavlink.signing import NEW_STREAM_TICKS, SigningMode
 from illuminator_ros.mavlink.signing_files import (
-    KeyFileError,
     load_key,
     load_signing,
     MAX_KEY_FILE,

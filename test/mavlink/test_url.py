@@ -8,6 +8,7 @@ from __future__ import annotations
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 from illuminator_ros.mavlink.device_kind import DeviceKind
+from illuminator_ros.mavlink.errors import UrlError
 from illuminator_ros.mavlink.url import (
     AutoUrl,
     Broadcast,
@@ -20,7 +21,6 @@ from illuminator_ros.mavlink.url import (
     TcpUrl,
     UdpUrl,
     Url,
-    UrlError,
 )
 import pytest
 

@@ -13,11 +13,11 @@ from hypothesis import given
 from hypothesis import strategies as st
 from illuminator_ros.mavlink.dialect import CRC_EXTRA, mavlink
 from illuminator_ros.mavlink.duplicate_filter import MEMORY
+from illuminator_ros.mavlink.errors import ChannelLost
 from illuminator_ros.mavlink.line import ANNOUNCE_INTERVAL, SILENCE
 from illuminator_ros.mavlink.messages import Address, CommandLong, heartbeat, Message
 from illuminator_ros.mavlink.routing_table import EXPIRY
 from illuminator_ros.mavlink.signing import Signing, SigningMode
-from illuminator_ros.mavlink.transport import ChannelLost
 from illuminator_ros.mavlink.url import parse_url
 import pytest
 from support.frames import Codec, frame_of, only, raw_v2, spoilt

@@ -16,8 +16,9 @@ from typing import Any
 from illuminator_ros.mavlink import connector as connector_module
 from illuminator_ros.mavlink import line, link_thread
 from illuminator_ros.mavlink.dialect import decode
+from illuminator_ros.mavlink.errors import LinkThreadError
 from illuminator_ros.mavlink.frame import Decoder
-from illuminator_ros.mavlink.link import Link, LinkThreadError, STORE_INTERVAL
+from illuminator_ros.mavlink.link import Link, STORE_INTERVAL
 from illuminator_ros.mavlink.link_state import LinkEvent
 from illuminator_ros.mavlink.messages import CommandLong
 from illuminator_ros.mavlink.retries import RESOURCE

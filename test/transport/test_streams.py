@@ -18,9 +18,10 @@ from typing import Any
 
 from hypothesis import given
 from hypothesis import strategies as st
+from illuminator_ros.mavlink.errors import ChannelLost
 from illuminator_ros.mavlink.frame import Decoder
 from illuminator_ros.mavlink.messages import heartbeat
-from illuminator_ros.mavlink.transport import base, ChannelLost
+from illuminator_ros.mavlink.transport import base
 from illuminator_ros.mavlink.transport.base import FrameQueue, MAX_QUEUED
 from illuminator_ros.mavlink.transport.tcp import EXPIRY, MAX_CLIENTS
 import pytest

@@ -11,8 +11,9 @@ import errno
 import socket
 from typing import Any
 
+from illuminator_ros.mavlink.errors import ChannelLost
 from illuminator_ros.mavlink.frame import Decoder
-from illuminator_ros.mavlink.transport import ChannelLost, udp
+from illuminator_ros.mavlink.transport import udp
 from illuminator_ros.mavlink.transport.udp import MAX_DATAGRAM, MAX_PEERS, PEER_EXPIRY
 from illuminator_ros.mavlink.url import Broadcast, HostPort, UdpUrl
 import pytest

@@ -31,7 +31,8 @@ from ...checks.report import as_json, as_junit, catalogue, lines, remedies, RunR
 from ...checks.requirement import AnyChecks, CheckResult, CheckVerdict
 from ...checks.runner import absence, CheckRunner
 from ...checks.session import Conditions, Session
-from ...mavlink.link import Link, LinkThreadError
+from ...mavlink.errors import LinkThreadError
+from ...mavlink.link import Link
 from ...mavlink.link_state import LinkEvent, LinkSnapshot
 from ...mavlink.messages import Address
 from ...mavlink.signing import Signing

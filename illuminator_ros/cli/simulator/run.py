@@ -26,7 +26,8 @@ from .options import parser, payload_types
 from .view import LiveView, PlainView
 from ..options import mavlink_version, signing
 from ..termination import Termination
-from ...mavlink.link import Link, LinkThreadError
+from ...mavlink.errors import LinkThreadError
+from ...mavlink.link import Link
 from ...mavlink.url import parse_url, Url
 from ...payload.payload_type import PayloadType
 from ...simulation.simulated import SimulatedComponents, SimulatedDevice, Snapshot

@@ -20,7 +20,8 @@ from .parameters import BeamGeometry, device_parameters
 from ..client import IlluminatorClient
 from ..events import LightEvent
 from ..light import Light
-from ..model import checked, InvalidValue, SafetyLimits
+from ..model import checked, SafetyLimits
+from ...mavlink.errors import InvalidValue
 from ...mavlink.messages import Address
 from ...payload.requests import Result
 from ...payload.rotation import Quaternion

@@ -8,14 +8,15 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from typing import Any
 
-from .base import Channel, ChannelLost, Peer
+from .base import Channel, Peer
 from .memory import open_memory
 from .serial import open_pty, open_serial
 from .tcp import open_tcp
 from .udp import UdpChannel
-from ..url import MemoryUrl, PtyUrl, SerialUrl, TcpUrl, UdpUrl, Url
+from ..errors import ChannelError, InvalidValue
+from ..url import AutoUrl, MemoryUrl, PtyUrl, SerialUrl, TcpUrl, UdpUrl, Url
 
-__all__ = ['Channel', 'ChannelLost', 'open_channel', 'Peer']
+__all__ = ['Channel', 'open_channel', 'Peer']
 
 _OPEN: Mapping[type, Callable[[Any], Channel]] = {
     UdpUrl: UdpChannel, TcpUrl: open_tcp, SerialUrl: open_serial, PtyUrl: open_pty,
@@ -26,6 +27,12 @@ def open_channel(url: Url) -> Channel:
     """
     Open a connection URL. May block for about a second, for name lookup and connecting.
 
-    :raises OSError: if it cannot be opened; the text says why.
+    :raises ChannelError: if it cannot be opened, such as a port in use; the text says why.
+    :raises InvalidValue: for ``serial://auto``, since only a :class:`~..link.Link` searches.
     """
-    return _OPEN[type(url)](url)
+    if isinstance(url, AutoUrl):
+        raise InvalidValue('serial://auto is not one channel: only a link searches for a device')
+    try:
+        return _OPEN[type(url)](url)
+    except OSError as error:
+        raise ChannelError(*error.args) from error

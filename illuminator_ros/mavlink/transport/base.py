@@ -16,6 +16,7 @@ import selectors
 import socket
 from typing import cast
 
+from ..errors import ChannelLost
 from ..forward_queue import ForwardQueue
 from ..frame import Frame
 from ..url import HostPort, SerialUrl
@@ -55,10 +56,6 @@ def cannot_listen(
         by = users()
         remedy = f'{by and " by "}{by} (doc/routers.md: several programs on one link)'
     return OSError(error.errno, f'cannot listen on {address}: {error.strerror}{remedy}')
-
-
-class ChannelLost(OSError):
-    """The other side or the device has gone; the channel must be closed."""
 
 
 class Channel(ABC):

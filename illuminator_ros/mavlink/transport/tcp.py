@@ -14,7 +14,6 @@ import socket
 from .base import (
     cannot_listen,
     Channel,
-    ChannelLost,
     FORWARD_SIZE,
     MAX_QUEUED,
     Peer,
@@ -22,6 +21,7 @@ from .base import (
     Serve,
     StreamChannel,
 )
+from ..errors import ChannelLost
 from ..frame import Frame
 from ..url import HostPort, TcpUrl
 

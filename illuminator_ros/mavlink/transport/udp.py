@@ -13,8 +13,9 @@ import itertools
 import selectors
 import socket
 
-from .base import cannot_listen, Channel, ChannelLost, Peer, resolve, Serve, SocketName
+from .base import cannot_listen, Channel, Peer, resolve, Serve, SocketName
 from .ports import users_of
+from ..errors import ChannelLost
 from ..url import HostPort, UdpUrl
 
 # Peers that a listening socket sends to. A new peer never replaces a live one.
