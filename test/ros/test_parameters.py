@@ -114,6 +114,8 @@ BEFORE: dict[str, Any] = {
     'mode': 'internal_control', 'brightness': 80.0, 'strobe_period': 0.0, 'strobe_duty_cycle': 0.0}
 FOUR = {'mode': 'external_sync', 'brightness': 40.0, 'strobe_period': 0.5,
         'strobe_duty_cycle': 25.0}
+
+
 @pytest.fixture
 def start(ros: Ros, light: ServedLight, parameters: Parameters) -> None:
     """Have a test begin with the same configuration."""

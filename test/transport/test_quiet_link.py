@@ -25,6 +25,8 @@ PEER = ('127.0.0.1', 14550)
 AUTOPILOT = Address(7, 1)
 ATTITUDE = 30
 BEAT, NOISE = heartbeat_frame(), b'noise' + heartbeat_frame()[:-1] + b'x'
+
+
 def foreign_frame(sequence: int, source: Address = AUTOPILOT) -> bytes:
     """Return a frame with a message that the endpoint does not handle."""
     return raw_v2(ATTITUDE, bytes(range(1, 29)), sequence=sequence & 0xFF, source=source)
