@@ -23,7 +23,7 @@ MODULES = {
     '.'.join(path.relative_to(ROOT).with_suffix('').parts).removesuffix('.__init__'): path
     for path in sorted((ROOT / PACKAGE).rglob('*.py'))}
 # Every other folder holds one payload.
-SHARED = {'mavlink', 'payload', 'simulation', 'checks', 'ros', 'cli'}
+SHARED = {'mavlink', 'payload', 'geometry', 'simulation', 'checks', 'ros', 'cli'}
 PAYLOADS = {module.split('.')[1] for module, path in MODULES.items()
             if path.name == '__init__.py' and module.count('.') == 1} - SHARED
 
@@ -55,13 +55,17 @@ def folder(module: str) -> tuple[str, ...]:
 def allowed(importer: tuple[str, ...]) -> set[tuple[str, ...]]:
     """Return the folders from which a module of this folder may import."""
     if importer in ((), ('cli',)):
-        return {(), ('cli',), ('ros',), ('simulation',), ('checks',), ('payload',), ('mavlink',),
+        return {(), ('cli',), ('ros',), ('simulation',), ('checks',), ('geometry',), ('payload',),
+                ('mavlink',),
                 *((name,) for name in PAYLOADS), *((name, 'ros') for name in PAYLOADS)}
     if importer == ('mavlink',):
         return {importer}
-    if importer in (('ros',), ('simulation',), ('checks',), ('payload',)):
-        return {importer, ('payload',), ('mavlink',), ()}
-    own = {(importer[0],), ('simulation',), ('checks',), ('payload',), ('mavlink',), ()}
+    if importer == ('payload',):
+        return {importer, ('mavlink',), ()}
+    if importer in (('ros',), ('simulation',), ('checks',), ('geometry',)):
+        return {importer, ('geometry',), ('payload',), ('mavlink',), ()}
+    own = {(importer[0],), ('simulation',), ('checks',), ('geometry',), ('payload',), ('mavlink',),
+           ()}
     return own | {importer, ('ros',)} if importer[1:] else own
 
 

@@ -9,8 +9,8 @@ import math
 from typing import NamedTuple, TypeAlias
 
 from .messages import GimbalDeviceInformation, GimbalManagerInformation
+from ..geometry.mount_attitude import AXES
 from ..mavlink.dialect import mavlink
-from ..payload.mount_attitude import AXES
 
 
 def _flags(name: str) -> tuple[int, int, int]:

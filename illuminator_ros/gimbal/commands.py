@@ -11,13 +11,13 @@ from typing import NamedTuple, TypeAlias
 
 from .axes import LEVEL
 from .messages import GimbalManagerStatus, NO_COMPONENT, REMOVE_SENDER, UNCHANGED
+from ..geometry.mount_attitude import STILL, YawFrame
+from ..geometry.rotation import Quaternion, Vector
 from ..mavlink.command_sender import CommandPosition
 from ..mavlink.dialect import flag_names, mavlink
 from ..mavlink.messages import Address
 from ..payload.attempt import Change
 from ..payload.messages import GeoPoint, GimbalDeviceAttitudeStatus
-from ..payload.mount_attitude import STILL, YawFrame
-from ..payload.rotation import Quaternion, Vector
 
 
 @dataclass(frozen=True)
@@ -141,7 +141,7 @@ class Attitude:
     An attitude that a message sets.
 
     :param rotation: with norm 1, from the FLU axes of the gimbal as in
-        :class:`~..payload.mount_attitude.MountAttitude`.
+        :class:`~..geometry.mount_attitude.MountAttitude`.
     """
 
     rotation: Quaternion

@@ -11,11 +11,11 @@ from typing import NamedTuple, TypeAlias
 from .axes import Ranges
 from .commands import Control
 from .messages import GimbalDeviceInformation
+from ..geometry.mount_attitude import MountAttitude
 from ..mavlink.dialect import raw
 from ..mavlink.messages import Address
 from ..payload.device_events import DeviceEvent
 from ..payload.identity import text
-from ..payload.mount_attitude import MountAttitude
 
 
 class GimbalKey(NamedTuple):

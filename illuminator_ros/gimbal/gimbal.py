@@ -46,6 +46,8 @@ from .commands import Attitude, describe_flags, Flag, Move, point, Rates, SETPOI
 from .gimbal_commands import CONTROL, GimbalCommands, POSE
 from .gimbal_reports import GimbalReports
 from .setpoint_stream import MOVE, SetpointStream, YAW_LOCK
+from ..geometry.mount_attitude import YawFrame
+from ..geometry.rotation import Quaternion, Vector
 from ..mavlink.command_sender import CommandSender, format_seconds
 from ..mavlink.dialect import mavlink
 from ..mavlink.messages import Address
@@ -53,9 +55,7 @@ from ..payload.attempt import Served
 from ..payload.command_sources import DEFAULT, SourceSettings
 from ..payload.device_events import DeviceHeld
 from ..payload.messages import GeoPoint, GimbalDeviceAttitudeStatus
-from ..payload.mount_attitude import YawFrame
 from ..payload.requests import Done, Goal, REPEAT_TIME, Request, Requests, Result, Values, Why
-from ..payload.rotation import Quaternion, Vector
 
 # s; the limits of requests for a pose, a place or control, and for the yaw lock. A release of
 # control waits as long until an attitude shows that the gimbal stands, and at the end of the

@@ -12,6 +12,8 @@ from . import events
 from . import messages as gimbal
 from .axes import known_ranges, Ranges
 from .commands import Control
+from ..geometry.mount_attitude import MountAttitude, YawFrame
+from ..geometry.rotation import Quaternion
 from ..mavlink.command_sender import (
     Command,
     CommandResult,
@@ -25,9 +27,7 @@ from ..mavlink.retries import Retries, RetryPolicy
 from ..payload.device_events import DeviceConnected, DeviceDisconnected
 from ..payload.liveness import Liveness
 from ..payload.messages import GimbalDeviceAttitudeStatus
-from ..payload.mount_attitude import MountAttitude, YawFrame
 from ..payload.requests import Result
-from ..payload.rotation import Quaternion
 
 GIMBAL_MESSAGE = RetryPolicy('a message of a gimbal or its manager', 1.0, 60.0)
 # s of silence after which a manager or a device is lost.

@@ -12,11 +12,7 @@ from .manager_setpoint import POSES, Setpoint
 from .manager_state import ManagerState, StateTracker
 from .messages import GimbalDeviceInformation, rates_of
 from .vehicle_state import VehicleState
-from ..mavlink.command_sender import CommandResult, CommandSender, request_message
-from ..mavlink.dialect import mavlink
-from ..mavlink.retries import Retries, RetryPolicy
-from ..payload.messages import GimbalDeviceAttitudeStatus
-from ..payload.mount_attitude import (
+from ..geometry.mount_attitude import (
     heading_of,
     names_frame,
     rotation_of,
@@ -24,7 +20,11 @@ from ..payload.mount_attitude import (
     yaw_frame,
     YawFrame,
 )
-from ..payload.rotation import Vector
+from ..geometry.rotation import Vector
+from ..mavlink.command_sender import CommandResult, CommandSender, request_message
+from ..mavlink.dialect import mavlink
+from ..mavlink.retries import Retries, RetryPolicy
+from ..payload.messages import GimbalDeviceAttitudeStatus
 
 DEVICE_INFORMATION = RetryPolicy('GIMBAL_DEVICE_INFORMATION, by `gimbal_manager`', 0.5, 5.0)
 # Requests for GIMBAL_DEVICE_INFORMATION without the message after which the manager announces the

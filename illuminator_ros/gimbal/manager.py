@@ -25,6 +25,8 @@ from .manager_setpoint import AnySetpoint, read_roi, read_setpoint, Refused, Set
 from .manager_state import ManagerState, StateChanged, StateTracker
 from .setpoint_mixer import SetpointEvent, SetpointMixer
 from .vehicle_state import VehicleState
+from ..geometry.mount_attitude import AXES, to_mavlink, YawFrame
+from ..geometry.rotation import Quaternion
 from ..mavlink import messages as mav
 from ..mavlink.command_sender import Command, CommandSender
 from ..mavlink.component import Payload
@@ -32,8 +34,6 @@ from ..mavlink.dialect import mavlink, replaced
 from ..mavlink.messages import Address, AnyCommand, params_of
 from ..payload.listeners import Listeners
 from ..payload.messages import Attitude, GimbalDeviceAttitudeStatus, GlobalPositionInt
-from ..payload.mount_attitude import AXES, to_mavlink, YawFrame
-from ..payload.rotation import Quaternion
 
 # s between GIMBAL_MANAGER_STATUS, and between those that are sent because control has changed.
 STATUS_INTERVAL = 0.2

@@ -6,7 +6,7 @@ Setpoints of a gimbal: reading, mixing and limiting them. Pure functions; MAVLin
 
 A setpoint has angles, which the ranges of the axes limit. They are read from a quaternion once,
 and become one once, in the message to the device. Roll and pitch are relative to the horizon. Yaw
-is relative to north or to the vehicle's heading: see :class:`~..payload.mount_attitude.YawFrame`.
+is relative to north or to the vehicle's heading: see :class:`~..geometry.mount_attitude.YawFrame`.
 """
 
 from __future__ import annotations
@@ -18,12 +18,12 @@ from typing import NamedTuple
 from . import messages as gimbal
 from .axes import LEVEL, Range, Ranges, RATE_LIMIT, UNLIMITED
 from .messages import rates_of
+from ..geometry.mount_attitude import AXES, STILL, UNSET_VECTOR, yaw_frame, YawFrame
+from ..geometry.rotation import Quaternion, Vector
 from ..mavlink.command_sender import DEGREE_SCALE
 from ..mavlink.dialect import MAV_RESULT_COMMAND_UNSUPPORTED_MAV_FRAME, mavlink
 from ..mavlink.messages import AnyCommand, CommandInt, params_of
 from ..payload.messages import GeoPoint
-from ..payload.mount_attitude import AXES, STILL, UNSET_VECTOR, yaw_frame, YawFrame
-from ..payload.rotation import Quaternion, Vector
 
 # Flags that alone set the attitude.
 POSES = mavlink.GIMBAL_DEVICE_FLAGS_RETRACT | mavlink.GIMBAL_DEVICE_FLAGS_NEUTRAL

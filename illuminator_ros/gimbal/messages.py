@@ -13,10 +13,10 @@ the values of those of devices, which are used for both.
 
 from __future__ import annotations
 
+from ..geometry.rotation import Vector
 from ..mavlink.dialect import mavlink
 from ..mavlink.messages import Address
 from ..payload.messages import GimbalDeviceAttitudeStatus
-from ..payload.rotation import Vector
 
 GimbalManagerInformation = mavlink.MAVLink_gimbal_manager_information_message
 GimbalManagerStatus = mavlink.MAVLink_gimbal_manager_status_message

@@ -10,9 +10,9 @@ import math
 
 from .commands import Attitude, describe_flags, Flag, Move
 from .manager_setpoint import direction
+from ..geometry.mount_attitude import MountAttitude, YawFrame
+from ..geometry.rotation import Quaternion
 from ..payload.messages import GeoPoint
-from ..payload.mount_attitude import MountAttitude, YawFrame
-from ..payload.rotation import Quaternion
 
 # s from a request for a pose until a gimbal that stands has reached it: it has begun to turn.
 POSE_DELAY = 1.0

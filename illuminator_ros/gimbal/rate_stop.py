@@ -10,9 +10,9 @@ import math
 
 from .axes import TURNING
 from .messages import rates_of
+from ..geometry.mount_attitude import MountAttitude
 from ..mavlink.retries import Retries, RetryPolicy
 from ..payload.messages import GimbalDeviceAttitudeStatus
-from ..payload.mount_attitude import MountAttitude
 
 ZERO_RATE = RetryPolicy('a rate of zero, until the gimbal stands', 0.1, 0.1, 10)
 STILL_TURNING = RetryPolicy('a rate of zero after these', 1.0, 1.0)

@@ -17,11 +17,11 @@ from .manager_state import ManagerState, StateTracker
 from .messages import GimbalDeviceSetAttitude
 from .rate_stop import RateStop
 from .vehicle_state import VehicleState
+from ..geometry.mount_attitude import AXES, STILL, UNSET_QUATERNION, YawFrame
+from ..geometry.rotation import Vector
 from ..mavlink.command_sender import CommandSender
 from ..mavlink.dialect import mavlink, short_names
 from ..payload.messages import GeoPoint
-from ..payload.mount_attitude import AXES, STILL, UNSET_QUATERNION, YawFrame
-from ..payload.rotation import Vector
 
 # s between repetitions of a constant setpoint, at most 1 s by the specification; and between
 # setpoints that follow a place, the vehicle or a rate.

@@ -13,9 +13,7 @@ from .events import GimbalKey
 from .gimbal_reports import GimbalReports
 from .messages import GimbalManagerSetAttitude
 from .rate_stop import RateStop
-from ..mavlink.dialect import mavlink
-from ..payload.messages import GeoPoint, GimbalDeviceAttitudeStatus
-from ..payload.mount_attitude import (
+from ..geometry.mount_attitude import (
     STILL,
     to_mavlink,
     UNSET_QUATERNION,
@@ -23,8 +21,10 @@ from ..payload.mount_attitude import (
     Wxyz,
     YawFrame,
 )
+from ..geometry.rotation import flu_frd, Vector
+from ..mavlink.dialect import mavlink
+from ..payload.messages import GeoPoint, GimbalDeviceAttitudeStatus
 from ..payload.requests import Request, Result
-from ..payload.rotation import flu_frd, Vector
 
 # s after which an attitude or the yaw lock is sent again, since no message is acknowledged.
 REPEATS = (0.2, 0.4, 0.8)

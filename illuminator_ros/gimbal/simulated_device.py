@@ -23,11 +23,11 @@ from .axes import range_fields
 from .manager_setpoint import Setpoint
 from .simulated_motion import GimbalMechanics, GimbalMotion
 from .. import __version__
+from ..geometry.mount_attitude import AXES, yaw_frame, YawFrame
+from ..geometry.rotation import Quaternion
 from ..mavlink.dialect import flag_names, mavlink
 from ..mavlink.messages import Address, Message, time_boot_ms
 from ..payload.messages import GimbalDeviceAttitudeStatus
-from ..payload.mount_attitude import AXES, yaw_frame, YawFrame
-from ..payload.rotation import Quaternion
 from ..simulation import simulated
 from ..simulation.faults import Behaviour, fault, FaultTable, FaultValue, FLAGS
 from ..simulation.settings import integer, number, one_of, setting, text

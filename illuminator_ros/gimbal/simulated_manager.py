@@ -23,6 +23,7 @@ from .axes import LEVEL, Range
 from .manager_setpoint import AnySetpoint, direction, read_roi, read_setpoint, Refused, Setpoint
 from .messages import DEVICE_ID_PARAM, NO_COMPONENT
 from .simulated_device import GimbalBehaviour, MountProperties, SimulatedMount
+from ..geometry.mount_attitude import UNSET_VECTOR, YawFrame
 from ..mavlink.dialect import mavlink, replaced
 from ..mavlink.messages import Address, AnyCommand, Message, params_of
 from ..payload.messages import (
@@ -32,7 +33,6 @@ from ..payload.messages import (
     is_plausible,
     place_of,
 )
-from ..payload.mount_attitude import UNSET_VECTOR, YawFrame
 from ..simulation import simulated
 from ..simulation.faults import fault, FaultTable
 from ..simulation.settings import geo_point, integer, number, setting

@@ -11,9 +11,9 @@ from typing import NamedTuple
 
 from .axes import AT_LIMIT, HAS_AXIS, HAS_FOLLOW, HAS_LOCK, LEVEL, LOCKS, Range, Ranges, RESOLUTION
 from .manager_setpoint import Setpoint
+from ..geometry.mount_attitude import AXES, UNSET_VECTOR, YawFrame
+from ..geometry.rotation import Quaternion, Vector
 from ..mavlink.dialect import mavlink, short_names
-from ..payload.mount_attitude import AXES, UNSET_VECTOR, YawFrame
-from ..payload.rotation import Quaternion, Vector
 from ..simulation.settings import number, one_of, setting
 
 # s without a heading from the vehicle after which its heading is unknown.

@@ -9,6 +9,7 @@ import math
 from typing import Generic, TypeVar
 
 from .messages import AutopilotStateForGimbalDevice
+from ..geometry.rotation import Quaternion, Vector
 from ..mavlink.messages import Address
 from ..payload.messages import (
     Attitude,
@@ -19,7 +20,6 @@ from ..payload.messages import (
     is_rate,
     place_of,
 )
-from ..payload.rotation import Quaternion, Vector
 
 T = TypeVar('T')
 

@@ -5,11 +5,11 @@
 
 from __future__ import annotations
 
+from ..geometry.mount_attitude import MountAttitude, YawFrame
+from ..geometry.rotation import flip, Quaternion
 from ..mavlink.dialect import mavlink
 from ..mavlink.messages import Address, Message
 from ..payload.messages import Attitude, GimbalDeviceAttitudeStatus, is_plausible
-from ..payload.mount_attitude import MountAttitude, YawFrame
-from ..payload.rotation import flip, Quaternion
 
 # s for which an attitude is valid.
 ATTITUDE_LIFETIME = 2.0

@@ -18,9 +18,9 @@ import math
 from typing import cast, TypeVar
 
 from .messages import CameraFeedback, GpsRawInt, GpsStatus, MountStatus
+from ..geometry.rotation import enu_flu, enu_ned, flip, flu_frd, ned_frd, Quaternion, Vector
 from ..mavlink.messages import Message
 from ..payload.messages import Attitude, GlobalPositionInt, SystemTime
-from ..payload.rotation import enu_flu, enu_ned, flip, flu_frd, ned_frd, Quaternion, Vector
 
 M = TypeVar('M', bound=Message)
 

@@ -14,8 +14,8 @@ import math
 from typing import NamedTuple
 
 from .conversions import MountFrame
+from ..geometry.rotation import Vector
 from ..mavlink.command_sender import format_seconds
-from ..payload.rotation import Vector
 
 # s for which the offset of UTC from ROS time holds.
 TIME_REFERENCE_LIFETIME = 60.0

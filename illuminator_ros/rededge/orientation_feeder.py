@@ -13,9 +13,9 @@ from typing import NamedTuple
 from . import conversions
 from .conversions import MountParent
 from .input_states import CameraSettings, Input, InputStates, PAIR, Stamp, UNKNOWN
+from ..geometry.rotation import Quaternion, Vector
 from ..mavlink.messages import Address, Message, time_boot_ms
 from ..mavlink.schedule import Schedule
-from ..payload.rotation import Quaternion, Vector
 
 # s between messages about a fixed mount while there is no attitude; the camera uses it for 5 s.
 MOUNT_INTERVAL = 1.0

@@ -18,10 +18,10 @@ import math
 from typing import Any, NamedTuple
 
 from . import messages as rededge
+from ..geometry.rotation import Quaternion
 from ..mavlink.dialect import mavlink, raw, replaced
 from ..mavlink.messages import Address, Heartbeat, Message, target_of
 from ..payload.messages import Attitude, GeoPoint, GlobalPositionInt, is_plausible, SystemTime
-from ..payload.rotation import Quaternion
 from ..simulation import simulated
 from ..simulation.faults import Behaviour, COUNT, fault, FaultTable, SECONDS
 from ..simulation.settings import geo_point, number, setting, SettingValues

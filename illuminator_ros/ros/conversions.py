@@ -11,7 +11,7 @@ from sensor_msgs.msg import Imu
 from std_msgs.msg import Header
 
 from .parameters import ParameterSpec
-from ..payload.rotation import Quaternion, Vector
+from ..geometry.rotation import Quaternion, Vector
 
 GEOID_SEPARATION = ParameterSpec(
     'geoid_separation', 0.0, 'height of mean sea level above the WGS84 ellipsoid, where the '

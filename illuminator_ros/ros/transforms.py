@@ -16,7 +16,7 @@ from std_msgs.msg import Header
 from .parameters import ParameterSpec, Values
 from .qos import STATE_QOS
 from .throttled_log import NodeLog
-from ..payload.rotation import Quaternion
+from ..geometry.rotation import Quaternion
 
 PUBLISH_TF = ParameterSpec('publish_tf', False, 'publish frames on /tf and /tf_static')
 # As tf2_ros has it.

@@ -6,8 +6,8 @@
 import math
 import re
 
-from illuminator_ros.payload.mount_attitude import to_mavlink, YawFrame
-from illuminator_ros.payload.rotation import Quaternion
+from illuminator_ros.geometry.mount_attitude import to_mavlink, YawFrame
+from illuminator_ros.geometry.rotation import Quaternion
 import pytest
 from support.processes import ROOT
 from support.tables import table

@@ -10,6 +10,8 @@ import contextlib
 import math
 import re
 
+from illuminator_ros.geometry.mount_attitude import STILL, YawFrame
+from illuminator_ros.geometry.rotation import Quaternion
 from illuminator_ros.gimbal.commands import Attitude, Control, Rates
 from illuminator_ros.gimbal.events import (
     AutomaticTakeFailed,
@@ -27,9 +29,7 @@ from illuminator_ros.mavlink import messages as mav
 from illuminator_ros.mavlink.dialect import mavlink, short_names
 from illuminator_ros.payload.device_events import DeviceDisconnected
 from illuminator_ros.payload.messages import GeoPoint
-from illuminator_ros.payload.mount_attitude import STILL, YawFrame
 from illuminator_ros.payload.requests import Done, Result
-from illuminator_ros.payload.rotation import Quaternion
 import pytest
 from support.gimbals import (
     ALL,

@@ -7,12 +7,12 @@ from __future__ import annotations
 
 import math
 
-from illuminator_ros.payload.mount_attitude import YawFrame
 import pytest
 
 pytest.importorskip('rclpy')
 
 from geometry_msgs.msg import Vector3, Vector3Stamped  # noqa: E402, I100
+from illuminator_ros.geometry.mount_attitude import YawFrame  # noqa: E402
 from illuminator_ros.gimbal.ros.conversions import Frames, read_rates  # noqa: E402
 from std_msgs.msg import Header  # noqa: E402
 

@@ -12,6 +12,8 @@ import math
 import random
 from typing import Any
 
+from illuminator_ros.geometry.mount_attitude import STILL, YawFrame
+from illuminator_ros.geometry.rotation import Quaternion
 from illuminator_ros.gimbal.commands import Attitude, Rates
 from illuminator_ros.gimbal.gimbal import Gimbal, GimbalSettings
 from illuminator_ros.gimbal.manager import GimbalManager, ManagerSettings, RequestRefused
@@ -27,9 +29,7 @@ from illuminator_ros.mavlink.command_sender import CommandSender
 from illuminator_ros.mavlink.component import Component
 from illuminator_ros.mavlink.dialect import mavlink
 from illuminator_ros.payload.command_sources import SourceSettings
-from illuminator_ros.payload.mount_attitude import STILL, YawFrame
 from illuminator_ros.payload.requests import Done, Result
-from illuminator_ros.payload.rotation import Quaternion
 import pytest
 from support.gimbal_manager import (
     AUTOPILOT,

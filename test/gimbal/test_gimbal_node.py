@@ -12,12 +12,12 @@ from pathlib import Path
 import signal
 from typing import Any
 
+from illuminator_ros.geometry.mount_attitude import from_mavlink, to_mavlink, YawFrame
+from illuminator_ros.geometry.rotation import Quaternion
 from illuminator_ros.gimbal.messages import NO_COMPONENT, rates_of
 from illuminator_ros.mavlink.dialect import mavlink
 from illuminator_ros.mavlink.link import Link
 from illuminator_ros.mavlink.messages import CommandInt
-from illuminator_ros.payload.mount_attitude import from_mavlink, to_mavlink, YawFrame
-from illuminator_ros.payload.rotation import Quaternion
 import pytest
 
 pytest.importorskip('rclpy')

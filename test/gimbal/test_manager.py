@@ -12,6 +12,8 @@ from typing import Any
 
 from hypothesis import assume, example, given
 from hypothesis import strategies as st
+from illuminator_ros.geometry.mount_attitude import UNSET_QUATERNION, UNSET_VECTOR, YawFrame
+from illuminator_ros.geometry.rotation import flip, Quaternion
 from illuminator_ros.gimbal import managed_device, setpoint_mixer
 from illuminator_ros.gimbal.axes import Range
 from illuminator_ros.gimbal.manager import AddressShared, RequestRefused
@@ -43,8 +45,6 @@ from illuminator_ros.mavlink.dialect import (
 )
 from illuminator_ros.payload.arbitration import Cause, Policy
 from illuminator_ros.payload.messages import GimbalDeviceAttitudeStatus
-from illuminator_ros.payload.mount_attitude import UNSET_QUATERNION, UNSET_VECTOR, YawFrame
-from illuminator_ros.payload.rotation import flip, Quaternion
 import pytest
 from support.gimbal_manager import (
     attitude_status,

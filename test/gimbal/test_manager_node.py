@@ -11,6 +11,7 @@ import math
 import socket
 from typing import Any
 
+from illuminator_ros.geometry.rotation import Quaternion  # noqa: E402
 from illuminator_ros.gimbal.simulated_device import GimbalProperties, SimulatedGimbal
 from illuminator_ros.mavlink.messages import Address, Message
 from illuminator_ros.simulation.simulated import SimulatedComponents
@@ -27,7 +28,6 @@ from illuminator_ros.gimbal.ros.manager_node import (  # noqa: E402
     MANAGER_PARAMETERS,
     manager_settings,
 )
-from illuminator_ros.payload.rotation import Quaternion  # noqa: E402
 from illuminator_ros.ros.parameters import ParameterError  # noqa: E402
 from illuminator_ros.ros.throttled_log import BURST, MAX_KINDS  # noqa: E402
 from nav_msgs.msg import Odometry  # noqa: E402

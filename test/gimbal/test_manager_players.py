@@ -18,12 +18,12 @@ from typing import Any
 
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from illuminator_ros.geometry.rotation import Quaternion
 from illuminator_ros.gimbal import messages as gimbal
 from illuminator_ros.gimbal.manager_control import ControlSettings, Role, RoleHolderChanged
 from illuminator_ros.mavlink import messages as mav
 from illuminator_ros.mavlink.dialect import mavlink
 from illuminator_ros.payload.arbitration import Cause, Policy
-from illuminator_ros.payload.rotation import Quaternion
 from support.gimbal_manager import (
     configure,
     EVERYWHERE,

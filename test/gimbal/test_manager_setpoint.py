@@ -10,6 +10,8 @@ from typing import Any
 
 from hypothesis import assume, example, given
 from hypothesis import strategies as st
+from illuminator_ros.geometry.mount_attitude import AXES, STILL, YawFrame
+from illuminator_ros.geometry.rotation import Quaternion, Vector
 from illuminator_ros.gimbal.axes import known_ranges, Range, UNLIMITED
 from illuminator_ros.gimbal.manager_setpoint import (
     clip,
@@ -20,8 +22,6 @@ from illuminator_ros.gimbal.manager_setpoint import (
     turned_by,
 )
 from illuminator_ros.payload.messages import GeoPoint
-from illuminator_ros.payload.mount_attitude import AXES, STILL, YawFrame
-from illuminator_ros.payload.rotation import Quaternion, Vector
 import pytest
 from support.gimbal_manager import information
 

@@ -9,6 +9,8 @@ from collections.abc import Callable
 import math
 from typing import Any
 
+from illuminator_ros.geometry.mount_attitude import YawFrame
+from illuminator_ros.geometry.rotation import Quaternion
 from illuminator_ros.gimbal.axes import Range
 from illuminator_ros.gimbal.commands import Attitude, Rates
 from illuminator_ros.gimbal.events import AttitudeReceived
@@ -24,9 +26,7 @@ from illuminator_ros.mavlink.dialect import mavlink
 from illuminator_ros.mavlink.messages import CommandLong
 from illuminator_ros.payload.device_events import DeviceConnected, DeviceDisconnected
 from illuminator_ros.payload.messages import GeoPoint, GimbalDeviceAttitudeStatus
-from illuminator_ros.payload.mount_attitude import YawFrame
 from illuminator_ros.payload.requests import Result
-from illuminator_ros.payload.rotation import Quaternion
 import pytest
 from support.gimbal_manager import (
     AUTOPILOT,

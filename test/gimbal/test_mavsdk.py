@@ -10,6 +10,8 @@ import contextlib
 import math
 from typing import Any, TypeVar
 
+from illuminator_ros.geometry.mount_attitude import to_mavlink, YawFrame
+from illuminator_ros.geometry.rotation import Quaternion, Vector
 from illuminator_ros.gimbal.client import GimbalClient
 from illuminator_ros.gimbal.commands import Attitude, Rates
 from illuminator_ros.gimbal.events import ControlChanged
@@ -22,9 +24,7 @@ from illuminator_ros.mavlink.command_sender import CommandSender
 from illuminator_ros.mavlink.component import Component, Endpoint
 from illuminator_ros.mavlink.dialect import mavlink
 from illuminator_ros.mavlink.messages import Address
-from illuminator_ros.payload.mount_attitude import to_mavlink, YawFrame
 from illuminator_ros.payload.requests import Result
-from illuminator_ros.payload.rotation import Quaternion, Vector
 from illuminator_ros.simulation.simulated import SimulatedComponents
 import pytest
 from support.gimbal_vehicle import Autopilot, HERE, managed_vehicle, Vehicle

@@ -8,11 +8,11 @@ from __future__ import annotations
 from dataclasses import replace
 import math
 
+from illuminator_ros.geometry.mount_attitude import MountAttitude, YawFrame
+from illuminator_ros.geometry.rotation import Quaternion
 from illuminator_ros.gimbal.commands import Attitude, Move, NEUTRAL, Rates, RETRACT
 from illuminator_ros.gimbal.pointing import line_of_sight, off_target, Seen
 from illuminator_ros.payload.messages import GeoPoint
-from illuminator_ros.payload.mount_attitude import MountAttitude, YawFrame
-from illuminator_ros.payload.rotation import Quaternion
 import pytest
 
 TOLERANCE = math.radians(2.0)

@@ -8,13 +8,13 @@ from __future__ import annotations
 from collections.abc import Callable
 import math
 
+from illuminator_ros.geometry.mount_attitude import STILL
+from illuminator_ros.geometry.rotation import Quaternion
 from illuminator_ros.gimbal.manager_state import ManagerState
 from illuminator_ros.gimbal.messages import GimbalDeviceSetAttitude, GimbalManagerStatus, rates_of
 from illuminator_ros.gimbal.rate_stop import ATTITUDE_SPACING, ZERO_RATE
 from illuminator_ros.gimbal.setpoint_mixer import RateStopped
 from illuminator_ros.mavlink.messages import Address
-from illuminator_ros.payload.mount_attitude import STILL
-from illuminator_ros.payload.rotation import Quaternion
 import pytest
 from support.gimbal_manager import DEVICE, ManagerRig, NAN, of, PILOT, pitch_yaw
 

@@ -8,6 +8,8 @@ from __future__ import annotations
 from collections.abc import Callable
 import math
 
+from illuminator_ros.geometry.mount_attitude import from_mavlink, STILL, to_mavlink, YawFrame
+from illuminator_ros.geometry.rotation import Quaternion, Vector
 from illuminator_ros.gimbal.commands import Attitude, Rates
 from illuminator_ros.gimbal.events import ControlChanged, GimbalKey, RateStopped
 from illuminator_ros.gimbal.gimbal import GimbalSettings
@@ -16,8 +18,6 @@ from illuminator_ros.gimbal.setpoint_stream import REPEATS
 from illuminator_ros.mavlink.dialect import mavlink, replaced
 from illuminator_ros.mavlink.messages import Address, CommandInt, CommandLong
 from illuminator_ros.payload.command_sources import SourceSettings
-from illuminator_ros.payload.mount_attitude import from_mavlink, STILL, to_mavlink, YawFrame
-from illuminator_ros.payload.rotation import Quaternion, Vector
 import pytest
 from pytest import approx
 from support.gimbals import (

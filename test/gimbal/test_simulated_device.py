@@ -8,14 +8,14 @@ from __future__ import annotations
 from collections.abc import Callable
 import math
 
+from illuminator_ros.geometry.mount_attitude import YawFrame
+from illuminator_ros.geometry.rotation import Quaternion
 from illuminator_ros.gimbal import messages as gimbal
 from illuminator_ros.gimbal.axes import Range
 from illuminator_ros.gimbal.simulated_device import MANAGER_TIMEOUT, SIMULATED
 from illuminator_ros.mavlink.dialect import mavlink
 from illuminator_ros.mavlink.messages import Address, CommandAck, CommandLong
 from illuminator_ros.payload.messages import GimbalDeviceAttitudeStatus
-from illuminator_ros.payload.mount_attitude import YawFrame
-from illuminator_ros.payload.rotation import Quaternion
 import pytest
 from support.bench import DeviceBench
 

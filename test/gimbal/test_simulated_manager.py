@@ -8,6 +8,8 @@ from __future__ import annotations
 import math
 from typing import Any
 
+from illuminator_ros.geometry.mount_attitude import YawFrame
+from illuminator_ros.geometry.rotation import Quaternion
 from illuminator_ros.gimbal import messages as gimbal
 from illuminator_ros.gimbal.simulated_manager import PROFILES, SIMULATED
 from illuminator_ros.mavlink import messages as mav
@@ -17,8 +19,6 @@ from illuminator_ros.payload.messages import (
     GimbalDeviceAttitudeStatus,
     GlobalPositionInt,
 )
-from illuminator_ros.payload.mount_attitude import YawFrame
-from illuminator_ros.payload.rotation import Quaternion
 import pytest
 from support.bench import DeviceBench
 

@@ -9,6 +9,7 @@ from collections.abc import Callable
 import random
 from typing import Any
 
+from illuminator_ros.geometry.mount_attitude import from_mavlink, STILL, YawFrame
 from illuminator_ros.gimbal.commands import NEUTRAL, Rates, YAW_LOCKS
 from illuminator_ros.gimbal.messages import DEVICE_ID_PARAM, GimbalManagerSetAttitude, rates_of
 from illuminator_ros.mavlink.dialect import mavlink
@@ -16,7 +17,6 @@ from illuminator_ros.mavlink.messages import CommandInt, CommandLong
 from illuminator_ros.payload.arbitration import Cause, HolderChanged
 from illuminator_ros.payload.command_sources import SourceSettings
 from illuminator_ros.payload.device_events import DeviceHeld
-from illuminator_ros.payload.mount_attitude import from_mavlink, STILL, YawFrame
 import pytest
 from support.gimbals import (
     FakeManager,

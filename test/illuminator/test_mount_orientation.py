@@ -9,6 +9,7 @@ import math
 
 from hypothesis import given
 from hypothesis import strategies as st
+from illuminator_ros.geometry.rotation import Quaternion, Vector
 from illuminator_ros.illuminator.mount_orientation import (
     ATTITUDE_LIFETIME,
     MountOrientations,
@@ -16,7 +17,6 @@ from illuminator_ros.illuminator.mount_orientation import (
 from illuminator_ros.mavlink.dialect import mavlink
 from illuminator_ros.mavlink.messages import Address
 from illuminator_ros.payload.messages import Attitude, GimbalDeviceAttitudeStatus
-from illuminator_ros.payload.rotation import Quaternion, Vector
 import pytest
 from pytest import approx
 

@@ -7,11 +7,11 @@ from __future__ import annotations
 
 from typing import Any
 
+from illuminator_ros.geometry.rotation import Quaternion
 from illuminator_ros.mavlink.command_sender import CommandSender
 from illuminator_ros.mavlink.component import Component
 from illuminator_ros.mavlink.messages import Address, Heartbeat, heartbeat, Message
 from illuminator_ros.payload.device_events import DeviceConnected, DeviceDisconnected
-from illuminator_ros.payload.rotation import Quaternion
 from illuminator_ros.rededge import messages as rededge
 from illuminator_ros.rededge.client import ImageTaken, RedEdgeClient
 from illuminator_ros.rededge.input_states import CameraSettings, Input, Stamp

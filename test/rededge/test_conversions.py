@@ -11,9 +11,9 @@ from typing import Any
 
 from hypothesis import given
 from hypothesis import strategies as st
+from illuminator_ros.geometry.rotation import flip, Quaternion, Vector
 from illuminator_ros.mavlink.dialect import decode, encode
 from illuminator_ros.payload.messages import Attitude, GlobalPositionInt
-from illuminator_ros.payload.rotation import flip, Quaternion, Vector
 from illuminator_ros.rededge import conversions
 from illuminator_ros.rededge.conversions import MountFrame, Position
 from illuminator_ros.rededge.messages import CameraFeedback, GpsRawInt, MountStatus

@@ -11,11 +11,11 @@ import functools
 import math
 from typing import Any
 
+from illuminator_ros.geometry.rotation import Quaternion, Vector
 from illuminator_ros.mavlink.command_sender import format_seconds
 from illuminator_ros.mavlink.messages import Address, Message
 from illuminator_ros.mavlink.schedule import Schedule
 from illuminator_ros.payload.messages import Attitude, GlobalPositionInt, SystemTime
-from illuminator_ros.payload.rotation import Quaternion, Vector
 from illuminator_ros.rededge.conversions import mount_angles, MountFrame, Position
 from illuminator_ros.rededge.feeder import ENU, Feeder
 from illuminator_ros.rededge.input_states import (

@@ -9,11 +9,11 @@ from collections.abc import Iterator
 from dataclasses import replace
 import heapq
 
+from illuminator_ros.geometry.rotation import enu_flu, flip, Quaternion
 from illuminator_ros.mavlink.command_sender import CommandSender
 from illuminator_ros.mavlink.component import Component
 from illuminator_ros.mavlink.messages import Address
 from illuminator_ros.payload.messages import GeoPoint
-from illuminator_ros.payload.rotation import enu_flu, flip, Quaternion
 from illuminator_ros.rededge.client import RedEdgeClient
 from illuminator_ros.rededge.conversions import Position
 from illuminator_ros.rededge.input_states import (

@@ -9,10 +9,10 @@ from collections.abc import Callable
 import math
 from typing import Any
 
+from illuminator_ros.geometry.rotation import Vector
 from illuminator_ros.mavlink.dialect import mavlink
 from illuminator_ros.mavlink.messages import Address, CommandLong, Heartbeat, heartbeat, Message
 from illuminator_ros.payload.messages import Attitude, GeoPoint, GlobalPositionInt, SystemTime
-from illuminator_ros.payload.rotation import Vector
 from illuminator_ros.rededge.messages import (
     CameraFeedback,
     CameraStatus,

@@ -8,8 +8,8 @@ import math
 from pathlib import Path
 
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
-from illuminator_ros.payload.mount_attitude import to_mavlink, YawFrame
-from illuminator_ros.payload.rotation import Quaternion
+from illuminator_ros.geometry.mount_attitude import to_mavlink, YawFrame
+from illuminator_ros.geometry.rotation import Quaternion
 import pytest
 from rclpy.qos import DurabilityPolicy, ReliabilityPolicy
 from support.gimbals import FakeManager, OTHER, served_gimbals

@@ -12,9 +12,9 @@ from typing import Any
 from xml.etree import ElementTree
 
 from geometry_msgs.msg import QuaternionStamped
+from illuminator_ros.geometry.mount_attitude import to_mavlink, YawFrame
+from illuminator_ros.geometry.rotation import Quaternion
 from illuminator_ros.mavlink.dialect import mavlink
-from illuminator_ros.payload.mount_attitude import to_mavlink, YawFrame
-from illuminator_ros.payload.rotation import Quaternion
 import pytest
 from rclpy.qos import DurabilityPolicy, ReliabilityPolicy
 from support.fake_camera import running_camera

@@ -30,11 +30,11 @@ import sys
 TEST = Path(__file__).resolve().parents[1]
 sys.path[:0] = [str(TEST.parent), str(TEST)]
 
+from illuminator_ros.geometry.rotation import Quaternion  # noqa: E402
 from illuminator_ros.gimbal.commands import Rates  # noqa: E402
 from illuminator_ros.gimbal.messages import GimbalManagerSetAttitude, rates_of  # noqa: E402
 from illuminator_ros.mavlink.messages import Address, Message  # noqa: E402
 from illuminator_ros.payload.command_sources import SourceSettings  # noqa: E402
-from illuminator_ros.payload.rotation import Quaternion  # noqa: E402
 from support.gimbals import FakeManager, NAN, OURS, Rig  # noqa: E402
 
 RATE = (0.0, 0.0, 0.3)

@@ -9,6 +9,8 @@ from collections.abc import Callable, Iterable, Sequence
 import itertools
 from typing import Any, TypeVar
 
+from illuminator_ros.geometry.mount_attitude import AXES
+from illuminator_ros.geometry.rotation import Quaternion
 from illuminator_ros.gimbal.manager import GimbalManager, ManagerEvent, ManagerSettings
 from illuminator_ros.gimbal.manager_control import ControlSettings
 from illuminator_ros.gimbal.manager_state import ManagerState
@@ -26,8 +28,6 @@ from illuminator_ros.payload.messages import (
     GimbalDeviceAttitudeStatus,
     GlobalPositionInt,
 )
-from illuminator_ros.payload.mount_attitude import AXES
-from illuminator_ros.payload.rotation import Quaternion
 from support.bench import Bench
 
 OURS, DEVICE, AUTOPILOT = mav.Address(1, 193), mav.Address(1, 154), mav.Address(1, 1)

@@ -11,6 +11,8 @@ import itertools
 import math
 from typing import Any, TypeVar
 
+from illuminator_ros.geometry.mount_attitude import YawFrame
+from illuminator_ros.geometry.rotation import Vector
 from illuminator_ros.gimbal import messages as gm
 from illuminator_ros.gimbal.client import GimbalClient
 from illuminator_ros.gimbal.commands import Move, NEUTRAL, RETRACT, YAW_LOCKS
@@ -23,9 +25,7 @@ from illuminator_ros.mavlink.dialect import entry_names, mavlink
 from illuminator_ros.mavlink.link import Link
 from illuminator_ros.payload.command_sources import DEFAULT
 from illuminator_ros.payload.messages import GeoPoint, GimbalDeviceAttitudeStatus
-from illuminator_ros.payload.mount_attitude import YawFrame
 from illuminator_ros.payload.requests import Done, Result
-from illuminator_ros.payload.rotation import Vector
 from support.bench import Bench
 from support.live_link import EndpointLink
 

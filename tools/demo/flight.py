@@ -28,10 +28,10 @@ import time
 
 from illuminator_ros.cli.simulator.components import SettingError
 from illuminator_ros.cli.simulator.csv_file import CsvFile
+from illuminator_ros.geometry.rotation import enu_flu, flip, Quaternion
 from illuminator_ros.mavlink.link import Link
 from illuminator_ros.mavlink.url import parse_url
 from illuminator_ros.payload.messages import GeoPoint
-from illuminator_ros.payload.rotation import enu_flu, flip, Quaternion
 from illuminator_ros.rededge.simulated import COLUMNS, RedEdgeProperties, SimulatedRedEdge
 from illuminator_ros.simulation.simulated import SimulatedComponents
 

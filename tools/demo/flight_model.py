@@ -14,7 +14,7 @@ from dataclasses import dataclass, field
 import math
 from typing import NamedTuple
 
-from illuminator_ros.payload.rotation import Quaternion, Vector
+from illuminator_ros.geometry.rotation import Quaternion, Vector
 
 # m/s, degrees, m/s^2
 SPEED, BANK, GRAVITY = 5.0, 40.0, 9.81

@@ -31,11 +31,11 @@ from ...checks.outcomes import Failed, Skipped
 from ...checks.requirement import AnyRequirement, Check, Requirement, requirement
 from ...checks.session import Transaction
 from ...checks.specifications import COMMAND, MESSAGES, Specification
+from ...geometry.mount_attitude import AXES
+from ...geometry.rotation import Quaternion
 from ...mavlink.dialect import flag_names, mavlink, short_names
 from ...mavlink.messages import Message
 from ...payload.messages import GimbalDeviceAttitudeStatus as AttitudeStatus
-from ...payload.mount_attitude import AXES
-from ...payload.rotation import Quaternion
 
 STATUS = 'GIMBAL_DEVICE_ATTITUDE_STATUS'
 # Degrees; the rotation between two statuses that the angular velocity need not explain.

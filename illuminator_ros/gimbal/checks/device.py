@@ -24,11 +24,11 @@ from ...checks.outcomes import Failed, Skipped
 from ...checks.requirement import Option, PayloadChecks, Requirement, requirement
 from ...checks.session import Conditions, Session
 from ...checks.specifications import MESSAGES, ROUTING
+from ...geometry.mount_attitude import UNSET_VECTOR, Wxyz
+from ...geometry.rotation import Quaternion, Vector
 from ...mavlink.dialect import mavlink
 from ...mavlink.messages import Address, CommandLong, heartbeat, Message, target_of
 from ...payload.messages import GimbalDeviceAttitudeStatus as AttitudeStatus
-from ...payload.mount_attitude import UNSET_VECTOR, Wxyz
-from ...payload.rotation import Quaternion, Vector
 
 INFORMATION = gimbal.GimbalDeviceInformation
 # s

@@ -35,12 +35,12 @@ from ...checks.outcomes import fail_if, Failed, Skipped
 from ...checks.requirement import PayloadChecks, Requirement, requirement
 from ...checks.session import Conditions, Session, Transaction
 from ...checks.specifications import MESSAGES, ROUTING
+from ...geometry.mount_attitude import Wxyz
+from ...geometry.rotation import Vector
 from ...mavlink.dialect import mavlink
 from ...mavlink.messages import Address, Message, time_boot_ms
 from ...payload.messages import Attitude, GlobalPositionInt
 from ...payload.messages import GimbalDeviceAttitudeStatus as AttitudeStatus
-from ...payload.mount_attitude import Wxyz
-from ...payload.rotation import Vector
 
 INFORMATION, MANAGER_STATUS = gimbal.GimbalManagerInformation, gimbal.GimbalManagerStatus
 PITCHYAW, CONFIGURE = (mavlink.MAV_CMD_DO_GIMBAL_MANAGER_PITCHYAW,

@@ -17,10 +17,7 @@ from ...checks.component_requirements import restore_interval
 from ...checks.outcomes import Failed, Skipped
 from ...checks.session import Conditions, Session
 from ...checks.specifications import Specification
-from ...mavlink.dialect import mavlink, short_names
-from ...mavlink.messages import Address, Message
-from ...payload.messages import GimbalDeviceAttitudeStatus as AttitudeStatus
-from ...payload.mount_attitude import (
+from ...geometry.mount_attitude import (
     names_frame,
     UNSET_QUATERNION,
     UNSET_VECTOR,
@@ -28,7 +25,10 @@ from ...payload.mount_attitude import (
     yaw_frame,
     YawFrame,
 )
-from ...payload.rotation import Quaternion, Vector
+from ...geometry.rotation import Quaternion, Vector
+from ...mavlink.dialect import mavlink, short_names
+from ...mavlink.messages import Address, Message
+from ...payload.messages import GimbalDeviceAttitudeStatus as AttitudeStatus
 
 GIMBAL = Specification('gimbal protocol v2', 'https://mavlink.io/en/services/gimbal_v2.html')
 PROPOSAL = Specification(

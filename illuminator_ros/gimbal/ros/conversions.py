@@ -14,9 +14,9 @@ from std_msgs.msg import Header
 
 from ..axes import RATE_LIMIT
 from ..messages import ALTITUDE_LIMIT
+from ...geometry.mount_attitude import AXES, YawFrame
+from ...geometry.rotation import Quaternion, Vector
 from ...payload.messages import GeoPoint
-from ...payload.mount_attitude import AXES, YawFrame
-from ...payload.rotation import Quaternion, Vector
 from ...ros.conversions import read_quaternion, read_vector
 from ...ros.parameters import ParameterError, ParameterSpec, Values
 

@@ -13,10 +13,10 @@ from ..axes import CONDITIONS, other_signs
 from ..commands import Control
 from ..events import DeviceIdentity, GimbalKey, GimbalSnapshot
 from ..gimbal_reports import STATUS_REQUEST_DELAY
+from ...geometry.mount_attitude import AXES
 from ...mavlink.command_sender import format_seconds
 from ...mavlink.dialect import entry_names, flag_names, mavlink
 from ...mavlink.messages import Address
-from ...payload.mount_attitude import AXES
 from ...ros import diagnostics
 from ...ros.command_sources import HOLDER_VALUES, holder_values
 

@@ -22,10 +22,10 @@ from .. import events
 from ..client import GimbalClient
 from ..commands import Attitude, Control, Move, NEUTRAL, Rates, RETRACT, YAW_LOCKS
 from ..gimbal import Gimbal
+from ...geometry.mount_attitude import YawFrame
 from ...mavlink.dialect import flag_names, mavlink
 from ...payload.command_sources import DEFAULT
 from ...payload.messages import GeoPoint
-from ...payload.mount_attitude import YawFrame
 from ...payload.requests import Done, Result
 from ...ros import node as ros_node
 from ...ros.command_sources import prefixes, release_services, SOURCE

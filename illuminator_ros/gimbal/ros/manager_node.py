@@ -27,11 +27,11 @@ from ..manager_control import ControlSettings, Role, RoleHolderChanged
 from ..manager_state import ManagerState, StateChanged
 from ..manager_with_client import ManagerWithClient
 from ..setpoint_mixer import AnglesClipped, RateStopped, ReferenceLost, SetpointSent
+from ...geometry.mount_attitude import AXES, from_mavlink
+from ...geometry.rotation import enu_ned, ned_frd, Quaternion, Vector
 from ...mavlink.command_sender import CommandSender
 from ...mavlink.messages import Address
 from ...payload.arbitration import Cause, Policy
-from ...payload.mount_attitude import AXES, from_mavlink
-from ...payload.rotation import enu_ned, ned_frd, Quaternion, Vector
 from ...ros.conversions import (
     GEOID_SEPARATION,
     quaternion_message,

@@ -15,8 +15,8 @@ from rclpy.node import Node
 from .parameters import BeamGeometry
 from ..events import LightEvent, StatusReceived
 from ..model import Mode, Status
+from ...geometry.rotation import Quaternion
 from ...payload.device_events import DeviceDisconnected
-from ...payload.rotation import Quaternion
 from ...ros.node import Entity
 from ...ros.qos import STATE_QOS
 from ...ros.transforms import TransformPublisher

@@ -21,10 +21,10 @@ from ..client import IlluminatorClient
 from ..events import LightEvent
 from ..light import Light
 from ..model import checked, SafetyLimits
+from ...geometry.rotation import Quaternion
 from ...mavlink.errors import InvalidValue
 from ...mavlink.messages import Address
 from ...payload.requests import Result
-from ...payload.rotation import Quaternion
 from ...ros import node as ros_node
 from ...ros.command_sources import prefixes, release_services, SOURCE
 from ...ros.diagnostics import DISCOVERY_GRACE

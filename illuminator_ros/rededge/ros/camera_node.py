@@ -37,9 +37,9 @@ from ..input_states import (
     Stamp,
 )
 from ..messages import CameraFeedback, Shot
+from ...geometry.rotation import Vector
 from ...mavlink.command_sender import CommandSender
 from ...mavlink.dialect import mavlink
-from ...payload.rotation import Vector
 from ...ros.conversions import GEOID_SEPARATION, quaternion_message
 from ...ros.device_nodes import ABSENCE_DELAY, publish_event
 from ...ros.diagnostics_publisher import DiagnosticsSource, MakeReports

@@ -22,8 +22,8 @@ from std_msgs.msg import Header, UInt32
 from ..conversions import Position, standard_deviations
 from ..feeder import Feeder
 from ..input_states import Input, Stamp, UNKNOWN
+from ...geometry.rotation import Quaternion, Vector
 from ...mavlink.link import Link
-from ...payload.rotation import Quaternion, Vector
 from ...ros.conversions import NO_VALUE, read_orientation, read_quaternion, read_vector
 from ...ros.node import AnyCommandTopic, CommandTopic, Entity
 

@@ -17,9 +17,9 @@ from dataclasses import dataclass
 from enum import Enum
 import math
 
-from .messages import GimbalDeviceAttitudeStatus, is_angle, is_rate
 from .rotation import enu_flu, flip, flu_frd, ned_frd, Quaternion, Vector
 from ..mavlink.dialect import mavlink
+from ..payload.messages import GimbalDeviceAttitudeStatus, is_angle, is_rate
 
 # w, x, y, z of a message.
 Wxyz = tuple[float, float, float, float]

@@ -9,11 +9,11 @@ import math
 
 from hypothesis import example, given
 from hypothesis import strategies as st
+from illuminator_ros.geometry import mount_attitude as mount
+from illuminator_ros.geometry.mount_attitude import MountAttitude, YawFrame
+from illuminator_ros.geometry.rotation import Quaternion
 from illuminator_ros.mavlink.dialect import mavlink
-from illuminator_ros.payload import mount_attitude as mount
 from illuminator_ros.payload.messages import GimbalDeviceAttitudeStatus
-from illuminator_ros.payload.mount_attitude import MountAttitude, YawFrame
-from illuminator_ros.payload.rotation import Quaternion
 import pytest
 from pytest import approx
 

@@ -8,7 +8,7 @@ import math
 
 from hypothesis import given
 from hypothesis import strategies as st
-from illuminator_ros.payload.rotation import (
+from illuminator_ros.geometry.rotation import (
     enu_flu,
     enu_ned,
     flip,
