@@ -486,6 +486,9 @@ def test_the_release_at_the_end_is_in_the_log_of_the_node_of_the_gimbal(
           served_gimbals(port, manager, link=link)):
         with time_passes():
             own_ros.subscribe(Bool, '/gimbal/in_control').wait_value(True)
+            # Several attitudes show that the gimbal stands, so that control can be released.
+            own_ros.subscribe(QuaternionStamped, '/gimbal/attitude', STREAM).wait_for(
+                lambda message: True, count=5)
         assert program.end() == 0
         [found] = [one for one in program.lines if line in one]
         assert '[gimbal]' in found
