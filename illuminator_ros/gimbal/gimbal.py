@@ -201,7 +201,6 @@ class Gimbal:
             return
         if not reports.in_control:
             self._end(self.unavailable(now), now, MOVE, YAW_LOCK)
-            self.requests.forget({MOVE: None})
         if reports.control is None:
             if setpoints.may_have_rate:
                 # The manager that had shown this component in control takes the zero.
@@ -298,8 +297,7 @@ class Gimbal:
             self.requests.reply(newest, SENT)
         for served in self._commanded.step(Goal.strongest(control, CONTROL, now),
                                            Goal.strongest(live, MOVE, now), now):
-            if served.request not in self._standing:
-                self._end_one(served.request, served.result, now)
+            self._end_one(served.request, served.result, now)
         self.requests.answer(now)
         self.control.answer(now)
         self._set_due()
@@ -376,7 +374,6 @@ class Gimbal:
         """End the requests that may turn the gimbal or stop it later, and a rate or a place."""
         has_place = self.setpoints.has_place
         self._end(message, now, MOVE, YAW_LOCK, superseded=superseded)
-        self.requests.forget({MOVE: None})
         self._step(now)
         if has_place:
             self.setpoints.stop(now, can_send=self.reports.in_control)
@@ -422,8 +419,6 @@ class Gimbal:
         for old in requests.standing[:]:
             if old.is_open and _ends(new, old):
                 self._end_one(old, result, now)
-        if is_lock:
-            requests.forget({MOVE: None})
         requests.put(new, now)
         self._step(now)
 

@@ -59,9 +59,8 @@ class GimbalCommands:
         """Have what is wanted under way; return the requests of commands that were withdrawn."""
         goals = {CONTROL: control}
         if move is not None and not isinstance(move.values, SETPOINTS):
-            # Of a stream of places the newest is sent when one has ended.
-            goals[POSE if isinstance(move.values, Flag) else PLACE] = move._replace(
-                waits=not move.is_awaited)
+            # Another place, of a topic, may be under way.
+            goals[POSE if isinstance(move.values, Flag) else PLACE] = move._replace(waits=True)
         return [served for name, one in self._properties.items() for served in one.steer(
             goals.get(name), now, None, self._gaps.get(name, (0.0, None))[1])]
 

@@ -122,7 +122,6 @@ class SetpointStream:
         if isinstance(move, Attitude):
             # A rate that has ended may be late.
             ends_rate = isinstance(self.followed, Rates) or self.rate_stop.is_running
-            self.rate_stop.cancel()
             self._send_again = lambda now: self._send_attitude(move, now)
             self._repeats = [now + delay for delay in REPEATS]
             self._send_again(now)

@@ -10,9 +10,8 @@ import contextlib
 import math
 import re
 
-from illuminator_ros.geometry.mount_attitude import STILL, YawFrame
-from illuminator_ros.geometry.rotation import Quaternion
-from illuminator_ros.gimbal.commands import Attitude, Control, Rates
+from illuminator_ros.geometry.mount_attitude import STILL
+from illuminator_ros.gimbal.commands import Control, Rates
 from illuminator_ros.gimbal.events import (
     AutomaticTakeFailed,
     ControlChanged,
@@ -444,35 +443,6 @@ def test_gm_3_the_yaw_lock_is_set_by_a_rate_of_zero_with_its_flag_until_it_is_sh
     assert len(manager.received) - before <= lost + 6
 
 
-def test_of_requests_for_the_yaw_lock_equal_ones_share_the_outcome_and_the_last_one_decides(
-) -> None:
-    rig = in_control()
-    rig.managers[0].applies = False
-    unlocked, locked = (ask for ask, *_ in reversed(YAW_LOCK_REQUESTS))
-    for ask in (unlocked, locked, locked):
-        ask(rig.gimbal, rig.now, rig.done)
-    rig.managers[0].applies = True
-    rig.run(1.0)
-
-    assert [(one.success, one.superseded, one.message.partition(',')[0])
-            for one in rig.results] == [
-        (False, True, 'superseded by lock yaw'), *[(True, False, 'yaw locked')] * 2]
-
-
-def test_each_of_equal_requests_for_the_yaw_lock_has_its_own_time() -> None:
-    rig = in_control()
-    rig.managers[0].applies = False
-    for seconds in (1.5, 1.0):
-        set_yaw_lock(rig.gimbal, True, rig.now, rig.done)
-        rig.run(seconds)
-    assert [one.success for one in rig.results] == [False]
-
-    rig.managers[0].flags |= mavlink.GIMBAL_DEVICE_FLAGS_YAW_LOCK
-    rig.run(0.5)
-
-    assert [one.success for one in rig.results] == [False, True]
-
-
 def test_a_status_from_before_an_equal_request_for_the_yaw_lock_does_not_confirm_it() -> None:
     rig = in_control()
     manager = rig.managers[0]
@@ -499,24 +469,6 @@ def test_a_caller_that_raises_leaves_the_answer_to_the_others_of_the_yaw_lock() 
         rig.run(1.0)
 
     assert [one.success for one in rig.results] == [True]
-
-
-@pytest.mark.parametrize('later', [
-    lambda gimbal, now, done: setpoint(gimbal, Rates((0.0, 0.1, 0.0)), now),
-    lambda gimbal, now, done: setpoint(gimbal, Attitude(Quaternion(), YawFrame.VEHICLE), now),
-    set_neutral])
-def test_a_yaw_lock_that_is_not_shown_does_not_stop_a_later_setpoint_or_request(
-        later: Ask) -> None:
-    rig = in_control(setpoint_timeout=10.0)
-    rig.managers[0].applies = False
-    YAW_LOCK_REQUESTS[0][0](rig.gimbal, rig.now, rig.done)
-    rig.run(0.1)
-    later(rig.gimbal, rig.now, rig.done)
-    sent = len(rig.managers[0].received)
-    rig.run(3.0)
-
-    assert STILL not in map(rates_of, rig.managers[0].received[sent:])
-    assert not rig.results[0].success
 
 
 @pytest.mark.parametrize('ask', [ask for ask, *_ in FLAG_REQUESTS])
@@ -560,45 +512,6 @@ def set_roi(gimbal: Gimbal, now: float, done: Done) -> None:
     gimbal.request(PLACE, now, done)
 
 
-@pytest.mark.parametrize('later', [
-    *(ask for ask, *_ in FLAG_REQUESTS), clear_roi, Gimbal.release_control,
-    lambda gimbal, now, done: setpoint(gimbal, Attitude(Quaternion(), YawFrame.VEHICLE), now),
-    lambda gimbal, now, done: setpoint(gimbal, Rates((0.0, 0.1, 0.0)), now)])
-def test_gm_8_place_without_an_answer_is_not_sent_again_after_a_later_setpoint_or_request(
-        later: Ask) -> None:
-    rig = in_control()
-    rig.managers[0].answers = False
-    set_roi(rig.gimbal, rig.now, rig.done)
-    # Another place waits for the acknowledgement.
-    rig.gimbal.request(GeoPoint(47.1, 8.5, 500.0), rig.now, rig.done, is_call=False)
-    rig.run(0.1)
-    rig.managers[0].answers = True
-
-    later(rig.gimbal, rig.now, rig.done)
-    rig.run(3.0)
-
-    assert len(rig.messages(mav.CommandInt)) == 1
-    assert [(one.success, one.superseded) for one in rig.results[:2]] == [(False, True)] * 2
-
-
-@pytest.mark.parametrize('later', [
-    lambda gimbal, now: setpoint(gimbal, Attitude(Quaternion(), YawFrame.VEHICLE), now),
-    lambda gimbal, now: setpoint(gimbal, Rates((0.0, 0.1, 0.0)), now)])
-def test_a_pose_without_an_answer_is_not_sent_again_after_a_later_setpoint(
-        later: Callable[[Gimbal, float], str]) -> None:
-    rig = in_control()
-    rig.managers[0].answers = False
-    set_neutral(rig.gimbal, rig.now, rig.done)
-    rig.run(0.1)
-
-    assert later(rig.gimbal, rig.now) == ''
-    rig.run(3.0)
-
-    assert len(commands(rig, mavlink.MAV_CMD_DO_GIMBAL_MANAGER_PITCHYAW)) == 1
-    assert [(one.superseded, one.message) for one in rig.results] == [
-        (True, 'superseded by a setpoint')]
-
-
 @pytest.mark.parametrize(('ask', 'command', 'wish'), [
     (retract, mavlink.MAV_CMD_DO_GIMBAL_MANAGER_PITCHYAW, 'retract'),
     (set_roi, mavlink.MAV_CMD_DO_SET_ROI_LOCATION, 'point at 47, 8.5, 500 m'),
@@ -626,118 +539,6 @@ def test_refusal_names_the_request_the_manager_and_who_has_control(
     rig.receive(AUTOPILOT, rig.managers[0].status())
     rig.run(1.0)
     assert rig.results[0].message == 'no control of gimbal 1/154: primary 1/195, secondary none'
-
-
-TURNING_REQUESTS = (*(ask for ask, *_ in POSES), set_roi)
-
-
-@pytest.mark.parametrize(('ask', 'result', 'is_repeated'), [
-    *((ask, mavlink.MAV_RESULT_ACCEPTED, False) for ask in TURNING_REQUESTS),
-    # ArduPilot goes on with the rate.
-    (clear_roi, mavlink.MAV_RESULT_ACCEPTED, True),
-    *((ask, mavlink.MAV_RESULT_DENIED, True) for ask in (*TURNING_REQUESTS, clear_roi))])
-def test_zero_before_a_request_is_sent_again_unless_the_request_turns_the_gimbal(
-        ask: Ask, result: int, is_repeated: bool) -> None:
-    rig = in_control()
-    rig.managers[0].results = dict.fromkeys(DEVICE_ID_PARAM, result)
-    # The zero is lost, or the device turns to its neutral position.
-    rig.managers[0].rates = (0.0, -0.2, 0.0)
-    rig.send(Rates((0.0, 0.2, 0.0)))
-    rig.run(0.1)
-
-    assert asked(rig, ask)[0] is (result == mavlink.MAV_RESULT_ACCEPTED)
-    before = len(rig.messages(GimbalManagerSetAttitude))
-    rig.run(30.0)
-
-    sent = [one.angular_velocity_y for one in rig.messages(GimbalManagerSetAttitude)]
-    assert steps(sent) == [pytest.approx(-0.2), 0]
-    assert (len(sent) - before >= 30) is is_repeated
-
-
-@pytest.mark.parametrize('ask', [clear_roi, set_neutral])
-def test_zero_is_not_sent_again_while_a_request_has_no_answer(ask: Ask) -> None:
-    rig = in_control()
-    rig.managers[0].rates = (0.0, -0.2, 0.0)
-    rig.managers[0].answers = False
-    rig.send(Rates((0.0, 0.2, 0.0)))
-    ask(rig.gimbal, rig.now, rig.done)
-    rig.run(1.5)
-
-    assert [one.angular_velocity_y for one in rig.messages(GimbalManagerSetAttitude)] == [-0.2, 0]
-
-
-@pytest.mark.parametrize('asks', [
-    (set_roi, set_neutral), (clear_roi, set_neutral)])
-@pytest.mark.parametrize('refusal', [
-    mavlink.MAV_RESULT_DENIED, mavlink.MAV_RESULT_TEMPORARILY_REJECTED], ids=['at once', 'later'])
-def test_zero_is_not_sent_again_to_a_gimbal_that_follows_another_request(
-        asks: tuple[Ask, Ask], refusal: int) -> None:
-    rig = in_control()
-    manager = rig.managers[0]
-    manager.results = dict.fromkeys(
-        (mavlink.MAV_CMD_DO_SET_ROI_LOCATION, mavlink.MAV_CMD_DO_SET_ROI_NONE), refusal)
-    # The device turns to its neutral position, and shows the flag late.
-    manager.rates, manager.applies = (0.0, -0.2, 0.0), False
-    rig.send(Rates((0.0, 0.2, 0.0)))
-    rig.run(0.1)
-
-    for ask in asks:
-        ask(rig.gimbal, rig.now, rig.done)
-    rig.run(0.7)
-    manager.flags |= mavlink.GIMBAL_DEVICE_FLAGS_NEUTRAL
-    rig.run(3.0)
-
-    assert sorted(one.success for one in rig.results) == [False, True]
-    assert [one.angular_velocity_y for one in rig.messages(GimbalManagerSetAttitude)] == [-0.2, 0]
-
-
-def test_zero_that_has_stopped_the_gimbal_is_not_sent_again_after_a_request() -> None:
-    rig = in_control()
-    manager = rig.managers[0]
-    manager.rates = (0.0, 0.0, 0.0)
-    rig.send(Rates((0.0, 0.2, 0.0)))
-    rig.run(3.0)
-    manager.applies, manager.rates = False, (0.0, -0.2, 0.0)
-
-    before = len(rig.messages(GimbalManagerSetAttitude))
-
-    assert not asked(rig, set_neutral)[0]
-
-    rig.run(3.0)
-    assert len(rig.messages(GimbalManagerSetAttitude)) == before
-
-
-@pytest.mark.parametrize('answers', [True, False])
-@pytest.mark.parametrize('ask', [*(ask for ask, *_ in POSES), clear_roi, set_roi])
-def test_place_after_a_failed_request_ends_with_the_control_of_the_node(
-        ask: Ask, answers: bool) -> None:
-    rig = in_control()
-    assert asked(rig, set_roi)[0]
-    rig.managers[0].results = dict.fromkeys(DEVICE_ID_PARAM, mavlink.MAV_RESULT_DENIED)
-    rig.managers[0].answers = answers
-    assert not asked(rig, ask)[0]
-    rig.managers[0].results, rig.managers[0].answers = {}, True
-
-    rig.gimbal.release_control(rig.now, rig.done)
-    rig.run(1.0)
-
-    assert steps(one.angular_velocity_z for one in rig.messages(GimbalManagerSetAttitude)) == [0]
-
-
-@pytest.mark.parametrize('before', [None, (0.0, 0.5, 0.0)])
-def test_attitude_before_a_refused_request_is_still_the_one_that_angles_change(
-        before: tuple[float, float, float] | None) -> None:
-    rig = in_control()
-    if before:
-        rig.send_angles(before, YawFrame.VEHICLE)
-    rig.managers[0].results = dict.fromkeys(DEVICE_ID_PARAM, mavlink.MAV_RESULT_DENIED)
-    assert not asked(rig, set_roi)[0]
-
-    rig.send_angles((math.nan, math.nan, 0.3), YawFrame.VEHICLE)
-    rig.run(0.1)
-
-    pitch, yaw = Quaternion(*rig.managers[0].received[-1].q).euler()[1:]
-    assert (pitch, yaw) == pytest.approx((-0.5 if before else 0.0, -0.3))
 
 
 @pytest.mark.parametrize(('primary', 'reason'), [

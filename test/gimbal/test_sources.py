@@ -9,11 +9,9 @@ from collections.abc import Callable
 import random
 from typing import Any
 
-from illuminator_ros.geometry.mount_attitude import from_mavlink, STILL, YawFrame
-from illuminator_ros.gimbal.commands import NEUTRAL, Rates, YAW_LOCKS
-from illuminator_ros.gimbal.messages import DEVICE_ID_PARAM, GimbalManagerSetAttitude, rates_of
-from illuminator_ros.mavlink.dialect import mavlink
-from illuminator_ros.mavlink.messages import CommandInt, CommandLong
+from illuminator_ros.geometry.mount_attitude import from_mavlink, YawFrame
+from illuminator_ros.gimbal.commands import Rates
+from illuminator_ros.gimbal.messages import GimbalManagerSetAttitude
 from illuminator_ros.payload.arbitration import Cause, HolderChanged
 from illuminator_ros.payload.command_sources import SourceSettings
 from illuminator_ros.payload.device_events import DeviceHeld
@@ -22,10 +20,8 @@ from support.gimbals import (
     FakeManager,
     in_control,
     OURS,
-    PLACE,
     Rig,
     setpoint,
-    steps,
 )
 
 NAMES = ('safety', 'operator', 'default', 'autonomy')
@@ -79,37 +75,6 @@ def test_the_next_source_has_the_gimbal_afterwards_and_must_send_a_setpoint(
     assert asked(rig.run(0.1)) == {'safety', 'autonomy'}
 
 
-@pytest.mark.parametrize('end', ENDS.values())
-@pytest.mark.parametrize(('start', 'sent'), [
-    (lambda rig: rig.send(Rates((0.0, 0.0, 0.2)), 'safety'), [pytest.approx(-0.2)]),
-    (lambda rig: rig.gimbal.request(PLACE, rig.now, rig.done, source='safety'), [])],
-    ids=['rate', 'place'])
-def test_a_rate_or_a_place_ends_with_the_hold_of_its_source(
-        start: Callable[[Rig], object], sent: list[float], end: Callable[[Rig], object]) -> None:
-    rig = shared(setpoint_timeout=30.0)
-    start(rig)
-    rig.run(1.0)
-    end(rig)
-    rig.run(1.0)
-
-    # The gimbal stops where it points.
-    assert holder(rig) == ''
-    assert steps(one.angular_velocity_z for one in rig.messages(GimbalManagerSetAttitude)) == [
-        *sent, 0.0]
-
-
-def test_an_attitude_is_not_sent_again_after_the_hold_of_its_source() -> None:
-    rig = shared()
-    assert point(rig, 'autonomy') == ''
-    rig.run(0.1)
-    before = len(rig.messages(GimbalManagerSetAttitude))
-
-    rig.send(Rates(), 'safety')
-    rig.run(3.0)
-
-    assert {rates_of(one) for one in rig.messages(GimbalManagerSetAttitude)[before:]} == {STILL}
-
-
 def test_a_takeover_leaves_the_commands_to_another_gimbal_of_the_manager() -> None:
     rig = Rig(*(FakeManager(device_id=number, primary=OURS) for number in (1, 2)),
               sources=SourceSettings(NAMES, TIMEOUT)).run(4.0)
@@ -124,86 +89,6 @@ def test_a_takeover_leaves_the_commands_to_another_gimbal_of_the_manager() -> No
     rig.managers[1].answers = True
     rig.run(2.0)
     assert [one.success for one in rig.results] == [False, True]
-
-
-def test_a_stream_leaves_the_call_of_its_own_source_under_way() -> None:
-    rig = shared()
-    rig.managers[0].answers = False
-    rig.gimbal.request(None, rig.now, rig.done, source='operator')
-    rig.gimbal.request(None, rig.now, rig.done, is_call=False, source='operator')
-    rig.run(0.1)
-
-    assert (holder(rig), rig.results) == ('operator', [])
-
-
-def call(rig: Rig, source: str) -> None:
-    """Request the neutral position, which no status shows yet."""
-    rig.managers[0].applies = False
-    rig.gimbal.request(NEUTRAL, rig.now, rig.done, source=source)
-    rig.run(0.1)
-
-
-@pytest.mark.parametrize('holds', [False, True])
-def test_a_source_that_releases_the_gimbal_during_its_call_does_not_hold_it_later(
-        holds: bool) -> None:
-    rig = shared()
-    if holds:
-        rig.send(Rates(), 'default')
-    call(rig, 'default')
-
-    rig.gimbal.release('default', rig.now)
-    rig.managers[0].flags |= mavlink.GIMBAL_DEVICE_FLAGS_NEUTRAL
-    rig.run(1.0)
-
-    assert [one[:2] for one in rig.results] == [(False, 'default has released the gimbal')]
-    assert holder(rig) == ''
-
-
-@pytest.mark.parametrize('end', [
-    lambda rig: rig.gimbal.release('autonomy', rig.now), lambda rig: rig.run(TIMEOUT - 1.2)],
-    ids=['release', 'silence'])
-def test_a_call_goes_on_when_the_hold_of_a_lower_source_ends(
-        end: Callable[[Rig], object]) -> None:
-    rig = shared()
-    rig.send(Rates(), 'autonomy')
-    rig.run(1.2)
-    call(rig, 'default')
-
-    end(rig)
-    assert holder(rig) == ''
-    rig.managers[0].flags |= mavlink.GIMBAL_DEVICE_FLAGS_NEUTRAL
-    rig.run(0.5)
-
-    assert [one.success for one in rig.results] == [True]
-    assert holder(rig) == 'default'
-
-
-def test_a_takeover_ends_the_commands_of_the_lower_source_and_their_resends() -> None:
-    rig = shared()
-    rig.managers[0].answers = False
-    rig.gimbal.request(YAW_LOCKS[True], rig.now, rig.done, source='autonomy')
-    rig.send(Rates((0.0, 0.0, 0.2)), 'autonomy')
-    rig.gimbal.request(PLACE, rig.now, rig.done, source='autonomy')
-    rig.run(0.1)
-    point(rig, 'safety')
-    taken_at = rig.now
-    rig.run(3.0)
-
-    assert [one.message for one in rig.results] == [
-        'superseded by point at 47, 8.5, 500 m', 'held by safety']
-    assert not [one for at, one in rig.sent if at > taken_at
-                and isinstance(one, CommandLong | CommandInt)
-                and one.command in set(DEVICE_ID_PARAM)]
-
-
-@pytest.mark.parametrize(('source', 'refusal'), [
-    ('safety', ''), ('operator', ''), ('default', 'held by operator')])
-def test_a_check_of_a_claim_gives_no_source_the_gimbal(source: str, refusal: str) -> None:
-    rig = shared()
-    point(rig, 'operator')
-
-    assert rig.gimbal.requests.refusal(source) == refusal
-    assert holder(rig) == 'operator'
 
 
 def test_without_sources_all_are_alike() -> None:
