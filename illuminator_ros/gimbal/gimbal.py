@@ -543,4 +543,4 @@ def _ends(new: Request, old: Request) -> bool:
         return field == MOVE and not isinstance(wish, SETPOINTS)
     # Of places of a topic the newest is sent when one has ended.
     waits = not new.is_call and isinstance(wish, GeoPoint) and isinstance(before, GeoPoint)
-    return field == YAW_LOCK or wish != before and not waits
+    return wish != before and not waits

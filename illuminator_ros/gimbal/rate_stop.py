@@ -110,6 +110,8 @@ class RateStop:
     def owe(self, send: Callable[[float], None], now: float) -> None:
         """Send the message as soon as an attitude shows that the device turns."""
         self.is_running, self._must_be_sent, self._send, self.begun = True, False, send, now
+        # An attitude that showed that it stood may be older than the rate.
+        self.turns = self.turns or None
         self._retries.stop()
 
     def cancel(self) -> None:

@@ -278,6 +278,8 @@ ROWS: dict[str, Row] = {
     'an equal attitude that is shown is not sent': row(
         'level, 3, mark, level, 3', '', '', 'repeated'),
     'nor angles that leave axes': row('down, 3, mark, down, 3', ''),
+    'also of a gimbal that is tilted': row(
+        'down, 3, mark, down, 3', '', q=Quaternion.from_euler(0.13, -0.21, 0.37)),
     'it is sent after a rate': row('level, 3, rate, 0.1, zero, 3, mark, level, 1', 'attitude 0'),
     'after a pose': row('level, 3, neutral, 3, mark, level, 1', 'attitude 0'),
     'during a pose': row(
@@ -436,6 +438,9 @@ ROWS: dict[str, Row] = {
     'a call goes on when a lower hold ends': row(
         'autonomy level, manager idles, mark, neutral, frees autonomy, device neutral, 1',
         'neutral', 'default', 'neutral position, confirmed', **SHARED),
+    'and when its time is over': row(
+        'autonomy level, 0.8, manager idles, mark, neutral, 0.4, device neutral, 0.5', 'neutral',
+        'default', 'neutral position, confirmed', timeout=1.0, **SHARED),
     'a call that fails claims nothing': row(
         'manager denies, mark, safety neutral, 1', 'neutral', '', DENIED, **SHARED),
     'one that succeeds claims': row('safety neutral, 1', None, 'safety', **SHARED),
@@ -462,6 +467,9 @@ ROWS: dict[str, Row] = {
     'a release stops a place': row('place, 1, mark, give, 1', 'zero control'),
     'also one that was refused after it': row(
         'place, 1, manager denies, field, 1, mark, give, 1', 'zero control'),
+    'one that a refused place has replaced': row(
+        'manager mute, place, manager answers, manager denies, field, 3, mark, give, 1',
+        'zero control'),
     'one without an answer': row(
         'manager mute, place, 6, manager answers, mark, give, 1', 'zero control'),
     'and a place before a failed pose': row(
@@ -479,6 +487,9 @@ ROWS: dict[str, Row] = {
         'no control of gimbal'),
     'a rate that another player left gets its zero later': row(
         'rate, other, 1, device turns, 2, mark, ours, 2', 'zero', ''),
+    'also after two, where an attitude before them showed that it stood': row(
+        'manager deaf, rate, 0.3, device turns, device mute, other, 0.3, nobody, 1, '
+        'device reports, manager hears, mark, ours, 2', 'zero', lasts=30.0),
     'but not one that it has stopped': row(
         'rate, other, device turns, 2, device stands, 2, device turns, mark, ours, 3', ''),
     'nor one whose end was shown before': row(
