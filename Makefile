@@ -10,12 +10,13 @@ export PYTHONDONTWRITEBYTECODE =
 # Arguments of tools/bench, such as '--repeat 3 enable'.
 BENCH ?=
 
-.PHONY: help demo test check lint unit fuzz soak bench pictures doc-tables clean environment
+.PHONY: help demo test check lint unit coverage fuzz soak bench pictures doc-tables clean environment
 
 help:
 	@echo 'make demo    run a simulated light and a camera with their nodes, and show what they do'
 	@echo 'make test    run all checks and tests; with ROS=kilted on ROS 2 Kilted instead of Jazzy'
 	@echo 'make unit    run the tests that need no ROS'
+	@echo 'make coverage  measure the branches of the core that its tests run'
 	@echo 'make check   run ruff and mypy'
 	@echo 'make lint    run ruff, mypy and the linters of ROS'
 	@echo 'make fuzz    send hostile input to both sides of the link for SECONDS=60'
@@ -44,6 +45,10 @@ unit: environment
 		test/docs/test_payload_pages.py test/docs/test_tables.py \
 		test/docs/test_example_pages.py
 
+coverage: environment
+	@$(PYTHON_IN_VENV) -m pytest -q -n 2 -p support.no_ros --cov --cov-report=term-missing:skip-covered \
+		test/payload test/illuminator test/gimbal
+
 check: environment
 	@$(PYTHON_IN_VENV) -m ruff check .
 	@$(PYTHON_IN_VENV) -m mypy
@@ -67,5 +72,5 @@ doc-tables: environment
 	@$(PYTHON_IN_VENV) -m tools.doc_tables
 
 clean:
-	rm -rf .venv .venv-kilted build install log .pytest_cache .mypy_cache .ruff_cache .hypothesis
+	rm -rf .venv .venv-kilted build install log .pytest_cache .mypy_cache .ruff_cache .hypothesis .coverage
 	find [a-z]* -name __pycache__ -prune -exec rm -rf {} +
