@@ -14,7 +14,7 @@ from illuminator_ros.gimbal import messages as gimbal
 from illuminator_ros.gimbal.axes import Range
 from illuminator_ros.gimbal.simulated_device import MANAGER_TIMEOUT, SIMULATED
 from illuminator_ros.mavlink.dialect import mavlink
-from illuminator_ros.mavlink.messages import Address, CommandAck, CommandLong
+from illuminator_ros.mavlink.messages import Address
 from illuminator_ros.payload.messages import GimbalDeviceAttitudeStatus
 import pytest
 from support.bench import DeviceBench
@@ -183,24 +183,6 @@ def test_a_manager_that_is_set_needs_no_announcement_and_cannot_be_replaced() ->
         assert bench.angles(1.0) == (0.0, pitch, 0.0)
 
 
-def test_gm_19_the_messages_and_commands_to_managers_move_no_device() -> None:
-    bench = Bench()
-    down = Quaternion.from_euler(0.0, -0.5, 0.0)
-    bench.give(MANAGER, gimbal.GimbalManagerSetAttitude(*DEVICE, FOLLOW, 154, down, NAN, NAN, NAN))
-    bench.give(MANAGER, CommandLong(*DEVICE, 1000, 0, -20.0, 0.0, NAN, NAN, 0, 0, 154))
-    assert bench.angles(1.0) == (0.0, 0.0, 0.0)
-    (ack,) = bench.messages(CommandAck)
-    assert ack.result == mavlink.MAV_RESULT_UNSUPPORTED
-
-
-def test_a_setpoint_for_another_component_or_with_both_frames_is_ignored() -> None:
-    bench = Bench()
-    bench.point(0.0, -10.0, 0.0, target=Address(1, 171))
-    bench.point(0.0, -10.0, 0.0, flags=96)
-    bench.give(MANAGER, gimbal.GimbalDeviceSetAttitude(*DEVICE, 32, (0, 0, 0, 0), NAN, NAN, NAN))
-    assert bench.angles(1.0) == (0.0, 0.0, 0.0)
-
-
 # Frames, heading and modes
 
 def test_gm_3_without_a_heading_yaw_relative_to_north_is_not_accepted() -> None:
@@ -251,35 +233,9 @@ def test_gm_5_an_axis_that_it_lacks_does_not_move_and_is_not_offered() -> None:
                                         | mavlink.GIMBAL_DEVICE_CAP_FLAGS_HAS_YAW_LOCK)
 
 
-# A person
-
-def test_a_person_turns_it_and_reads_its_state() -> None:
-    bench = Bench(announced=False, manager_id=191)
-    (turn,) = bench.device.commands
-    turn.do(bench.device, ['-20', '15'], bench.now)()
-    assert bench.angles(1.0) == (0.0, -20.0, 15.0)
-    assert bench.device.snapshot(bench.now).text == (
-        'roll    0.0  pitch  -20.0  yaw   15.0 deg  manager 1/191  heading unknown')
-    with pytest.raises(ValueError, match='outside'):
-        turn.do(bench.device, ['-200', '0'], bench.now)
-
-
-def test_each_15_degrees_of_movement_are_worth_a_line() -> None:
-    bench = Bench()
-    bench.point(0.0, -45.0, -30.0)
-    bench.angles(0.5)
-    bench.angles(4.0)
-    assert bench.device.snapshot(bench.now).drift == pytest.approx(75.0 / 15.0)
-
-
 @pytest.mark.parametrize(('name', 'text', 'reason'), [
     ('pitch_range', '-90', 'is not MIN,MAX'), ('yaw_range', '90,-90', 'minimum is above'),
     ('roll_range', '-200,0', 'outside'), ('lacks', 'has_wings', 'is not one of has_retract')])
 def test_a_wrong_setting_is_refused_with_the_reason(name: str, text: str, reason: str) -> None:
     with pytest.raises(ValueError, match=reason):
         SIMULATED.all_settings[name].read(text)
-
-
-def test_a_yaw_without_a_stop_is_offered() -> None:
-    properties = Bench(yaw_range=Range(-math.pi, math.pi)).device.properties
-    assert properties.capabilities & mavlink.GIMBAL_DEVICE_CAP_FLAGS_SUPPORTS_INFINITE_YAW

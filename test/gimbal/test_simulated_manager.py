@@ -13,9 +13,8 @@ from illuminator_ros.geometry.rotation import Quaternion
 from illuminator_ros.gimbal import messages as gimbal
 from illuminator_ros.gimbal.simulated_manager import PROFILES, SIMULATED
 from illuminator_ros.mavlink import messages as mav
-from illuminator_ros.mavlink.dialect import MAV_RESULT_COMMAND_UNSUPPORTED_MAV_FRAME, mavlink
+from illuminator_ros.mavlink.dialect import mavlink
 from illuminator_ros.payload.messages import (
-    Attitude,
     GimbalDeviceAttitudeStatus,
     GlobalPositionInt,
 )
@@ -75,20 +74,6 @@ class Bench(DeviceBench):
         return tuple(round(math.degrees(angle), 3) + 0.0 for angle in euler)
 
 
-@every_profile
-def test_gm_27_it_announces_its_gimbal_and_streams_status_and_attitude(profile: str) -> None:
-    bench = Bench(profile)
-    assert dict(bench.device.streams()) == {281: 0.2, 285: 0.1}
-    information = bench.message(gimbal.GimbalManagerInformation)
-    assert information.gimbal_device_id == 1
-    assert information.cap_flags & mavlink.GIMBAL_DEVICE_CAP_FLAGS_CAN_POINT_LOCATION_GLOBAL
-    assert bool(information.cap_flags
-                & mavlink.GIMBAL_DEVICE_CAP_FLAGS_HAS_RETRACT) is (profile != 'px4')
-    assert bench.message(GimbalDeviceAttitudeStatus).gimbal_device_id == 1
-    assert bench.message(gimbal.GimbalDeviceInformation).gimbal_device_id == 1
-    assert bench.result(mavlink.MAV_CMD_REQUEST_MESSAGE, 280) == ACCEPTED
-
-
 # Control
 
 @pytest.mark.parametrize(('profile', 'values', 'result', 'control'), [
@@ -144,14 +129,6 @@ def test_gm_2_the_flags_tell_the_frame_of_a_yaw(profile: str, flags: int, yaw: f
     assert frame == (YawFrame.EARTH if earth else YawFrame.VEHICLE).flag
 
 
-@pytest.mark.parametrize('value', [NAN, math.inf])
-def test_an_attitude_of_the_vehicle_that_is_not_a_rotation_is_ignored(value: float) -> None:
-    bench = Bench()
-    bench.point(0.0, -20.0, 30.0, flags=LOCK)
-    bench.give(mav.Address(1, 1), Attitude(0, 0.0, 0.0, value, 0.0, 0.0, 0.0))
-    assert bench.angles() == (0.0, -20.0, 30.0)
-
-
 @every_profile
 def test_gm_28_a_message_for_another_device_is_ignored_except_by_px4(profile: str) -> None:
     bench = Bench(profile)
@@ -197,26 +174,3 @@ def test_gm_8_it_keeps_pointing_at_the_place_while_the_vehicle_moves_until_the_n
     assert bench.angles() == (0.0, -10.0, 0.0)
 
 
-@pytest.mark.parametrize(('params', 'frame', 'result'), [
-    ((1, 0, 0, 0, 910000000, 0, 0), 0, DENIED), ((1, 0, 0, 0, 0, 0, NAN), 0, DENIED),
-    ((1, 0, 0, 0, 0, 0, 0), 10, MAV_RESULT_COMMAND_UNSUPPORTED_MAV_FRAME),
-    ((3, 0, 0, 0, 0, 0, 0), 0, DENIED)])
-def test_a_place_that_does_not_exist_is_refused(
-        params: tuple[float, ...], frame: int, result: int) -> None:
-    assert Bench().result(ROI, *params, form=mav.CommandInt, frame=frame) == result
-
-
-# People
-
-@pytest.mark.parametrize('flags', [NAN, math.inf, 96.0])
-def test_impossible_flags_are_denied(flags: float) -> None:
-    assert Bench().result(PITCHYAW, -10, 0, NAN, NAN, flags) == DENIED
-
-
-def test_a_person_sees_who_has_control() -> None:
-    bench = Bench()
-    bench.take(PLAYER, OTHER)
-    assert bench.device.snapshot(bench.now).text == (
-        'roll    0.0  pitch    0.0  yaw    0.0 deg  primary 1/195, secondary 255/190')
-    bench.result(ROI, 0, 0, 0, 0, 47.4, 8.545594, 488.0)
-    assert bench.device.snapshot(bench.now).text.endswith('region of interest')

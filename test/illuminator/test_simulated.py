@@ -6,7 +6,7 @@
 from collections.abc import Iterable
 from typing import Any
 
-from illuminator_ros.illuminator.messages import IlluminatorStatus, STATUS_ID
+from illuminator_ros.illuminator.messages import IlluminatorStatus
 from illuminator_ros.illuminator.simulated import SimulatedIlluminator
 from illuminator_ros.illuminator.simulated_properties import IlluminatorProperties
 from illuminator_ros.illuminator.thermal import ThermalProperties
@@ -85,20 +85,6 @@ def test_a_change_is_acknowledged_then_applied_then_reported(
         assert status.brightness == params[1]
 
 
-@pytest.mark.parametrize(('position', 'value'), [
-    *((0, value) for value in (0, -1, 3, 1.5, 255, NAN, INF)),
-    *((1, value) for value in (-1, -0.001, 100.001, 101, NAN, INF, -INF)),
-    *((2, value) for value in (-1, 0.04, 10.01, 1e30, NAN, INF, -INF)),
-    *((3, value) for value in (-1, -0.001, 100.001, 101, NAN, INF, -INF))])
-def test_one_wrong_value_denies_the_whole_configuration(
-    bench: LightBench, position: int, value: float,
-) -> None:
-    before, params = bench.shown(), [2.0, 50.0, 1.0, 25.0]
-    params[position] = value
-    (ack,) = bench.command(CONFIGURE, *params)
-    assert (ack.result, bench.shown()) == (DENIED, before)
-
-
 def test_a_restart_resets_the_settings_and_keeps_the_temperature() -> None:
     bench = LightBench()
     bench.command(ON_OFF, 1)
@@ -138,18 +124,3 @@ def test_a_strobe_heats_by_its_duty_cycle_and_not_at_0_percent(
     bench.command(CONFIGURE, 1, brightness, period, duty_cycle)
     bench.now = 100.0
     assert bench.status().temp_c == pytest.approx(40.0 + rise, abs=0.1)
-
-
-@pytest.mark.parametrize(('command', 'params', 'result'), [
-    *((REQUEST, (message_id,), DENIED) for message_id in (0, 1, 33, NAN, INF, -1, 440.5)),
-    *((SET_INTERVAL, (message_id, 1e5), DENIED) for message_id in (0, mav.INFORMATION_ID, NAN)),
-    *((SET_INTERVAL, (STATUS_ID, interval), DENIED) for interval in (NAN, INF, -INF, -2, -0.5)),
-    *((command, (), mavlink.MAV_RESULT_UNSUPPORTED) for command in (0, 80, 176, 404, 407, 65535)),
-    *((ON_OFF, (value,), DENIED) for value in (-1, 2, 0.5, 1.5, 255, NAN, INF, -INF))])
-def test_a_command_that_the_light_cannot_do_is_refused_and_changes_nothing(
-    bench: LightBench, command: int, params: tuple[float, ...], result: int,
-) -> None:
-    (ack,) = bench.command(command, *params)
-    assert ack.result == result
-    assert bench.status().enable == 0
-    assert len(bench.run(3.0).messages(IlluminatorStatus)) == 3

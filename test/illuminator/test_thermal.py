@@ -28,14 +28,6 @@ def test_the_temperature_approaches_ambient_plus_rise_times_power(
     assert (one.flags, one.output) == (0, 1.0)
 
 
-def test_the_temperature_does_not_depend_on_the_length_of_the_steps() -> None:
-    once, often = model(), model()
-    once.advance(60.0, 1.0)
-    for _ in range(600):
-        often.advance(0.1, 1.0)
-    assert once.temperature == pytest.approx(often.temperature, abs=0.01)
-
-
 def test_a_light_in_too_hot_an_environment_is_throttled_from_the_start() -> None:
     one = model(ambient=85.0)
     assert (one.flags, one.output) == (THROTTLING, 0.5)
@@ -49,17 +41,6 @@ def test_thresholds_have_a_hysteresis() -> None:
             (69.9, SHUTDOWN, 0.0), (65.1, SHUTDOWN, 0.0), (64.9, 0, 1.0)):
         one.set_temperature(temperature)
         assert (one.flags, one.output) == (flags, output), temperature
-
-
-def test_a_throttled_light_cools_and_throttles_again() -> None:
-    one = model(ambient=30.0, rise=60.0, time_constant=10.0)
-    changes = 0
-    for _ in range(3000):
-        before = one.flags
-        one.advance(0.1, 1.0)
-        changes += before != one.flags
-    assert changes >= 4
-    assert 69.0 < one.temperature < 81.0
 
 
 @pytest.mark.parametrize('wrong', [

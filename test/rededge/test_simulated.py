@@ -11,7 +11,7 @@ from typing import Any
 
 from illuminator_ros.geometry.rotation import Vector
 from illuminator_ros.mavlink.dialect import mavlink
-from illuminator_ros.mavlink.messages import Address, CommandLong, Heartbeat, heartbeat, Message
+from illuminator_ros.mavlink.messages import Address, Heartbeat, heartbeat, Message
 from illuminator_ros.payload.messages import Attitude, GeoPoint, GlobalPositionInt, SystemTime
 from illuminator_ros.rededge.messages import (
     CameraFeedback,
@@ -19,13 +19,11 @@ from illuminator_ros.rededge.messages import (
     DigicamControl,
     GpsRawInt,
     MountStatus,
-    Ping,
 )
 from illuminator_ros.rededge.simulated import (
     COLUMNS,
     FAULTS,
     Image,
-    MAX_IMAGES,
     RedEdgeProperties,
     SIMULATED,
     SimulatedRedEdge,
@@ -94,12 +92,6 @@ def test_camera_has_the_system_id_of_the_host_that_it_heard_last_re_8() -> None:
     assert camera.component.address == Address(9, 100)
     camera.component.restart(camera.now)
     assert camera.component.address == Address(255, 100)
-
-
-@pytest.mark.parametrize('message', [
-    Ping(5, 1, 7, 100), Ping(5, 1, 7, 1), CommandLong(7, 100, 512, 0, 0, 0, 0, 0, 0, 0, 0)])
-def test_answers_and_commands_are_not_answered(message: Message) -> None:
-    assert Camera().tell(message) == []
 
 
 def test_capture_is_followed_by_camera_status_and_later_by_camera_feedback() -> None:
@@ -218,27 +210,6 @@ def test_images_at_an_interval_have_its_times_and_what_was_known_then() -> None:
     assert (image.time_utc_s, image.position_source) == (OWN_UTC + 1.0, Source.OWN)
 
 
-@pytest.mark.parametrize('value', [math.nan, math.inf])
-def test_attitude_that_is_not_a_rotation_is_ignored(value: float) -> None:
-    camera = Camera(interval=1.0)
-    camera.tell(Attitude(0, value, 0.0, 0.0, 0.0, 0.0, 0.0))
-    camera.wait(3.0)
-    assert [image.attitude_source for image in camera.device.images] == [Source.NONE] * 3
-
-
-@pytest.mark.parametrize('fault', FAULTS)
-def test_no_other_fault_is_shown_than_the_one_that_was_added(fault: str) -> None:
-    device = Camera(fault).device
-    assert FAULTS.active(device.behaviour, device.normal) == [fault]
-
-
-def test_feedback_that_waits_is_bounded() -> None:
-    camera = Camera('late')
-    for _ in range(MAX_IMAGES + 2):
-        camera.tell(control(1))
-    assert [one.img_idx for one in camera.wait(15.0)] == list(range(3, MAX_IMAGES + 3))
-
-
 def console(device: SimulatedRedEdge, line: str) -> Callable[[], None]:
     """Return the change that a line of the console makes."""
     name, *words = line.split()
@@ -267,25 +238,6 @@ def test_command_of_the_console_has_its_effect(
 def test_wrong_argument_of_the_console_is_named(line: str, reason: str) -> None:
     with pytest.raises(ValueError, match=reason):
         console(Camera().device, line)
-
-
-def test_line_of_the_view_has_the_sources_of_the_next_image() -> None:
-    camera = Camera()
-    camera.image(FIX, LEVEL_NORTH)
-    text = camera.device.snapshot(camera.now).text
-    assert '1 image ' in text
-    assert text.split()[2:] == (
-        ['time', 'injected', 'position', 'injected', 'attitude', 'injected', 'mount', 'none'])
-
-
-def test_settings_make_a_camera() -> None:
-    settings = {name: SIMULATED.all_settings[name].read(text) for name, text in (
-        ('interval', '2'), ('validity', '30'), ('own_gps', 'none'))}
-    device = SIMULATED.make(settings, Address(255, 100))
-
-    assert (device.own_gps, device.properties.validity) == (None, 30.0)
-    assert device.due == 2.0
-    assert SIMULATED.make({}, Address(255, 100)).own_gps is not None
 
 
 @pytest.mark.parametrize('text', ['7.1', '7.1.x', '7.1.256', ''])
