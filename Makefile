@@ -39,7 +39,7 @@ test: $(if $(filter-out jazzy,$(ROS)),environment,check)
 	@$(PYTHON_IN_VENV) -m pytest -n 6 --dist loadfile --no-loadscope-reorder $(TESTS)
 
 unit: environment
-	@$(PYTHON_IN_VENV) -m pytest -p support.no_ros test/mavlink test/transport test/payload \
+	@$(PYTHON_IN_VENV) -m pytest -p support.no_ros test/mavlink test/transport test/geometry test/payload \
 		test/illuminator test/rededge test/gimbal test/payloads test/simulator \
 		test/conformance test/cli test/test_bounds.py test/docs/test_links.py test/docs/test_tool_pages.py \
 		test/docs/test_payload_pages.py test/docs/test_tables.py \
@@ -47,7 +47,7 @@ unit: environment
 
 coverage: environment
 	@$(PYTHON_IN_VENV) -m pytest -q -n 2 -p support.no_ros --cov --cov-report=term-missing:skip-covered \
-		test/payload test/illuminator test/gimbal
+		test/geometry test/payload test/illuminator test/gimbal
 
 check: environment
 	@$(PYTHON_IN_VENV) -m ruff check .

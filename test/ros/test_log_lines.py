@@ -38,6 +38,8 @@ def test_light_that_is_missed_found_changed_by_others_lost_and_restarted_is_logg
             light.send(heartbeat(AUTOPILOT), Address(1, 1))
             parameters.wait(brightness=100.0)
             assert parameters.set(brightness=80.0)[0].successful
+            # The test must not receive the event of this change.
+            own_ros.synchronize()
             events = parameters.events()
             light.forget()
             # Float32 rounding, heat and implausible values do not change parameters.

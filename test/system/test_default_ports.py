@@ -60,10 +60,12 @@ def commands(way: str) -> list[tuple[list[str], str]]:
 
 
 def in_this_tree(command: list[str]) -> list[str]:
-    """Return a command of the page as one that runs this tree, none where ros2 is missing."""
+    """Return a command of the page as one that runs this tree; skip the rest without ros2."""
     if command[:2] == ['ros2', 'run']:
         return [sys.executable, '-m', '.'.join(command[2:4]), *command[4:]]
-    return command if shutil.which(command[0]) else []
+    if not shutil.which(command[0]):
+        pytest.skip(f'{command[0]} is not installed, for {shlex.join(command)}')
+    return command
 
 
 @pytest.mark.parametrize('way', WAYS, ids=lambda way: way.partition('\n')[0])
@@ -74,9 +76,8 @@ def test_the_commands_of_a_way_in_print_in_an_empty_home_what_the_page_says(
            'ROS_LOG_DIR': f'{tmp_path}/log'}
     with (default_port(14590), default_port(14592), contextlib.ExitStack() as programs):
         for command, text in commands(way):
-            if not (arguments := in_this_tree(command)):
-                continue
-            program = programs.enter_context(ended(Program(*arguments, env=env, cwd=tmp_path)))
+            program = programs.enter_context(ended(Program(
+                *in_this_tree(command), env=env, cwd=tmp_path)))
             if not {'run', 'echo', '-r'} & {*command}:
                 assert program.wait() == 0, program.log
             if text:
