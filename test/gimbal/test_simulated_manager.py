@@ -172,5 +172,3 @@ def test_gm_8_it_keeps_pointing_at_the_place_while_the_vehicle_moves_until_the_n
     bench.point(0.0, -10.0, 0.0)
     bench.give(mav.Address(1, 1), moved)
     assert bench.angles() == (0.0, -10.0, 0.0)
-
-

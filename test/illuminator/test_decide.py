@@ -113,6 +113,9 @@ class Play:
 
         def done(result: Result, now: float) -> None:
             self.answers[number] = result.message
+            # A result that is shown is a success; one that another request replaces says so.
+            assert (result.success, result.permanent) == (result.message == 'shown', False)
+            assert result.superseded or not result.message.startswith('superseded by ')
 
         match step:
             case Call(values, source) | Topic(values, source):
@@ -371,7 +374,7 @@ def test_the_holder_is_reported_when_it_changes() -> None:
 
 
 def test_a_call_beyond_the_bound_is_answered_with_it() -> None:
-    play = Play([Call(ON)] * (MAX_CALLS + 1))
+    play = Play([*[Call(ON)] * (MAX_CALLS + 1), Call(b(10.0)), Topic(ON)])
 
     assert play.answers == {MAX_CALLS: '32 requests are waiting for light 1/243 already'}
 
