@@ -3,6 +3,7 @@
 
 """MAVLink payloads (lights, gimbals, MicaSense cameras) as ordinary ROS 2 devices."""
 
+from collections.abc import Callable, Mapping, Sequence
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
@@ -23,3 +24,24 @@ else:
             return version(__name__)
         except PackageNotFoundError:
             return 'unknown'
+
+
+def lazy_exports(
+    package: str, modules: Mapping[str, Sequence[str]],
+) -> Callable[[str], object]:
+    """
+    Return ``__getattr__`` of a package that imports its public names when they are used.
+
+    So a program that needs one module of the package does not wait for all (PEP 562).
+
+    :param modules: the public names, by the module of the package that has them.
+    """
+    module_of = {name: module for module, names in modules.items() for name in names}
+
+    def look_up(name: str) -> object:
+        if name not in module_of:
+            raise AttributeError(f'module {package!r} has no attribute {name!r}')
+        from importlib import import_module
+        return getattr(import_module(f'.{module_of[name]}', package), name)
+
+    return look_up

@@ -12,7 +12,7 @@ import math
 from statistics import median_high
 
 from .outcomes import fail_if, Failed, Skipped
-from .requirement import Requirement, requirement, T
+from .requirements import Requirement, requirement, T
 from .session import REJECTIONS, Session, Transaction
 from .specifications import COMMAND, HEARTBEAT, MESSAGES, ROUTING, SERIALIZATION, Specification
 from ..mavlink.dialect import mavlink, raw

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import json
 from xml.etree import ElementTree
 
-from .requirement import AnyRequirement, CheckResult, CheckVerdict
+from .requirements import AnyRequirement, CheckResult, CheckVerdict
 from .specifications import HEARTBEAT
 from .. import __version__
 

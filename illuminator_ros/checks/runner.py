@@ -12,7 +12,7 @@ from typing import Generic
 from .components import names
 from .coroutines import Interrupted
 from .outcomes import DeviceLost, Failed, Skipped
-from .requirement import CheckResult, CheckVerdict, NOT_AGREED, PayloadChecks, Requirement, T
+from .requirements import CheckResult, CheckVerdict, NOT_AGREED, PayloadChecks, Requirement, T
 from .session import Session
 
 # s

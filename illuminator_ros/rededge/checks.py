@@ -21,7 +21,7 @@ from . import conversions
 from . import messages as rededge
 from ..checks import component_requirements as component
 from ..checks.outcomes import Failed, Skipped
-from ..checks.requirement import PayloadChecks, Requirement, requirement
+from ..checks.requirements import PayloadChecks, Requirement, requirement
 from ..checks.session import Conditions, Session
 from ..checks.specifications import Specification
 from ..mavlink.dialect import mavlink

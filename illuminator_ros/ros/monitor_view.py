@@ -5,6 +5,7 @@
 The view of a payload in the monitor: how its devices are found and shown, and what keys request.
 
 A payload defines one :class:`View`. No I/O, no clock, no screen: texts have styles by name.
+The names of ``__all__`` are public.
 """
 
 from __future__ import annotations
@@ -16,6 +17,9 @@ import math
 from typing import Any, NamedTuple
 
 from std_srvs.srv import Trigger
+
+__all__ = ['Device', 'Key', 'measured', 'number', 'numbers', 'Request', 'Topic', 'trigger',
+           'trigger_key', 'View', 'WrongText']
 
 # s without topics and diagnostics of a device until its values are out of date: bridges request a
 # status after 2.5 s, and publish diagnostics once a second.

@@ -5,7 +5,7 @@
 
 from dataclasses import replace
 
-from illuminator_ros.checks.requirement import CheckVerdict
+from illuminator_ros.checks.requirements import CheckVerdict
 from illuminator_ros.illuminator.model import Configuration, Mode
 from illuminator_ros.illuminator.simulated_properties import (
     FAULTS,

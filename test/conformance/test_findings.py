@@ -10,7 +10,7 @@ from dataclasses import replace
 import math
 from typing import Any
 
-from illuminator_ros.checks.requirement import CheckVerdict
+from illuminator_ros.checks.requirements import CheckVerdict
 from illuminator_ros.cli.payloads import PAYLOADS
 from illuminator_ros.gimbal import messages as gimbal
 from illuminator_ros.gimbal.manager_setpoint import Setpoint

@@ -9,7 +9,7 @@ from collections.abc import Callable, Sequence
 import math
 from typing import Any, TypeAlias
 
-from illuminator_ros.checks.requirement import CheckVerdict, PayloadChecks
+from illuminator_ros.checks.requirements import CheckVerdict, PayloadChecks
 from illuminator_ros.gimbal.checks import device
 from illuminator_ros.gimbal.messages import GimbalDeviceSetAttitude
 from illuminator_ros.illuminator.checks import requirements as illuminator

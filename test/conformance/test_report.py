@@ -9,7 +9,7 @@ from xml.etree import ElementTree
 
 from illuminator_ros.checks import report as reports
 from illuminator_ros.checks.report import lines, RunReport, unreached
-from illuminator_ros.checks.requirement import CheckVerdict
+from illuminator_ros.checks.requirements import CheckVerdict
 from illuminator_ros.illuminator.checks.requirements import REQUIREMENTS
 from illuminator_ros.mavlink.messages import Address
 import pytest

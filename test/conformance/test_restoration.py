@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any
 
-from illuminator_ros.checks.requirement import CheckVerdict, Requirement
+from illuminator_ros.checks.requirements import CheckVerdict, Requirement
 from illuminator_ros.gimbal.manager_setpoint import Setpoint
 from illuminator_ros.illuminator.checks.requirements import REQUIREMENTS
 from illuminator_ros.illuminator.checks.session import LightSession

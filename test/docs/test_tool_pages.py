@@ -10,7 +10,7 @@ import shlex
 from typing import Any
 
 from illuminator_ros.checks.report import as_json, RunReport
-from illuminator_ros.checks.requirement import CheckResult, CheckVerdict, Requirement
+from illuminator_ros.checks.requirements import CheckResult, CheckVerdict, Requirement
 from illuminator_ros.cli.conformance.run import parse
 from illuminator_ros.cli.discover import run as discover
 from illuminator_ros.cli.payloads import PAYLOADS

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from illuminator_ros.checks.requirement import CheckVerdict
+from illuminator_ros.checks.requirements import CheckVerdict
 from illuminator_ros.gimbal.axes import Range
 from illuminator_ros.gimbal.checks import manager
 from illuminator_ros.gimbal.manager_control import ControlSettings, Role

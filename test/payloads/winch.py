@@ -14,24 +14,35 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import partial
 
-from illuminator_ros.checks.component_requirements import with_common
-from illuminator_ros.checks.requirement import PayloadChecks, requirement
-from illuminator_ros.checks.session import Session, Transaction
-from illuminator_ros.checks.specifications import MESSAGES
-from illuminator_ros.mavlink.command_sender import CommandSender
-from illuminator_ros.mavlink.component import Payload
-from illuminator_ros.mavlink.device_kind import DeviceKind
-from illuminator_ros.mavlink.dialect import mavlink
-from illuminator_ros.mavlink.messages import Address, AnyCommand, Heartbeat, Message
-from illuminator_ros.payload.attempt import Change, Sending, Served, Target
-from illuminator_ros.payload.device_property import plan_of, Property
-from illuminator_ros.payload.discovery import Discovery
-from illuminator_ros.payload.listeners import Listeners
-from illuminator_ros.payload.liveness import Liveness
-from illuminator_ros.payload.payload_type import PayloadType
-from illuminator_ros.payload.requests import Done, Goal, Request, Requests, Result, Why
-from illuminator_ros.simulation import simulated
-from illuminator_ros.simulation.faults import Behaviour
+from illuminator_ros import checks, simulation
+from illuminator_ros.mavlink import (
+    Address,
+    AnyCommand,
+    CommandSender,
+    DeviceKind,
+    Heartbeat,
+    mavlink,
+    Message,
+    Payload,
+)
+from illuminator_ros.payload import (
+    Change,
+    Discovery,
+    Done,
+    Goal,
+    Listeners,
+    Liveness,
+    PayloadType,
+    plan_of,
+    Property,
+    Request,
+    Requests,
+    Result,
+    Sending,
+    Served,
+    Target,
+    Why,
+)
 
 WinchStatus = mavlink.MAVLink_winch_status_message
 WINCH = PayloadType('winch', ros='payloads.winch_ros:WINCH', simulated='payloads.winch:SIMULATED',
@@ -150,40 +161,40 @@ class WinchClient(Payload):
 
 # The simulated device
 
-class SimulatedWinch(simulated.SimulatedDevice):
+class SimulatedWinch(simulation.SimulatedDevice):
     """A winch that releases and winds in at once."""
 
     changes = frozenset({mavlink.MAV_CMD_DO_WINCH})
     line_length = 0.0
 
-    def reports(self) -> Mapping[type[Message], simulated.Report]:
-        return {WinchStatus: simulated.Report(lambda now: WinchStatus(
+    def reports(self) -> Mapping[type[Message], simulation.Report]:
+        return {WinchStatus: simulation.Report(lambda now: WinchStatus(
             int(now * 1e6), self.line_length, 0, 0, 12, 0, 25, 1), interval=1.0)}
 
-    def execute(self, source: Address, command: AnyCommand, now: float) -> simulated.Reply:
+    def execute(self, source: Address, command: AnyCommand, now: float) -> simulation.Reply:
         if command.command != mavlink.MAV_CMD_DO_WINCH:
             return None
         length = self.line_length + command.param3
         if command.param2 != mavlink.WINCH_RELATIVE_LENGTH_CONTROL or not length >= 0:
-            return simulated.CommandReply(mavlink.MAV_RESULT_DENIED)
-        return simulated.CommandReply(mavlink.MAV_RESULT_ACCEPTED,
-                                      partial(setattr, self, 'line_length', length))
+            return simulation.CommandReply(mavlink.MAV_RESULT_DENIED)
+        return simulation.CommandReply(
+            mavlink.MAV_RESULT_ACCEPTED, partial(setattr, self, 'line_length', length))
 
-    def snapshot(self, now: float) -> simulated.Snapshot:
-        return simulated.Snapshot(f'{self.line_length:.1f} m released', (self.line_length,))
+    def snapshot(self, now: float) -> simulation.Snapshot:
+        return simulation.Snapshot(f'{self.line_length:.1f} m released', (self.line_length,))
 
 
-SIMULATED = simulated.SimulatedType(
-    'winch', 'winches', SimulatedWinch, simulated.Properties(
-        Address(1, 169), Behaviour(heartbeat_type=mavlink.MAV_TYPE_WINCH)))
+SIMULATED = simulation.SimulatedType(
+    'winch', 'winches', SimulatedWinch, simulation.Properties(
+        Address(1, 169), simulation.Behaviour(heartbeat_type=mavlink.MAV_TYPE_WINCH)))
 
 
 # The checks
 
-class WinchSession(Session):
+class WinchSession(checks.Session):
     """Releases line, and winds it in at the end."""
 
-    messages = (*Session.messages, WinchStatus)
+    messages = (*checks.Session.messages, WinchStatus)
     mav_type = mavlink.MAV_TYPE_WINCH
     before: float | None = None
 
@@ -192,7 +203,7 @@ class WinchSession(Session):
         status = await self.request(WinchStatus)
         return status.line_length if status else None
 
-    async def release(self, length: float) -> Transaction:
+    async def release(self, length: float) -> checks.Transaction:
         return await self.command(
             mavlink.MAV_CMD_DO_WINCH, 1, mavlink.WINCH_RELATIVE_LENGTH_CONTROL, length)
 
@@ -205,8 +216,8 @@ class WinchSession(Session):
         return [] if await self.length() == self.before else ['line_length']
 
 
-@requirement(
-    'release', 'releases line when commanded', MESSAGES, 'MAV_CMD_DO_WINCH', changes=True)
+@checks.requirement(
+    'release', 'releases line when commanded', checks.MESSAGES, 'MAV_CMD_DO_WINCH', changes=True)
 async def releases(winch: WinchSession) -> None:
     before = await winch.length()
     one = await winch.release(2.0)
@@ -215,5 +226,6 @@ async def releases(winch: WinchSession) -> None:
         raise one.failure(f'{before} m, then {after} m')
 
 
-CHECKS = PayloadChecks('winch', 'winch', WinchSession, 'HEARTBEAT with MAV_TYPE_WINCH',
-                       with_common((releases,), WinchStatus))
+CHECKS = checks.PayloadChecks(
+    'winch', 'winch', WinchSession, 'HEARTBEAT with MAV_TYPE_WINCH',
+    checks.with_common((releases,), WinchStatus))

@@ -5,11 +5,18 @@
 
 from __future__ import annotations
 
-from illuminator_ros.payload.requests import Result
-from illuminator_ros.ros import monitor_view as shared
+from illuminator_ros.payload import Result
+from illuminator_ros.ros import (
+    BridgeContext,
+    CommandTopic,
+    Entity,
+    monitor_view,
+    NodeEntities,
+    RosPayload,
+    ServedPayload,
+    SWITCH_QOS,
+)
 from illuminator_ros.ros.monitor_view import Device, Key, Request, Topic
-from illuminator_ros.ros.node import CommandTopic, Entity, NodeEntities, SWITCH_QOS
-from illuminator_ros.ros.payload import BridgeContext, RosPayload, ServedPayload
 from payloads.winch import WinchClient
 from std_msgs.msg import Float32
 
@@ -42,17 +49,17 @@ WINCH = RosPayload(
 
 def length(device: Device) -> str:
     """Return the released line."""
-    return shared.measured(device.values.get('line_length'), 'm')
+    return monitor_view.measured(device.values.get('line_length'), 'm')
 
 
 def release_key(device: Device, typed: str) -> Request | str:
     """Release line, m, or wind it in if negative."""
-    found = shared.numbers(typed, 1)
+    found = monitor_view.numbers(typed, 1)
     return Request(f'release {found[0]:g} m', 'cmd/release', Float32, Float32(data=found[0])) if (
         found) else f'{typed!r} is not a length'
 
 
-VIEW = shared.View(
+VIEW = monitor_view.View(
     'winch', {'line_length': Topic(Float32)}, ('line_length',), lambda device: [length(device)],
     lambda device: [('line', [f'{length(device)} released'])],
     (Key(('p',), 'release line', release_key, 'length (m, negative winds in)'),))

@@ -11,7 +11,7 @@ from dataclasses import replace
 from typing import Any
 
 from illuminator_ros.checks.coroutines import Interrupted
-from illuminator_ros.checks.requirement import (
+from illuminator_ros.checks.requirements import (
     CheckResult,
     CheckVerdict,
     PayloadChecks,

@@ -28,7 +28,7 @@ from ..termination import ENDING
 from ...checks.components import names
 from ...checks.coroutines import Main
 from ...checks.report import as_json, as_junit, catalogue, lines, remedies, RunReport, unreached
-from ...checks.requirement import AnyChecks, CheckResult, CheckVerdict
+from ...checks.requirements import AnyChecks, CheckResult, CheckVerdict
 from ...checks.runner import absence, CheckRunner
 from ...checks.session import Conditions, Session
 from ...mavlink.errors import LinkThreadError

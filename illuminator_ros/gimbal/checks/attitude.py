@@ -28,7 +28,7 @@ from .session import (
 from ..axes import CONDITIONS
 from ...checks.component_requirements import check_command_int, none_of, uptime
 from ...checks.outcomes import Failed, Skipped
-from ...checks.requirement import AnyRequirement, Check, Requirement, requirement
+from ...checks.requirements import AnyRequirement, Check, Requirement, requirement
 from ...checks.session import Transaction
 from ...checks.specifications import COMMAND, MESSAGES, Specification
 from ...geometry.mount_attitude import AXES

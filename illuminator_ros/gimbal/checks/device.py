@@ -21,7 +21,7 @@ from .. import messages as gimbal
 from ..axes import LEVEL
 from ...checks import component_requirements as component
 from ...checks.outcomes import Failed, Skipped
-from ...checks.requirement import Option, PayloadChecks, Requirement, requirement
+from ...checks.requirements import Option, PayloadChecks, Requirement, requirement
 from ...checks.session import Conditions, Session
 from ...checks.specifications import MESSAGES, ROUTING
 from ...geometry.mount_attitude import UNSET_VECTOR, Wxyz

@@ -32,7 +32,7 @@ from ..commands import Control
 from ..messages import NON_MAVLINK_IDS
 from ...checks import component_requirements as component
 from ...checks.outcomes import fail_if, Failed, Skipped
-from ...checks.requirement import PayloadChecks, Requirement, requirement
+from ...checks.requirements import PayloadChecks, Requirement, requirement
 from ...checks.session import Conditions, Session, Transaction
 from ...checks.specifications import MESSAGES, ROUTING
 from ...geometry.mount_attitude import Wxyz

@@ -24,7 +24,7 @@ from ..messages import IlluminatorStatus
 from ..model import Configuration, flag_names, float32, Mode, Status, StrobeRange
 from ...checks import component_requirements as component
 from ...checks.outcomes import fail_if, Failed, Skipped
-from ...checks.requirement import Option, PayloadChecks, Requirement, requirement
+from ...checks.requirements import Option, PayloadChecks, Requirement, requirement
 from ...checks.specifications import COMMAND, MESSAGES, ROUTING, Specification
 from ...mavlink.dialect import mavlink
 from ...mavlink.messages import Address, ComponentInformationBasic

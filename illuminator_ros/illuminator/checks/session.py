@@ -20,7 +20,7 @@ from ..model import (
 )
 from ...checks.component_requirements import restore_interval
 from ...checks.outcomes import Failed, Skipped
-from ...checks.requirement import NOT_AGREED
+from ...checks.requirements import NOT_AGREED
 from ...checks.session import Conditions, Session, Transaction
 from ...mavlink.dialect import mavlink
 from ...mavlink.messages import ComponentInformationBasic, Message
