@@ -133,7 +133,6 @@ class OrientationFeeder:
     def expect_mount(self) -> None:
         """Stop sending the fixed mount, since ``~/mount`` has a publisher."""
         self.fixed_mount = None
-        self._set_due()
 
     def set_fixed_mount(self, angles: Vector, since: float) -> None:
         """

@@ -542,7 +542,6 @@ class SimulatedComponent(Generic[D]):
             behaviour.heartbeat_type, behaviour.heartbeat_autopilot,
             behaviour.heartbeat_base_mode, behaviour.heartbeat_custom_mode,
             behaviour.heartbeat_state, messages.MAVLINK_VERSION), now)
-        self._set_due()
 
     def poll(self, now: float) -> None:
         """Do what is due."""

@@ -224,6 +224,9 @@ def test_no_request_waits_without_a_link() -> None:
         (False, 'link lost: unplugged'),
         (False, 'link lost: unplugged; the image may have been taken'),
         (False, 'link lost: unplugged'), (False, f'camera {NEW} is lost: link lost: unplugged')]
+    pings = len(rig.messages(rededge.Ping))
+    rig.run(5.0)
+    assert (len(rig.messages(rededge.Ping)), rig.state.unanswered_pings) == (pings, 0)
     rig.component.link_opened(rig.now)
     assert rig.state.loss.startswith(f'camera {NEW} is lost: no heartbeat for ')
 
