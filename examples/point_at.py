@@ -105,8 +105,9 @@ def main() -> None:
     node = PointAt(NavSatFix(latitude=latitude, longitude=longitude, altitude=altitude))
     for client in (node.enable, node.take):
         if not client.wait_for_service(4.0):
+            nodes = node.get_fully_qualified_node_names()
             sys.exit(f'{client.service_name}: no such service; nodes in the ROS domain '
-                     f'{node.context.get_domain_id()}: {", ".join(node.get_node_names())}')
+                     f'{node.context.get_domain_id()}: {", ".join(nodes)}')
     for number in (signal.SIGINT, signal.SIGTERM):
         signal.signal(number, node.stop)
     reasons = []

@@ -122,8 +122,9 @@ def main() -> None:
     search = Search()
     for client in (search.enable, search.take):
         if not client.wait_for_service(4.0):
+            nodes = search.get_fully_qualified_node_names()
             sys.exit(f'{client.service_name}: no such service; nodes in the ROS domain '
-                     f'{search.context.get_domain_id()}: {", ".join(search.get_node_names())}')
+                     f'{search.context.get_domain_id()}: {", ".join(nodes)}')
     for number in (signal.SIGINT, signal.SIGTERM):
         signal.signal(number, search.stop)
     reasons = []

@@ -90,8 +90,9 @@ def main() -> None:
     rclpy.init(signal_handler_options=SignalHandlerOptions.NO)
     light = Searchlight()
     if not light.enable.wait_for_service(4.0):
+        nodes = light.get_fully_qualified_node_names()
         sys.exit(f'{light.enable.service_name}: no such service; nodes in the ROS domain '
-                 f'{light.context.get_domain_id()}: {", ".join(light.get_node_names())}')
+                 f'{light.context.get_domain_id()}: {", ".join(nodes)}')
     for number in (signal.SIGINT, signal.SIGTERM):
         signal.signal(number, light.stop)
     failures = []

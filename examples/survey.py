@@ -56,9 +56,10 @@ class Survey(Node):
         self.said[subject] = text
 
     def name_missing(self) -> None:
+        nodes = sorted(self.get_fully_qualified_node_names())
         self.say('service', '' if self.capture.service_is_ready() else (
             f'{self.capture.service_name}: no such service; nodes in the ROS domain '
-            f'{self.context.get_domain_id()}: {", ".join(sorted(self.get_node_names()))}'))
+            f'{self.context.get_domain_id()}: {", ".join(nodes)}'))
         self.say('fix', '' if self.count_publishers(FIX) else (
             f'{self.resolve_topic_name(FIX)}: no publisher'))
         if self.waiting is not None and time.monotonic() > self.waiting[1] + TIMEOUT:

@@ -36,8 +36,9 @@ before the next is set, and before a light is switched on; "enable=false" is alw
 EPILOG = """\
 light:  brightness (%), strobe_duty_cycle (%), strobe_period (s, 0 for none), enable (true or
         false), refresh=true, release=true
-gimbal: take_control=true, roll (degrees right), pitch (degrees down), yaw (degrees left),
-        neutral=true, release_control=true, release=true
+gimbal: take_control=true, roll (degrees right), pitch (degrees down), yaw (degrees left, in
+        the frame of ~/angles: the vehicle, or the earth while the yaw is locked), neutral=true,
+        release_control=true, release=true
 camera: capture=true, capture_panel=true, ping=true
 
 examples:
