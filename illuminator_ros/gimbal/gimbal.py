@@ -490,7 +490,8 @@ class Gimbal:
             return Result(False, f'{self.setpoints.lack_of_stop}, {REQUEST_LIMIT:g} s after a '
                           'rate of zero: control is kept, and the zero is sent again')
         if field == MOVE:
-            return SENT
+            return SENT if isinstance(value, SETPOINTS) else Result(
+                False, f'{describe(one.values)}: not sent, an earlier command was under way')
         device, name = self.reports.device, GimbalDeviceAttitudeStatus.msgname
         shown = (f'{name} shows {describe_flags(device.flags)}'
                  if device.attitude_at >= one.since + STATUS_DELAY else f'no {name} came')

@@ -86,7 +86,12 @@ class LightControl:
         if self._steer(self.switch, goals.switch, now) and self._report is None:
             self._tell_automatic('')
         attempt = self.switch.attempt
-        if attempt is not None and attempt.goal.insists and (failure := attempt.failure()):
+        failure = attempt.failure() if attempt is not None and attempt.goal.insists else ''
+        for one in self._requests.live():
+            if one.is_call and 'enabled' in one.values and not one.is_served and now >= one.until:
+                self._requests.end(one, Result(False, failure or (
+                    'off not confirmed: no answer to an earlier OFF, which is sent again')), now)
+        if failure:
             if self._report is None:
                 self._tell_automatic(failure)
             else:

@@ -21,6 +21,8 @@ from ..payload.liveness import Liveness
 from ..payload.requests import Done, REPEAT_TIME, Request, Requests, Result
 
 OFF = SWITCHES[False]
+# s from an OFF call to its failure, while an OFF that insists is under way.
+INSISTENT_LIMIT = 4.0
 
 
 class UserRequests:
@@ -63,6 +65,10 @@ class UserRequests:
         elif is_held or self._is_right(new):
             if new.is_call and not is_held and not requests.are_calling:
                 self._rules.silence.calling_since = now
+            attempt = self._switch.attempt
+            if new.is_call and is_off and attempt is not None and attempt.goal.insists:
+                # It may never end, and a later call waits for the next one.
+                new.until = now + INSISTENT_LIMIT
             requests.put(new, now)
 
     def _refuse_lost(self, new: Request, now: float, *, is_off: bool, is_held: bool) -> None:

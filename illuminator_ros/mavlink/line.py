@@ -294,6 +294,9 @@ class Line:
                 self._schedule.at(self._forward_more, channel.forward_due)
             if events & selectors.EVENT_READ and not self._user.is_behind:
                 for peer, data in channel.receive(handle):
+                    # An answer to the datagram before may have shown the loss.
+                    if self._channel is not channel:
+                        return
                     if self._silent and self._silent.is_away:
                         self._silent.feed(data)
                         continue

@@ -426,7 +426,8 @@ class Attempt(Generic[S]):
     @property
     def due(self) -> float:
         """Return when :meth:`poll` has something to do, s."""
-        return min(self._end, self._repeat_due, self._requests.due)
+        return min(self._end, self._repeat_due, self._requests.due,
+                   *(one.until for one in self.serves))
 
     # The result
 

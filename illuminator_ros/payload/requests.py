@@ -344,7 +344,7 @@ class Requests:
     # Requests end
 
     def end(self, one: Request, result: Result, now: float) -> None:
-        """End a request: the only way out. A call that has succeeded claims the device."""
+        """End a request. A call that has succeeded claims the device."""
         is_known, one.is_open, one.is_served = one in self.standing, False, False
         if is_known and not (one.is_wish and self.claims.is_claimed_by(one.source)):
             self.standing.remove(one)

@@ -12,7 +12,9 @@ from typing import Any
 
 from illuminator_ros.illuminator.client import enable_all
 from illuminator_ros.illuminator.messages import STATUS_ID
+from illuminator_ros.illuminator.settings import LightSettings
 from illuminator_ros.illuminator.simulated_properties import IlluminatorProperties
+from illuminator_ros.illuminator.user_requests import INSISTENT_LIMIT
 from illuminator_ros.mavlink import messages as mav
 from illuminator_ros.mavlink.dialect import mavlink
 from illuminator_ros.payload.identity import Identity
@@ -339,3 +341,24 @@ def test_an_off_of_all_lights_reaches_each_at_once_though_one_has_not_answered_t
     three.run(0.1)
     assert not first.results
     assert {one.target_component for one in three.commands(ON_OFF, since=pressed_at)} >= {244, 245}
+
+
+@pytest.mark.parametrize(('result', 'applies', 'answer'), [
+    (mavlink.MAV_RESULT_FAILED, True, 'refused: MAV_RESULT_FAILED'),
+    (mavlink.MAV_RESULT_ACCEPTED, False, 'off not confirmed: MAV_RESULT_ACCEPTED, but '
+     'ILLUMINATOR_STATUS shows on'),
+    (None, True, 'off not confirmed: no answer to an earlier OFF, which is sent again')])
+def test_an_off_call_beside_an_automatic_off_that_never_succeeds_is_answered(
+        result: int | None, applies: bool, answer: str) -> None:
+    fake = FakeLight(enable=0)
+    pair = Pair(fake, settings=LightSettings(off_after_silence=2.0)).settle()
+    assert pair.enable(True).success
+    fake.results, fake.applies = {mavlink.MAV_CMD_ILLUMINATOR_ON_OFF: result}, applies
+    pair.run(5.0)
+
+    failed = pair.ask_enable(False)
+    pair.run(INSISTENT_LIMIT)
+    assert [one.message for one in failed.results] == [answer]
+
+    fake.results, fake.applies = {}, True
+    assert pair.enable(False).success

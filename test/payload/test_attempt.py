@@ -267,3 +267,14 @@ def test_a_restart_confirms_nothing_and_a_command_that_may_be_repeated_is_sent_a
     assert bench.ended.message == (
         f'{text}; the device restarted meanwhile ({timing(tries, ended_at)})')
     assert bench.tries[1:3] == [0.1, 0.35][:tries - 1]
+
+
+def test_each_request_ends_at_its_own_time_though_another_waits_longer() -> None:
+    bench = CommandBench()
+    first, second = (Request({'level': 5}, Why.REQUEST, 0.0, is_call=True, until=until)
+                     for until in (2.0, 3.0))
+    attempt: Attempt[int | None] = Attempt(
+        bench.target(), LEVEL_5, Goal(5, (first, second), 3.0), {first: LEVEL_5, second: LEVEL_5},
+        0.0, gap=0.5)
+    assert attempt.due <= 2.0
+    assert [one.request for one in attempt.poll(2.0)] == [first]

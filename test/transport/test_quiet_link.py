@@ -5,10 +5,12 @@
 
 from __future__ import annotations
 
+import errno
 import socket
 from typing import Any
 
 from illuminator_ros.mavlink import component
+from illuminator_ros.mavlink.connector import Connector
 from illuminator_ros.mavlink.frame import Decoder, Frame
 from illuminator_ros.mavlink.messages import Address, CommandLong
 from illuminator_ros.mavlink.signing import stamp_of, ticks
@@ -135,3 +137,24 @@ def test_line_that_takes_nothing_makes_no_work_and_drops_are_counted(
     assert rests(link)
     assert link.state().traffic.frames_dropped > 0
     assert link.state().traffic.frames_sent >= 3000
+
+
+def test_a_line_that_is_lost_by_an_answer_to_a_datagram_reads_no_other_and_stays_silent(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    link, endpoint = simulated()
+    [line] = link.lines
+    link.run(1.0)
+    monkeypatch.setattr(Connector, 'start', lambda self: None)
+
+    def fail(*arguments: object) -> None:
+        raise OSError(errno.ENETUNREACH, 'Network is unreachable')
+
+    monkeypatch.setattr(link.udp, 'send', fail)
+    # Each new peer is sent a heartbeat.
+    link.receive((BEAT, PEER), (BEAT, ('127.0.0.1', 2)))
+    announced = len(endpoint.announcements)
+    link.run(6.0)
+
+    assert not line.is_open
+    assert len(endpoint.announcements) == announced
