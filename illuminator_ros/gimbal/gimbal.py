@@ -300,7 +300,7 @@ class Gimbal:
             self._end_one(served.request, served.result, now)
         self.requests.answer(now)
         self.control.answer(now)
-        self._set_due()
+        self._set_due(now)
 
     def _end_one(self, one: Request, result: Result, now: float) -> None:
         (field, value), = one.values.items()
@@ -318,14 +318,10 @@ class Gimbal:
             result = self.reports.explained(result, describe(one.values), now)
         (self.control if field == CONTROL else self.requests).end(one, result, now)
 
-    @property
-    def _standing(self) -> list[Request]:
-        return self.requests.standing + self.control.standing
-
     def _end(self, message: str, now: float, *fields: str, superseded: bool = False) -> None:
         """End the open requests for some fields."""
         result = Result(False, message, superseded=superseded)
-        for one in self._standing:
+        for one in self.requests.standing + self.control.standing:
             if one.is_open and not one.values.keys().isdisjoint(fields):
                 self._end_one(one, result, now)
 
@@ -345,7 +341,7 @@ class Gimbal:
         if settings.sources:
             self.requests.claims.set_lease(settings.sources.timeout)
             self._expire(now)
-        self._set_due()
+        self._set_due(now)
 
     # Sources
 
@@ -469,9 +465,8 @@ class Gimbal:
 
         self.update(now)
         self._expire(now)
-        for one in self._standing:
-            if one.is_open and not one.is_served and now >= one.until:
-                self._end_one(one, self._out_of_time(one), now)
+        for one in self.requests.late(now) + self.control.late(now):
+            self._end_one(one, self._out_of_time(one), now)
         self._step(now, self._commanded.poll(now))
         if self.reports.in_control:
             self.setpoints.poll(now, may_stop=not self._commanded.may_move)
@@ -481,7 +476,7 @@ class Gimbal:
             if control.primary is None:
                 self._request_control(True, now, taken)
         self.reports.poll(now)
-        self._set_due()
+        self._set_due(now)
 
     def _out_of_time(self, one: Request) -> Result:
         """Return the result of a request that has ended without a command."""
@@ -499,15 +494,14 @@ class Gimbal:
         return Result(
             False, f'{value.goal} not confirmed: {shown} within {LOCK_LIMIT:g} s{advice}')
 
-    def _set_due(self) -> None:
+    def _set_due(self, now: float) -> None:
         """Have :meth:`poll` called when it is due."""
         reports = self.reports
         if self._take_due and reports.is_connected and reports.control is not None:
             due = -math.inf
         else:
-            due = min(*(time for one in self._standing if one.is_open and not one.is_served
-                        for time in (one.due, one.until) if time > -math.inf),
-                      self.requests.claims.due, self._commanded.due, reports.due,
+            due = min(self.requests.next_due(now), self.control.next_due(now),
+                      self._commanded.due, reports.due,
                       self.setpoints.due(may_stop=not self._commanded.may_move)
                       if reports.in_control else math.inf)
         self._commands.schedule.at(self.poll, due)

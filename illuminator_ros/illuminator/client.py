@@ -9,7 +9,7 @@ from collections.abc import Callable, Collection, Mapping, Sequence
 import functools
 import itertools
 
-from .commands import SWITCHES
+from .commands import OFF
 from .events import LightEvent
 from .light import Light
 from .messages import IlluminatorStatus
@@ -140,7 +140,7 @@ class IlluminatorClient(Payload):
     def may_send_at_end(self, sent: Command | Message) -> bool:
         """See :meth:`Payload.may_send_at_end`."""
         return (isinstance(sent, Command) and sent.command == mavlink.MAV_CMD_ILLUMINATOR_ON_OFF
-                and sent.params == SWITCHES[False].params)
+                and sent.params == OFF.params)
 
     def close(self, now: float) -> None:
         """See :meth:`Payload.close`."""

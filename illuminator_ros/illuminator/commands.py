@@ -57,6 +57,7 @@ SWITCHES = {on: Change[Status](
     sending=Sending.UNTIL_ACKNOWLEDGED if on else Sending.UNTIL_OBEYED,
     shown_by=partial(_shows_switch, on), actual=_shown_switch,
     evidence=partial(_switch_evidence, on)) for on in (False, True)}
+ON, OFF = SWITCHES[True], SWITCHES[False]
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -9,7 +9,7 @@ from collections.abc import Callable, Iterable, Mapping
 import math
 
 from . import events
-from .commands import Configure, SWITCHES
+from .commands import Configure, OFF, ON, SWITCHES
 from .decide import decide, Goals
 from .model import FIELDS, Status
 from .rules import Rules
@@ -18,8 +18,6 @@ from .user_requests import not_reported
 from ..payload.attempt import Change, Served, Target
 from ..payload.device_property import plan_of, Property
 from ..payload.requests import Goal, Request, Requests, Result, WEAK, Why
-
-ON, OFF = SWITCHES[True], SWITCHES[False]
 
 
 def _waits(one: Request, goal: Goal, name: str) -> bool:
@@ -87,8 +85,8 @@ class LightControl:
             self._tell_automatic('')
         attempt = self.switch.attempt
         failure = attempt.failure() if attempt is not None and attempt.goal.insists else ''
-        for one in self._requests.live():
-            if one.is_call and 'enabled' in one.values and not one.is_served and now >= one.until:
+        for one in self._requests.late(now):
+            if 'enabled' in one.values:
                 self._requests.end(one, Result(False, failure or (
                     'off not confirmed: no answer to an earlier OFF, which is sent again')), now)
         if failure:

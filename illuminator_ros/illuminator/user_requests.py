@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable
 
 from . import events
-from .commands import SWITCHES
+from .commands import OFF
 from .model import checked, FIELDS, Status
 from .rules import Rules
 from .twin import Twin
@@ -20,7 +20,6 @@ from ..payload.device_property import Property
 from ..payload.liveness import Liveness
 from ..payload.requests import Done, REPEAT_TIME, Request, Requests, Result
 
-OFF = SWITCHES[False]
 # s from an OFF call to its failure, while an OFF that insists is under way.
 INSISTENT_LIMIT = 4.0
 

@@ -442,6 +442,11 @@ class Requests:
             self._report(change, now)
         return change
 
+    def late(self, now: float) -> list[Request]:
+        """Return the open requests whose time is over, and that no attempt will end."""
+        return [one for one in self.standing
+                if one.is_open and not one.is_served and now >= one.until]
+
     def next_due(self, now: float) -> float:
         """Return when a request becomes due or is late next, or when a claim ends, s."""
         due = self.claims.due if self.are_ranked else math.inf

@@ -274,7 +274,7 @@ ROWS: dict[str, Row] = {
     'a place of a topic ends a pose': row(
         'manager mute, mark, neutral, 0.1, manager answers, topic place, 3', 'neutral place',
         'place', 'superseded by point at 47'),
-    # What a topic repeats.
+    # Repeated messages of topics.
     'an equal attitude that is shown is not sent': row(
         'level, 3, mark, level, 3', '', '', 'repeated'),
     'nor angles that leave axes': row('down, 3, mark, down, 3', ''),
@@ -303,7 +303,7 @@ ROWS: dict[str, Row] = {
         'rate, 0.1, manager deaf, 20, mark, manager hears, 3', 'zero'),
     'with a zero that is lost': row(
         'rate, 0.1, manager deaf, zero, 20, mark, manager hears, 3', 'zero'),
-    'with one that is lost, at once': row(
+    'with a lost zero, at once': row(
         'rate, 0.1, manager deaf, zero, mark, manager hears, 0.3', 'zero', lasts=30.0),
     'with an attitude that is lost': row(
         'rate, 0.1, manager deaf, level, 2, mark, manager hears, 3', 'attitude 0'),
@@ -421,7 +421,7 @@ ROWS: dict[str, Row] = {
         'place field', 'operator, place', *['MAV_RESULT_ACCEPTED'] * 2, **SHARED),
     'a place ends with the release of its source': row(
         'safety place, 1, mark, frees safety, 1', 'zero', **SHARED),
-    'one that is under way too': row(
+    'a place under way too': row(
         'manager mute, safety place, mark, frees safety, 1', 'zero', '', **SHARED),
     'with its silence': row('safety topic place, mark, 3', 'zero', timeout=1.0, **SHARED),
     'one under way with its silence': row(
@@ -465,7 +465,7 @@ ROWS: dict[str, Row] = {
         'rate, device mute, mark, give, 0.5, rate, level, down, neutral, place, 6', 'zero',
         'turns', 'no attitude shows', *[BEING_RELEASED] * 5),
     'a release stops a place': row('place, 1, mark, give, 1', 'zero control'),
-    'also one that was refused after it': row(
+    'also a place that was refused after it': row(
         'place, 1, manager denies, field, 1, mark, give, 1', 'zero control'),
     'one that a refused place has replaced': row(
         'manager mute, place, manager answers, manager denies, field, 3, mark, give, 1',

@@ -255,7 +255,7 @@ ROWS: dict[str, Row] = {
         enable=1),
     'the off of a release is sent to a light that is off': row(
         'operator off, 2, mark, release operator, 1', 'off', 'off', **OFF),
-    'and to one that is on unseen': row(
+    'and to a light that is on unseen': row(
         'operator off, 2, light still, light on, mark, release operator, 1', 'off', 'off', **OFF),
     'and where an on is under way': row(
         'light late 1.2, operator on, release operator, 8', 'off', **OFF),
@@ -328,7 +328,7 @@ ROWS: dict[str, Row] = {
     'a light that is lost during its off': row(
         'default calls on, 1, is ON_OFF failed, 4.5, close, 6, is ON_OFF obeyed, open, 2',
         'off, default', **SILENT),
-    'an on that takes effect late is no request': row(
+    'an on that takes effect late is not a request': row(
         'default calls off, 0.5, is ON_OFF lost, default calls on, 3, is ON_OFF obeyed, '
         'light on, 1.2',
         'on, default', **SILENT),
@@ -336,7 +336,7 @@ ROWS: dict[str, Row] = {
         'default calls off, 0.5, is ON_OFF lost, default calls on, 3, is ON_OFF obeyed, '
         'light on, 1.9',
         'off, default', **SILENT),
-    'a release is no request': row(
+    'a release is not a request': row(
         'safety off, 3, operator on, 0.5, release safety, 4, release safety, 3', 'off, operator',
         silence=6.0),
     'nor is a state that is sent for a source': row(
@@ -364,14 +364,14 @@ ROWS: dict[str, Row] = {
         'off, default', **SILENT),
     'and is sent once if it is': row('default on, 2, light hot, 1.1, mark, 10', 'off, default',
                                      'off', **SILENT),
-    'so is that of a release': row(
+    'so is the off of a release': row(
         'default on, 2, light hot, 1.1, is ON_OFF rejected, release default, 5, is ON_OFF obeyed, '
         'light lit, 4', 'off', **OFF),
     # Lights whose brightness is the switch.
     'a brightness before an off is not sent after it': row(
         LEARN + 'is CONFIGURE lost lost obeyed, default dims 30, default dims 35, 0.05, '
         'default calls off, 10', 'off, default', **SWITCH),
-    'nor is one that is restored': row(
+    'nor is a restored brightness': row(
         LEARN + 'is CONFIGURE lost obeyed, restart on, 1.05, default calls off, 10',
         'off, default', **SWITCH),
     'nor after a takeover': row(

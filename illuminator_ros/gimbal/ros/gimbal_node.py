@@ -88,8 +88,6 @@ CMD_ROI = Entity(
     'cmd/roi', NavSatFix, 'a place to point at (MAV_CMD_DO_SET_ROI_LOCATION); its altitude is '
     'above the ellipsoid. Set `geoid_separation`: until then the diagnostics warn while the '
     'gimbal points at a place', ros_node.SWITCH_QOS)
-
-
 FIX = Entity(
     'fix', NavSatFix, 'position of the vehicle, for places, where its autopilot sends none; '
     'ignored without a fix')
