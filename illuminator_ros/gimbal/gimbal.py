@@ -466,7 +466,7 @@ class Gimbal:
         self.update(now)
         self._expire(now)
         for one in self.requests.late(now) + self.control.late(now):
-            self._end_one(one, self._out_of_time(one), now)
+            self._end_one(one, self._out_of_time(one, now), now)
         self._step(now, self._commanded.poll(now))
         if self.reports.in_control:
             self.setpoints.poll(now, may_stop=not self._commanded.may_move)
@@ -478,12 +478,14 @@ class Gimbal:
         self.reports.poll(now)
         self._set_due(now)
 
-    def _out_of_time(self, one: Request) -> Result:
+    def _out_of_time(self, one: Request, now: float) -> Result:
         """Return the result of a request that has ended without a command."""
         (field, value), = one.values.items()
         if field == CONTROL:
+            state = (self.reports.lack_of_control(now)
+                     or 'control is kept, and the zero is sent again')
             return Result(False, f'{self.setpoints.lack_of_stop}, {REQUEST_LIMIT:g} s after a '
-                          'rate of zero: control is kept, and the zero is sent again')
+                          f'rate of zero: {state}')
         if field == MOVE:
             return SENT if isinstance(value, SETPOINTS) else Result(
                 False, f'{describe(one.values)}: not sent, an earlier command was under way')

@@ -458,7 +458,10 @@ ROWS: dict[str, Row] = {
         'control released, confirmed'),
     'and fails if that is not shown': row(
         'rate, device mute, mark, give, 10', 'zero', 'turns',
-        'no attitude shows that the gimbal stands, 5 s after'),
+        'no attitude shows that the gimbal stands, 5 s after a rate of zero: control is kept'),
+    'and names the component that has taken control': row(
+        'rate, device mute, mark, give, 1, other, 6', 'zero', 'turns',
+        'no attitude shows that the gimbal stands, 5 s after a rate of zero: no control of'),
     'and if it still turns': row(
         'rate, manager deaf, mark, give, 5.1', 'zero', 'turns', 'the gimbal still turns'),
     'meanwhile nothing moves it': row(
