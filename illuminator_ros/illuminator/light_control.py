@@ -262,6 +262,9 @@ class LightControl:
 
     def restarted(self, status: Status, now: float) -> None:
         """Take the first status after a restart, which confirms nothing."""
+        if not self._rules.settings.restore_configuration:
+            # Its command would bring back the fields that nobody asks for.
+            self._withdrawn(self.configuration.withdraw('the light restarted', now), now)
         attempt, wanted = self.configuration.attempt, self._twin.agreed
         if attempt is not None:
             # A set ends before the fence of the restart, and its values must not be lost with it.

@@ -453,6 +453,26 @@ def test_after_a_restart_the_configuration_is_sent_and_the_light_stays_off(
     assert agreed.recorder.changes[-1] == (ChangeCause.LIGHT, {'brightness': 66.0})
 
 
+@pytest.mark.parametrize('restores', [True, False])
+def test_a_set_under_way_at_a_restart_brings_other_fields_back_only_with_a_restored_configuration(
+    fake: FakeLight, restores: bool,
+) -> None:
+    pair = Pair(fake, settings=LightSettings(restore_configuration=restores)).settle()
+    assert pair.configure(strobe_period=2, strobe_duty_cycle=40).success
+    fake.results[CONFIGURE] = [None, ACCEPTED]
+    at = pair.now
+    answer = pair.ask_configure(brightness=60.0)
+    pair.run(0.1)
+
+    fake.restart(pair.now, brightness=20.0)
+    pair.run(5.0)
+
+    # The first was sent before the restart.
+    assert {one[2:] for one in sent(pair, since=at)[1:]} == {(2, 40) if restores else (0, 0)}
+    assert len(answer.results) == 1
+    assert fake.fields['brightness'] == 60.0
+
+
 def test_after_a_restart_a_light_that_kept_its_configuration_is_sent_nothing(
     fake: FakeLight, agreed: Pair,
 ) -> None:
