@@ -88,7 +88,8 @@ def usage(executable: Executable) -> str:
     examples = ''.join(f'  {line}\n' for line in kind.examples)
     examples = examples and f'{examples}\n'
     return f"""\
-usage: {name} [-h | --version] [URL] [--ros-args -p NAME:=VALUE ... | --params-file FILE]
+usage: {name} [-h | --version] [URL]
+       [--ros-args [-p NAME:=VALUE ...] [--params-file FILE] [-r __ns:=/NAMESPACE]]
 
 Runs the ROS 2 node /{kind.node_name} for {kind.summary}.
 
@@ -150,8 +151,8 @@ def _run(arguments: list[str], termination: Termination, executable: Executable)
     url = own.pop(0) if own and not own[0].startswith('-') and ':=' not in own[0] else ''
     if own:
         raise Refusal(
-            f'unknown argument {own[0]!r}; parameters follow --ros-args -p, see '
-            f'{executable.name} --help')
+            f'unknown argument {own[0]!r}; parameters and names follow --ros-args, as in '
+            f'"--ros-args -r __ns:=/uav1 -p NAME:=VALUE", see {executable.name} --help')
     arguments = [argument for argument in arguments if argument != url]
     return _serve(arguments, url, termination, executable)
 

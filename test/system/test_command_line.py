@@ -61,10 +61,10 @@ def test_help_names_every_parameter_option_and_form_of_url() -> None:
 
 # The arguments of a program, and the content of the line; KEYS is a folder of bad files.
 @pytest.mark.parametrize(('name', 'arguments', 'text'), [
-    ('bridge', '--banana', "unknown argument '--banana'; parameters follow --ros-args -p"),
+    ('bridge', '--banana', "unknown argument '--banana'; parameters and names follow --ros-args"),
     ('bridge', '--ros-args -p brightness:=60 -- udpin://127.0.0.1:1 more', "argument 'more'"),
     ('bridge', 'http://x', "unknown scheme 'http'"),
-    ('bridge', 'brightness:=60', "'brightness:=60'; parameters follow --ros-args -p, see"),
+    ('bridge', 'brightness:=60', "'brightness:=60'; parameters and names follow --ros-args"),
     ('bridge', 'udpin://127.0.0.1:1 --ros-args -p connection_url:=udpin://127.0.0.1:2',
      "'udpin://127.0.0.1:2', but the argument is 'udpin://127.0.0.1:1': give one of them only"),
     *(('bridge', f'--ros-args {arguments}', text) for arguments, text in (

@@ -152,8 +152,8 @@ def shared_topics(graph: Topics) -> Iterable[str]:
 def why_unused(name: Input, snapshot: InputSnapshot) -> str:
     """Return why an input that was received is refused, stale or not sent, for people."""
     if snapshot.state is InputState.UNSENT:
-        return (f'~/{name.value}: received, and not sent, since the link has no room: lower the '
-                'rates of the inputs, or raise the baud rate')
+        return (f'~/{name.value}: received, and not sent: the line has no room (lower the rates of '
+                'the inputs, or raise the baud rate), or no camera was heard yet on a UDP link')
     if snapshot.state is InputState.REFUSED or snapshot.age is None:
         return (f'~/{name.value} refused {format_seconds(snapshot.refused_age or 0.0)} ago: '
                 f'{snapshot.refusal}')
