@@ -312,7 +312,7 @@ def why_nothing_is_heard(link: LinkDiagnostics, device: str) -> str:
     if frames:
         heard = described(link.state.traffic.sources, link.heartbeats, link.known)
         return (f'{frames} frames from {heard}, none from {device}: check that it is on, and that '
-                'routers forward its frames')
+                'routers forward its frames; discover names the node for each device')
     if bytes_:
         return f'{bytes_} bytes received, no valid frame; check the baud rate (discover)'
     return ('nothing is received: check that the device is on, and that it, or a router, sends '

@@ -213,7 +213,8 @@ UNADDRESSABLE = frame_of(heartbeat(mavlink.MAV_TYPE_ILLUMINATOR), 0, Address(0, 
      r'111 bytes received, no valid frame; check the baud rate \(discover\)'),
     (SigningMode.OFF, [FOREIGN, frame_of(heartbeat(mavlink.MAV_TYPE_GCS), 0, Address(255, 190))],
      r'2 frames from 1/1 \(autopilot, PX4\) and 255/190 \(ground station\), none from a light: '
-     'check that it is on, and that routers forward its frames'),
+     'check that it is on, and that routers forward its frames; discover names the node for '
+     'each device'),
     (SigningMode.OFF, [FOREIGN, UNADDRESSABLE], '0/243 heard, whose system id 0 cannot be '
      'addressed: set its system id, such as 1'),
     (SigningMode.REQUIRE, [FOREIGN], '1 frames refused because they are not signed: sign '
