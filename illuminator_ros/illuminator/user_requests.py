@@ -79,8 +79,9 @@ class UserRequests:
             self._switch.note_sent(OFF, now)
         refusal = requests.refusal(new.source) or liveness.loss(
             f'light {self._target.address}', now)
-        requests.reply(new, Result(
-            False, refusal + ('; an OFF was sent once' if is_sent else '')))
+        if is_sent:
+            refusal += '; an OFF was sent once, and the light may still be on'
+        requests.reply(new, Result(False, refusal))
         if new.is_wish and is_off:
             new.is_open = new.may_be_repeated = False
             requests.put(new, now)

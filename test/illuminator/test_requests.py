@@ -109,7 +109,7 @@ def test_requests_to_a_lost_light_fail_at_once_with_the_reason(
     # It may hear an OFF though it is not heard.
     answer = faked.ask_enable(False)
     assert answer.result.message == f'light 1/243 is lost: {reason}' + (
-        '' if is_closed else '; an OFF was sent once')
+        '' if is_closed else '; an OFF was sent once, and the light may still be on')
     assert [one.param1 for one in faked.commands()[sent:]] == [0.0] * (not is_closed)
 
 
