@@ -364,6 +364,7 @@ class Graph:
 
 def _taken(subscription: Subscription, limit: int = 1) -> Iterator[Any]:
     """Return messages that have come; skip large and broken ones."""
+    # An executor would deserialize each one, and would wake the view for each.
     for _ in range(limit):
         if (taken := subscription.handle.take_message(subscription.msg_type, True)) is None:
             return
