@@ -7,7 +7,8 @@ The parameter services of a node whose parameters are kept by a device.
 rclpy's own answer from synchronous callbacks: while one waits for the device, the executor
 is blocked, and each parameter of a list needs a command of its own. Here a set waits for the
 device's acknowledgement without blocking, and the values of one call are one command. The
-executor's thread checks them, so that a request costs the link's thread one call at most.
+executor's thread checks them, so that a request costs the link's thread one call for the node,
+and one for the device.
 """
 
 from __future__ import annotations
@@ -45,8 +46,6 @@ QUEUE_DEPTH = 100
 # Sets values in the device, in the link's thread, given the time (s); calls its last argument
 # once with '' or why the values were not set.
 ConfigureDevice = Callable[[Values, float, Callable[[str], None]], None]
-# Changes the node or its device, in the link's thread, given the time (s).
-ApplyChange = Callable[[float], None]
 # Raises ValueError if a parameter cannot have a value, given its name.
 CheckValue = Callable[[str, object], object]
 
@@ -77,7 +76,7 @@ class ParameterServices:
         self._configure = configure
         self._changeable = changeable
         self._link = link
-        self._calls, self._own_calls = LinkCalls(link, log), LinkCalls(link, log)
+        self._calls = LinkCalls(link, log)
         qos = QoSProfile(depth=QUEUE_DEPTH,
                          reliability=qos_profile_services_default.reliability)
 
@@ -149,7 +148,7 @@ class ParameterServices:
 
         All those of the node are one change of it, and all those of the device one command.
 
-        :param atomically: set all or none. Those of the node are set first: they can be put back.
+        :param atomically: set all or none, which is possible for the node or for the device.
         """
         if not self._is_short(messages):
             answer([f'{len(messages)} parameters are more than {MAX_NAMES}'])
@@ -160,85 +159,59 @@ class ParameterServices:
                 for message, reason in zip(messages, reasons, strict=True) if not reason}
         reasons = [reason or _replacement(message, last[message.name])
                    for message, reason in zip(messages, reasons, strict=True)]
-        if atomically and any(reasons):
-            answer(reasons)
-            return
         of_device = {name: _value(message) for name, message in last.items()
                      if name in self._device.specs}
         own = [self._parameter(message) for name, message in last.items() if name not in of_device]
-        before = [self._node.get_parameter(parameter.name) for parameter in own]
-        failures, change, undo = self._set_own(own, atomically)
+        if atomically and own and of_device and not any(reasons):
+            reasons = [f'set {", ".join(of_device)} of the device in a request without others']
+        if atomically and any(reasons):
+            answer(reasons)
+            return
+        failures = self._set_own(own, atomically) if own else {}
 
         def done(refusals: Mapping[str, str]) -> None:
             answer([reason or failures.get(message.name, '') or refusals.get(message.name, '')
                     for message, reason in zip(messages, reasons, strict=True)])
 
-        def put_back(refusals: Mapping[str, str]) -> None:
-            # Not those that another request has set meanwhile, such as a tighter limit.
-            _, changed_back, _ = self._set_own(
-                [old for old, new in zip(before, own, strict=True)
-                 if self._node.get_parameter(new.name).value == new.value], True)
-            self._link.call(changed_back)
-            done(refusals)
-
-        def made(refusals: Mapping[str, str]) -> None:
-            refused = {name for name, refusal in refusals.items() if refusal}
-            if before and refused and (atomically or not refused <= of_device.keys()):
-                self._device.call(functools.partial(put_back, refusals))
-            else:
-                done(refusals)
-
-        if atomically and failures or not of_device and change is _no_change:
-            done({})
+        if of_device:
+            self._calls.ask(
+                functools.partial(self._set_device, of_device, atomically), done,
+                lambda reason: dict.fromkeys(of_device, reason))
         else:
-            # Own parameters are set by now, and few requests without others wait at any time.
-            (self._calls if of_device else self._own_calls).ask(
-                functools.partial(self._make, change, undo, of_device, atomically), made,
-                lambda reason: dict.fromkeys(last, reason))
+            done({})
 
     def _set_own(
         self, parameters: Sequence[Parameter], atomically: bool,
-    ) -> tuple[dict[str, str], ApplyChange, ApplyChange]:
-        """
-        Set parameters of the node itself.
-
-        :return: by name why some were not set; the change for the link, and how it is undone.
-        """
-        failures: dict[str, str] = {}
-        before = self._changeable.values if self._changeable else {}
-        if parameters:
-            result = self._node.set_parameters_atomically([*parameters])
-            if not result.successful and (atomically or len(parameters) == 1):
-                failures = {parameters[0].name: str(result.reason)}
-            elif not result.successful:
-                results = ((one.name, self._node.set_parameters_atomically([one]))
-                           for one in parameters)
-                failures = {name: str(one.reason) for name, one in results if not one.successful}
-        changeable = self._changeable
-        if changeable is None or changeable.values == before:
-            return failures, _no_change, _no_change
-        return (failures, functools.partial(changeable.change, changeable.values),
-                functools.partial(changeable.change, before))
+    ) -> Mapping[str, str]:
+        """Set parameters of the node itself; return by name why some were not set."""
+        changeable, failures = self._changeable, dict[str, str]()
+        before = changeable.values if changeable else {}
+        result = self._node.set_parameters_atomically([*parameters])
+        if not result.successful and (atomically or len(parameters) == 1):
+            failures = {parameters[0].name: str(result.reason)}
+        elif not result.successful:
+            results = ((one.name, self._node.set_parameters_atomically([one]))
+                       for one in parameters)
+            failures = {name: str(one.reason) for name, one in results if not one.successful}
+        if changeable and changeable.values != before:
+            self._link.call(functools.partial(changeable.change, changeable.values))
+        return failures
 
     # In the link's thread
 
-    def _make(
-        self, change: ApplyChange, undo: ApplyChange, of_device: Values, atomically: bool,
-        now: float, answer: Callable[[Mapping[str, str]], None],
+    def _set_device(
+        self, values: Values, atomically: bool, now: float,
+        answer: Callable[[Mapping[str, str]], None],
     ) -> None:
-        """Change the node and the device; answer by name why the device's were not set."""
-        change(now)
+        """Set parameters of the device; answer by name why some were not set."""
         refusals: dict[str, str] = {}
-        for name, value in of_device.items():
+        for name, value in values.items():
             try:
                 self._check_by_device(name, value)
             except ValueError as error:
                 refusals[name] = str(error)
-        allowed = {name: value for name, value in of_device.items() if name not in refusals}
-        if atomically and refusals:
-            undo(now)
-            answer(refusals)
-        elif allowed:
+        allowed = {name: value for name, value in values.items() if name not in refusals}
+        if allowed and not (atomically and refusals):
             self._configure(allowed, now, lambda refusal: answer(
                 {**dict.fromkeys(allowed, refusal), **refusals}))
         else:
@@ -278,10 +251,6 @@ class ParameterServices:
         except ValueError as error:
             return str(error)
         return ''
-
-
-def _no_change(now: float) -> None:
-    pass
 
 
 def _result(reason: str) -> SetParametersResult:

@@ -1,7 +1,7 @@
 # Copyright 2026 The illuminator_ros developers
 # SPDX-License-Identifier: Apache-2.0
 
-"""A request to the parameter services is one call of the link; the executor does the rest."""
+"""A request to the parameter services is few calls of the link; the executor does the rest."""
 
 from __future__ import annotations
 
@@ -96,24 +96,34 @@ def served(ros: Ros) -> Iterator[Served]:
     made.node.destroy_node()
 
 
-@pytest.mark.parametrize('atomically', [False, True])
-def test_all_values_of_a_request_are_one_call_one_change_and_one_command(
-    served: Served, atomically: bool,
-) -> None:
-    repeated = [] if atomically else [
-        (name, float(number)) for number in range(MAX_NAMES // 4) for name in (
-            'limit', 'brightness')]
+def test_all_values_of_a_request_are_one_change_and_one_command(served: Served) -> None:
+    repeated = [(name, float(number)) for number in range(MAX_NAMES // 4) for name in (
+        'limit', 'brightness')]
     served.set_parameters(
-        *repeated, ('limit', 60.0), ('silence', 5.0), ('brightness', 50.0), atomically=atomically)
+        *repeated, ('limit', 60.0), ('silence', 5.0), ('brightness', 50.0))
 
-    assert served.run_link() == 1
+    assert served.run_link() == 2
     assert served.changes == [{'limit': 60.0, 'silence': 5.0}]
     assert served.commands == [{'brightness': 50.0}]
     [answer] = served.answers
-    if not atomically:
-        reasons = [result.reason for result in answer.results]
-        assert reasons == [f'{name} has another value later in the request'
-                           for name, _ in repeated] + [''] * 3
+    assert [result.reason for result in answer.results] == [
+        f'{name} has another value later in the request' for name, _ in repeated] + [''] * 3
+
+
+def test_parameters_of_node_and_device_are_not_set_atomically_in_one_request(
+    served: Served,
+) -> None:
+    served.set_parameters(('limit', 60.0), ('brightness', 50.0), atomically=True)
+
+    [answer] = served.answers
+    assert answer.result.reason == 'set brightness of the device in a request without others'
+    assert (served.run_link(), served.values('limit')) == (0, [100.0])
+
+    served.set_parameters(('limit', 60.0), ('silence', 5.0), atomically=True)
+    served.set_parameters(('brightness', 50.0), atomically=True)
+    served.run_link()
+    assert served.changes == [{'limit': 60.0, 'silence': 5.0}]
+    assert served.commands == [{'brightness': 50.0}]
 
 
 @pytest.mark.parametrize('values', [
@@ -129,33 +139,6 @@ def test_request_that_is_too_long_or_wrong_is_answered_without_the_link(
     result = answer.result if atomically else answer.results[0]
     assert not result.successful
     assert served.values('limit') == [100.0]
-
-
-def test_change_that_the_device_refuses_is_put_back_before_the_answer(
-    served: Served,
-) -> None:
-    served.refusal = 'denied'
-    served.set_parameters(('limit', 60.0), ('brightness', 50.0), atomically=True)
-    served.run_link()
-    assert served.answers == []
-    served.executor.spin_once()
-
-    assert served.answers[0].result.reason == 'denied'
-    assert served.values('limit') == [100.0]
-    served.run_link()
-    assert [change['limit'] for change in served.changes] == [60.0, 100.0]
-
-
-def test_limit_that_was_tightened_meanwhile_is_not_put_back(served: Served) -> None:
-    served.refusal = 'denied'
-    served.set_parameters(('limit', 60.0), ('brightness', 50.0), atomically=True)
-    served.set_parameters(('limit', 20.0))
-    served.run_link()
-    served.executor.spin_once()
-    served.run_link()
-
-    assert served.values('limit') == [20.0]
-    assert served.changes[-1]['limit'] == 20.0
 
 
 def test_parameters_of_the_device_are_set_by_the_executor_before_the_next_request(
