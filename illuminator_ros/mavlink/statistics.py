@@ -19,10 +19,6 @@ WINDOW = 64
 _ALL_SEEN = (1 << WINDOW) - 1
 # Consecutive numbers, more than most reads bring.
 _CONSECUTIVE = bytes(range(256)) * 8
-# A sender is distinguished from another one with its address if its numbers continue within this
-# many frames, by at most this many.
-INTERLEAVED = 32
-CONTINUED = 4
 # s
 RECENT = 10.0
 
@@ -57,14 +53,6 @@ class SourceCounts(NamedTuple):
     recent_loss: float | None
 
 
-class _Place(NamedTuple):
-    """The state in which a sender left off, see the fields of :class:`SequenceCounter`."""
-
-    newest: int
-    seen: int
-    left_at: int
-
-
 @dataclass(slots=True)
 class SequenceCounter:
     """
@@ -73,8 +61,8 @@ class SequenceCounter:
     A frame that comes twice is a duplicate and one that comes late is reordered; neither is a
     loss. A missing number is a loss only where each frame of the source should have come.
 
-    Two senders with one address count independently, so the numbers jump back and forth; so do
-    those of a component with two counters.
+    A jump that is farther than :data:`WINDOW` is no loss: the sender has restarted, or it is
+    another one with this address, or a second counter of a component.
 
     :ivar is_complete: whether each frame should have come, so that a missing one is lost.
     """
@@ -84,7 +72,6 @@ class SequenceCounter:
     duplicate: int = 0
     reordered: int = 0
     is_complete: bool = True
-    _left: _Place | None = None
     _newest: int = -1
     # The number that follows, -1 while that is not known.
     _next: int = -1
@@ -114,23 +101,13 @@ class SequenceCounter:
                 self.add(sequence)
 
     def _add_irregular(self, sequence: int) -> None:
-        if self._newest < 0:
+        back = (self._newest - sequence) & 0xFF
+        if self._newest < 0 or WINDOW <= back < 256 - WINDOW:
             # The frames before the first one are not known, so they do not count as lost.
             self._newest, self._seen = sequence, _ALL_SEEN
-            return
-        back = (self._newest - sequence) & 0xFF
-        if back < WINDOW and self._seen >> back & 1:
+        elif back < WINDOW and self._seen >> back & 1:
             self.duplicate += 1
-            return
-        if back >= WINDOW and self._return_to_left(sequence):
-            back = (self._newest - sequence) & 0xFF
-        elif back >= WINDOW and 256 - back > WINDOW:
-            # The frame is of another sender, or comes after a long loss.
-            self.lost += 255 - back if back >= 128 else 0
-            self._left = _Place(self._newest, self._seen, self.received)
-            self._newest, self._seen = sequence, _ALL_SEEN
-            return
-        if back < WINDOW:
+        elif back < WINDOW:
             self._seen |= 1 << back
             self.reordered += 1
             self.lost -= 1
@@ -140,23 +117,9 @@ class SequenceCounter:
             self._seen = (self._seen << ahead | 1) & _ALL_SEEN
             self._newest = sequence
 
-    def _return_to_left(self, sequence: int) -> bool:
-        """Return to the sender before if its numbers continue; return whether they do."""
-        left = self._left
-        if left is None or self.received - left.left_at > INTERLEAVED:
-            return False
-        continues_left, continues = (
-            0 < (sequence - newest) & 0xFF <= CONTINUED for newest in (left.newest, self._newest))
-        if continues or not continues_left:
-            return False
-        self._left = _Place(self._newest, self._seen, self.received)
-        self._newest, self._seen, _ = left
-        return True
-
     def restart(self) -> None:
         """Forget the numbers but not the counts: the next frame has no predecessor."""
         self._newest = self._next = -1
-        self._left = None
 
     def reset_loss(self) -> None:
         """Forget recent losses: the sequence numbers of the sender have restarted."""
