@@ -8,8 +8,7 @@ A table is found by the heading of its first column; headings and all else are w
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
-import itertools
+from collections.abc import Callable, Iterable, Sequence
 import math
 from pathlib import Path
 import re
@@ -111,12 +110,6 @@ def published(of: Iterable[Entity], statuses: str) -> Rows:
             ['`/diagnostics`', '`diagnostic_msgs/DiagnosticArray`', 'stream', statuses]]
 
 
-def diagnostic_values(of: Mapping[str, str]) -> Rows:
-    """Return the rows of values in the diagnostics; adjacent ones may share a meaning."""
-    return [[', '.join(f'`{key}`' for key in keys), meaning]
-            for meaning, keys in itertools.groupby(of, key=of.__getitem__)]
-
-
 def of_a_source(of: Iterable[Entity], release: Entity) -> Rows:
     """Return the rows of the topics and services that each source of commands has."""
     return endpoints(
@@ -128,19 +121,16 @@ def ros_tables() -> Tables:
     """Return the tables of the ROS interface and of the monitor."""
     from illuminator_ros.cli.monitor import app
     from illuminator_ros.gimbal.ros import gimbal_node, manager_node
-    from illuminator_ros.gimbal.ros.diagnostics import DEVICE_VALUES
     from illuminator_ros.gimbal.ros.gimbals import GIMBAL_PARAMETERS
     from illuminator_ros.gimbal.ros.manager_node import MANAGER_PARAMETERS
     from illuminator_ros.illuminator.ros import event_publisher, light_node, lights
     from illuminator_ros.illuminator.ros.beam import beam_topic
-    from illuminator_ros.illuminator.ros.diagnostics import FLAG_LEVELS, LAMP_VALUES
+    from illuminator_ros.illuminator.ros.diagnostics import FLAG_LEVELS
     from illuminator_ros.illuminator.ros.parameters import DEVICE_PARAMETERS, LIGHT_PARAMETERS
     from illuminator_ros.mavlink.dialect import short_names
     from illuminator_ros.rededge.ros import camera_node as camera
-    from illuminator_ros.rededge.ros.diagnostics import CAMERA_VALUES
     from illuminator_ros.rededge.ros.inputs import TOPICS
     from illuminator_ros.ros.command_sources import RELEASE, SOURCE
-    from illuminator_ros.ros.diagnostics import LINK_VALUES
     from illuminator_ros.ros.parameters import LINK_PARAMETERS
 
     kinds = {float: 'double', str: 'string'}
@@ -177,13 +167,6 @@ def ros_tables() -> Tables:
             camera.PUBLICATIONS,
             '`rededge: link` and `rededge: camera`; [their values](#values-of-diagnostics)'),
         ('rededge', 'service'): endpoints((camera.PING, *camera.CAPTURES)),
-        **{(page, f'value of `{status}`'): diagnostic_values(values)
-           for page, status, values in (
-               ('protocol', 'illuminator: link', LINK_VALUES),
-               ('protocol', 'illuminator: lamp', LAMP_VALUES),
-               ('gimbal', 'gimbal: device', DEVICE_VALUES),
-               ('gimbal_manager', 'gimbal_manager: manager', manager_node.MANAGER_VALUES),
-               ('rededge', 'rededge: camera', CAMERA_VALUES))},
         ('reference', 'parameter of the light'): [
             [f'`{spec.name}`', kinds[type(spec.default)], values_of(spec), spec.unit,
              meaning_of(spec)] for spec in DEVICE_PARAMETERS],

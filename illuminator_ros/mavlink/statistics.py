@@ -61,8 +61,8 @@ class SequenceCounter:
     A frame that comes twice is a duplicate and one that comes late is reordered; neither is a
     loss. A missing number is a loss only where each frame of the source should have come.
 
-    A jump that is farther than :data:`WINDOW` is no loss: the sender has restarted, or it is
-    another one with this address, or a second counter of a component.
+    A jump farther than :data:`WINDOW` counts no loss: the sender has restarted, another one has
+    this address, or the component has a second counter.
 
     :ivar is_complete: whether each frame should have come, so that a missing one is lost.
     """

@@ -21,11 +21,6 @@ SOURCE = Entity(
     'source', String, "only with `sources`: the source that holds the device, `''` for none")
 RELEASE = Entity('release', Trigger, 'the source gives the device back; the answer names the '
                  'next holder')
-# Their values in the diagnostics, with their meanings for the pages.
-HOLDER_VALUES = {
-    'holder': 'only with `sources`: the source that holds the device, or `none`',
-    'held_s': 'for how long it does, s',
-}
 SOURCE_PARAMETERS = (
     ParameterSpec('sources', [],
                   'sources of commands, the highest first; empty = commands have no sources',

@@ -41,38 +41,6 @@ LOSS_WARNING = 5.0
 # Messages that are named in the status of a line.
 MAX_NAMED = 8
 
-# The values of the status of a line, with their meanings for the pages.
-LINK_VALUES = {
-    'url': '`connection_url`; `illuminator: link 2` and so on have those of `forward_urls`',
-    'open': '`true` or `false`',
-    'since_s': 'time since it was opened or lost, s',
-    'openings': 'number of openings',
-    'peers': 'peers with recent valid frames',
-    'frames_received': 'frames with a valid checksum',
-    'frames_sent': 'frames that were sent',
-    'frames_dropped': 'frames that were not sent, because the queue was full or the link slow',
-    **dict.fromkeys(('bytes_received', 'bytes_sent'), 'all bytes'),
-    **dict.fromkeys(('bytes_received_per_s', 'bytes_sent_per_s'), 'recent average'),
-    'crc_errors': 'frames with a wrong checksum',
-    'frames_forwarded':
-        'frames from other links that were sent, or wait to be sent, over this one',
-    'frames_not_forwarded': 'forwarded frames that the link replaced by newer ones or dropped',
-    'not_forwarded': 'the most frequent messages of these, with their numbers',
-    'copies_received': 'frames that had come over another link less than 5 s before; WARN names '
-                       'both links',
-    'lights': 'lights that are known; in `gimbal: link` there is `gimbals`',
-    **dict.fromkeys(('frames_lost', 'frames_duplicate', 'frames_reordered'),
-                    'of the device of this node, by its sequence numbers'),
-    'loss_percent': 'of this device, recently; WARN above 5 %; `unknown`, as `frames_lost` is, '
-                    'behind [a router](routers.md#effects-of-a-router)',
-    'round_trip_ms': 'from the last command to its acknowledgement',
-    **dict.fromkeys(('commands_sent', 'commands_resent', 'commands_unanswered'),
-                    'to all devices'),
-    **dict.fromkeys(('signatures_good', 'signatures_bad', 'signatures_replayed',
-                     'unsigned_frames'), '0 where `signing_mode` is `off`'),
-    'signatures_unchecked': 'signed frames accepted unchecked, since `signing_mode` is `off`',
-}
-
 # A level and a text for people.
 Finding = tuple[bytes, str]
 Value = str | int | float | bool | None

@@ -5,7 +5,8 @@
 The private parts of rclpy that nodes import, and the type of its loggers.
 
 Where a part of rclpy is replaced or called in place of an executor, the module says why:
-``deferred_service``, ``payload_node``, ``cli/monitor/ros_graph``. All were seen in rclpy 7.1.6, of Jazzy, and in 9.1.2, of Kilted.
+``deferred_service``, ``payload_node``, ``cli/monitor/ros_graph``. All were seen in rclpy 7.1.6, of
+Jazzy, and in 9.1.2, of Kilted.
 """
 
 from collections.abc import Mapping

@@ -15,13 +15,8 @@ from typing import Any
 import xml.etree.ElementTree as ET
 
 from diagnostic_msgs.msg import DiagnosticArray
-from illuminator_ros.gimbal.ros.diagnostics import DEVICE_VALUES
-from illuminator_ros.gimbal.ros.manager_node import MANAGER_VALUES
-from illuminator_ros.illuminator.ros.diagnostics import LAMP_VALUES
 from illuminator_ros.mavlink.link import Link
 from illuminator_ros.rededge.input_states import Input
-from illuminator_ros.rededge.ros.diagnostics import CAMERA_VALUES
-from illuminator_ros.ros.diagnostics import LINK_VALUES
 import pytest
 from rcl_interfaces.srv import SetParameters
 from rclpy.parameter import parameter_dict_from_yaml_file
@@ -33,7 +28,7 @@ from support.light import Address, eventually, ServedLight
 from support.ports import free_port
 from support.processes import ended, python, ROOT
 from support.ros import bridge_arguments, Parameters, Ros, STREAM
-from support.tables import parameter_file, table
+from support.tables import diagnostic_values, parameter_file, table
 import yaml
 
 CONFIG = ROOT / 'config'
@@ -177,8 +172,10 @@ def test_page_has_the_topics_and_services_of_the_node(name: str, running: Runnin
 
 
 def test_pages_have_each_value_of_the_diagnostics_of_all_nodes(running: Running) -> None:
-    documented = {'link': LINK_VALUES, 'lamp': LAMP_VALUES, 'device': DEVICE_VALUES,
-                  'manager': MANAGER_VALUES, 'camera': CAMERA_VALUES}
+    documented = {part: diagnostic_values(page, f'{node}: {part}') for page, node, part in (
+        ('protocol', 'illuminator', 'link'), ('protocol', 'illuminator', 'lamp'),
+        ('gimbal', 'gimbal', 'device'), ('gimbal_manager', 'gimbal_manager', 'manager'),
+        ('rededge', 'rededge', 'camera'))}
     inputs = '|'.join(sorted((name.value for name in Input), reverse=True))
 
     for status, keys in running.reported.items():

@@ -3,6 +3,7 @@
 
 """The tables and diagrams of the documentation, and the parameter files."""
 
+import re
 from typing import Any
 
 from support.processes import ROOT
@@ -24,6 +25,12 @@ def table(document: str, first_heading: str) -> list[list[str]]:
             break
         found.append([cell.strip() for cell in line.strip('|').split('|')])
     return found
+
+
+def diagnostic_values(page: str, status: str) -> set[str]:
+    """Return the names of the values of a status that a page has."""
+    rows = table((ROOT / 'doc' / f'{page}.md').read_text(), f'value of `{status}`')
+    return {name for row in rows for name in re.findall('`([^`]+)`', row[0])}
 
 
 def parameter_file(name: str) -> dict[str, Any]:

@@ -6,19 +6,18 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import fields
 import math
 
 from ..axes import CONDITIONS, other_signs
 from ..commands import Control
-from ..events import DeviceIdentity, GimbalKey, GimbalSnapshot
+from ..events import GimbalKey, GimbalSnapshot
 from ..gimbal_reports import STATUS_REQUEST_DELAY
 from ...geometry.mount_attitude import AXES
 from ...mavlink.command_sender import format_seconds
 from ...mavlink.dialect import entry_names, flag_names, mavlink
 from ...mavlink.messages import Address
 from ...ros import diagnostics
-from ...ros.command_sources import HOLDER_VALUES, holder_values
+from ...ros.command_sources import holder_values
 
 # s; a longer silence of the device is reported: attitudes come about five times a second. A status
 # that does not come is requested first.
@@ -28,33 +27,6 @@ STATUS_SILENCE = STATUS_REQUEST_DELAY + 1.5
 STOP_TIME = 1.0
 NO_GEOID = ('geoid_separation is not set, so the altitude of the place is taken as above mean sea '
             'level, and is above the ellipsoid')
-# The values of the status of a gimbal, with their meanings for the pages. Angles have the signs of
-# ROS.
-DEVICE_VALUES = {
-    'address': 'system and component id of the component that sends its attitude',
-    'gimbal_device_id': 'its id at the manager',
-    'manager': 'address of the manager',
-    'connected': '`true` or `false`',
-    **dict.fromkeys(('in_control', 'controller'), 'as on the topics'),
-    'controller_s': 'for how long, s',
-    'control_enforced': '`false` if the manager also obeys components without control',
-    'setpoints_sent': 'since the gimbal was found, with repetitions',
-    'failure_flags': 'GIMBAL_DEVICE_ERROR_FLAGS as sent; the message of the status names them',
-    'flags': 'GIMBAL_DEVICE_FLAGS by name',
-    'accepts_yaw_in_earth_frame': 'whether these have the flag of this name',
-    **HOLDER_VALUES,
-    **dict.fromkeys(('attitude_s_ago', 'status_s_ago'),
-                    'age of the last attitude of the device, and status of the manager, s'),
-    'yaw_frame': '`earth` or `vehicle`',
-    **dict.fromkeys((f'{axis}_rad' for axis in AXES), 'angles of the attitude'),
-    'vehicle_heading_rad': 'if it is known',
-    'off_target': 'why `~/on_target` is false, or `none`',
-    'capabilities': 'GIMBAL_DEVICE_CAP_FLAGS by name',
-    **dict.fromkeys((f'{axis}_{end}_rad' for axis in AXES for end in ('min', 'max')),
-                    'range of an axis'),
-    **dict.fromkeys((field.name for field in fields(DeviceIdentity)),
-                    'GIMBAL_DEVICE_INFORMATION'),
-}
 _ERRORS = 'GIMBAL_DEVICE_ERROR_FLAGS'
 
 

@@ -86,18 +86,6 @@ MANAGER_PARAMETERS = (
 )
 
 
-# The values of the status of the manager, with their meanings for the pages.
-MANAGER_VALUES = {
-    'state': '[no device, listening, active or inactive](#one-manager-for-one-gimbal)',
-    'gimbal_device_id': 'of the device',
-    'policy': 'as the parameter',
-    **dict.fromkeys((f'{role.value}_control' for role in Role),
-                    'the player that has it, or `none`'),
-    'control_s_ago': 'for how long primary control has not changed, s',
-    'other_manager': 'another manager of the device, or `none`',
-}
-
-
 def _players(values: Values, name: str, ros: Address) -> tuple[Address, ...]:
     """
     Return the players that a parameter lists.

@@ -5,7 +5,7 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict, dataclass, fields
+from dataclasses import asdict, dataclass
 import math
 
 from ..events import LightSnapshot
@@ -13,33 +13,14 @@ from ..model import flag_names, KNOWN_FLAGS
 from ...mavlink.command_sender import format_seconds
 from ...mavlink.dialect import mavlink
 from ...mavlink.messages import Address
-from ...payload.identity import Identity
 from ...ros import diagnostics
-from ...ros.command_sources import HOLDER_VALUES, holder_values
+from ...ros.command_sources import holder_values
 
 # s without a status from a light that has sent some; one is requested every 2.5 s.
 STATUS_SILENCE = 10.0
 # s between two log lines on one flag.
 FLAG_PAUSE = 5.0
 
-# The values of the status of a light, with their meanings for the pages.
-LAMP_VALUES = {
-    'address': 'system and component id',
-    'connected': '`true` or `false`',
-    'heard_s_ago': 'age of the last heartbeat or status, s',
-    'restarts': 'restarts of the light, by its uptime',
-    'states_are_changing': 'whether its state goes back and forth: [several '
-                           'lights](lights.md#several-lights-with-one-address), or another '
-                           'controller',
-    **dict.fromkeys(('enabled', 'mode', 'brightness_percent', 'strobe_period_s',
-                     'strobe_duty_cycle_percent', 'error_flags', 'uptime_s'), 'as on the topics'),
-    'temperature_c': 'degC, if measured',
-    'status_s_ago': 'age of the last status, s',
-    'off_in_s': 'until `off_after_silence` switches the light off, s',
-    **HOLDER_VALUES,
-    'agreed': 'the configuration agreed with the light, which parameters hold',
-    **dict.fromkeys((field.name for field in fields(Identity)), 'COMPONENT_INFORMATION_BASIC'),
-}
 # The consequence of each flag for the user of the light.
 FLAG_LEVELS: dict[int, tuple[bytes, str]] = {
     mavlink.ILLUMINATOR_ERROR_FLAGS_THERMAL_THROTTLING: (

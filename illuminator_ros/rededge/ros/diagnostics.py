@@ -28,21 +28,6 @@ from ...ros.diagnostics import (
 # The camera adopts the system id of the host, so only the component id identifies it.
 HARDWARE_ID = f'mavlink:{mavlink.MAV_COMP_ID_CAMERA}'
 
-# The values of the status of a camera, with their meanings for the pages.
-CAMERA_VALUES = {
-    'address': 'system and component id',
-    'connected': '`true` or `false`',
-    'heard_s_ago': 'age of the last heartbeat, s',
-    'round_trip_ms': 'of the last answered PING',
-    'pings_unanswered': 'PINGs without a reply since the last reply',
-    'images': 'images that were reported since the start',
-    'image_index': 'number of the newest image',
-    'INPUT': f'state of an input, such as `fix`: {", ".join(one.value for one in InputState)}',
-    'INPUT_s_ago': 'its age, s',
-    **dict.fromkeys(('INPUT_refused', 'INPUT_refused_s_ago', 'INPUT_refusal'), 'only after a '
-                    'refusal: how often, age of the last one in s, and its reason'),
-}
-
 
 class InputTopic(NamedTuple):
     """The topic of an input, with its name in the graph and the number of its publishers."""
@@ -152,8 +137,8 @@ def shared_topics(graph: Topics) -> Iterable[str]:
 def why_unused(name: Input, snapshot: InputSnapshot) -> str:
     """Return why an input that was received is refused, stale or not sent, for people."""
     if snapshot.state is InputState.UNSENT:
-        return (f'~/{name.value}: received, and not sent: the line has no room (lower the rates of '
-                'the inputs, or raise the baud rate), or no camera was heard yet on a UDP link')
+        return (f'~/{name.value}: received, and not sent: the line has no room (lower the rates '
+                'of the inputs, or raise the baud rate), or no camera was heard yet on a UDP link')
     if snapshot.state is InputState.REFUSED or snapshot.age is None:
         return (f'~/{name.value} refused {format_seconds(snapshot.refused_age or 0.0)} ago: '
                 f'{snapshot.refusal}')
