@@ -32,20 +32,23 @@ due, decides, and steers both properties. A second run changes nothing.
 other values replaces it at once, but a setpoint or a rule waits for a configuration that is under
 way. The attempt sends the command with a request for the status, and ends each request that it
 serves as soon as a status that came after an acknowledgement, or after the last try, shows the
-values of that request. After a restart it sends the command again and counts no status for 1.5 s;
-a parameter set then fails after 0.85 s, and a rule sends its values. A request that was made after
-the attempt began waits for the next attempt: nothing that was sent before proves it. An OFF that a
-rule insists on may never end, so an OFF call beside it fails after 4 s. Replies are called when
-the step has ended, so a reply may make the next request.
+values of that request. After a restart it sends the command again and counts no status for 1.5 s.
+A parameter set, which ends 0.85 s after it was made, is then confirmed by a status that shows its
+values though the first one did not; if it fails, the configuration that was agreed is restored.
+Without ``restore_configuration`` a new command carries the other fields as the light has them. A
+request that was made after the attempt began waits for the next attempt: nothing that was sent
+before proves it. An OFF that a rule insists on may never end, so an OFF call beside it fails after
+4 s. Replies are called when the step has ended, so a reply may make the next request.
 
 **Not solved well.** COMMAND_ACK does not name the try that it answers. After a command that ended
-unconfirmed, its frames may still come for 1.5 s, the fence, in which nothing proves the next
-command, except a set that alone can have caused the status. A line with a round trip above 250 ms
-meets a further fence at each call within 1.5 s, since the acknowledgements there do not show that
-no frame is under way. A copy of a frame that a
-network delivers after more than 1.5 s can confirm a command that was lost. Within the fence two
-sets that share a command succeed only together. For a light whose brightness is its switch, an
-OFF ends each configuration under way, since no status shows which of both comes last.
+unconfirmed, and after a restart, older frames may still come for 1.5 s, the fence, in which
+nothing proves a command. A set has no time for that: a status that it alone can have caused proves
+it, and so does one after an acknowledgement if all frames under way set equal values. A line with
+a round trip above 250 ms meets a further fence at each call within 1.5 s, since the
+acknowledgements there do not show that no frame is under way. A copy of a frame that a network
+delivers after more than 1.5 s can confirm a command that was lost. Within the fence two sets that
+share a command succeed only together. For a light whose brightness is its switch, an OFF ends each
+configuration under way, since no status shows which of both comes last.
 """
 
 from __future__ import annotations

@@ -266,13 +266,10 @@ class LightControl:
             # Its command would bring back the fields that nobody asks for.
             self._withdrawn(self.configuration.withdraw('the light restarted', now), now)
         attempt, wanted = self.configuration.attempt, self._twin.agreed
-        if attempt is not None:
-            # A set ends before the fence of the restart, and its values must not be lost with it.
-            wanted = attempt.goal.values
-        self._rules.restarted({} if wanted is None else {
+        self._rules.restore({} if wanted is None else {
             name: getattr(wanted, name) for name in FIELDS if name != 'mode' or wanted.mode}, now)
         for part in self.switch, self.configuration:
-            part.restarted(now)
+            part.restarted(status, now)
         self._twin.restarted(status)
         self._compare(status, OwnCommands(is_busy=attempt is not None), now)
 

@@ -139,20 +139,24 @@ class Rules:
         for one in self.weak:
             one.tried, one.failure, one.due = 0, '', self._first_due(now)
 
-    def restarted(self, values: dict[str, Any], now: float) -> None:
+    def restore(self, values: dict[str, Any], now: float) -> None:
         """
         Restore a configuration: the light has restarted.
 
-        :param values: what was agreed, and what was under way.
+        :param values: what was agreed.
         """
         for one in self._requests.standing:
             one.may_be_repeated = False
+        given = set[str]()
         for one in self.weak:
+            if one.why is Why.OVERRIDE:
+                given |= one.values.keys()
+                continue
             # The light has other values now.
             if one.why is Why.RESTORED:
                 values = {**values, **one.values}
-            if one.why is not Why.OVERRIDE:
-                self._requests.end(one, ENDED, now)
+            self._requests.end(one, ENDED, now)
+        values = {name: value for name, value in values.items() if name not in given}
         if self.settings.restore_configuration and values:
             self._put(Why.RESTORED, values, 'restored after a restart', now)
         self.limits.limited_at = -math.inf

@@ -167,19 +167,25 @@ class Served(NamedTuple, Generic[S]):
     status: S | None = None
 
 
+class Proof(Enum):
+    """What proves a command while frames of other commands may be under way."""
+
+    NOTHING = 'nothing'
+    STATUS = 'a status that shows it: none of these frames can have caused that'
+    ACKNOWLEDGED = 'the same after an acknowledgement: all these frames set equal values'
+
+
 class Fence(NamedTuple):
     """
-    The time in which frames of other commands may be under way, so that a status proves nothing.
+    The time in which frames of other commands may be under way.
 
     :param ends_at: s.
     :param frames: of the command before that were not acknowledged.
-    :param is_proved: whether a status that shows the change counts all the same, since none of
-        these frames can have caused it.
     """
 
     ends_at: float = -math.inf
     frames: int = 0
-    is_proved: bool = False
+    proof: Proof = Proof.NOTHING
 
 
 NO_FENCE = Fence()
@@ -301,7 +307,9 @@ class Attempt(Generic[S]):
         tries = self._transmission.tries
         if self._are_all_answered(tries):
             return 0
-        return max(tries - max(self._received.counted, int(is_shown)), 0)
+        # Else the status may show an earlier try of an equal value.
+        has_arrived = is_shown and self._fence.proof is not Proof.ACKNOWLEDGED
+        return max(tries - max(self._received.counted, int(has_arrived)), 0)
 
     def _are_all_answered(self, tries: int) -> bool:
         """Return whether each frame so far was answered before the next one, none twice."""
@@ -312,11 +320,19 @@ class Attempt(Generic[S]):
         target = self._target
         return target.commands.answers.get((target.address, self.change.command), 0)
 
-    def restarted(self, now: float) -> None:
-        """Send it again: the device has restarted, and nothing from before counts."""
+    def restarted(self, status: S, now: float) -> None:
+        """
+        Send it again: the device has restarted, and nothing from before counts.
+
+        :param status: the first since then.
+        """
         self._received.has_restarted = True
         if self._sending is not Sending.ONCE:
-            self._fence = Fence(now + FENCE)
+            fence, is_hurried = self._fence, self.goal.until <= now + FENCE
+            may_be_others = now < fence.ends_at and fence.proof is Proof.NOTHING
+            self._fence = Fence(now + FENCE, proof=Proof.STATUS if (
+                is_hurried and not may_be_others and self.change.shown_by(status) is False
+            ) else Proof.NOTHING)
             self._answer = self._instead = None
             self._ends_at = math.inf
             self._requests.stop()
@@ -361,11 +377,15 @@ class Attempt(Generic[S]):
 
     # The status
 
-    def _counts(self, now: float) -> bool:
-        """Return whether a status that comes now was sent after the command, as far as known."""
-        transmission, sending = self._transmission, self._sending
+    def _counts(self, status: S, now: float) -> bool:
+        """Return whether a status was sent after the command, as far as known."""
+        transmission, sending, proof = self._transmission, self._sending, self._fence.proof
         if now < self._fence.ends_at:
-            return sending is Sending.AT_THE_END and transmission.tries >= ENOUGH_TRIES
+            if sending is Sending.AT_THE_END:
+                return transmission.tries >= ENOUGH_TRIES
+            is_enough = proof is Proof.STATUS or (
+                proof is Proof.ACKNOWLEDGED and transmission.result is not None)
+            return is_enough and self.change.shown_by(status) is True
         if sending is not Sending.ONCE and transmission.first_sent < self._fence.ends_at:
             # This turn is late: the try at the end of the fence is still due.
             return False
@@ -381,9 +401,7 @@ class Attempt(Generic[S]):
         :return: the requests that have ended.
         """
         self._gap = gap
-        if not self._counts(now) and not (
-                self._fence.is_proved and now < self._fence.ends_at
-                and self.change.shown_by(status)):
+        if not self._counts(status, now):
             return []
         ended = []
         for one in self.serves:
@@ -474,8 +492,9 @@ class Attempt(Generic[S]):
     def _failed_result(self, part: Change[S], one: Request, now: float) -> Result:
         target, answer, shown = self._target, self._answer, self._shown_instead(part)
         if answer is None and now < self._fence.ends_at:
-            text = 'an earlier command may still be under way'
-            return self._result(f'{part.goal} not confirmed: {text}', one, now)
+            text = ('' if self._received.has_restarted
+                    else ': an earlier command may still be under way')
+            return self._result(f'{part.goal} not confirmed{text}', one, now)
         if answer is None or not (answer.accepted or answer.refused):
             return self._result(
                 self._protocol().describe() + (f', and {shown}' if shown else ''), one, now,

@@ -9,7 +9,7 @@ from collections.abc import Callable, Mapping
 import math
 from typing import Generic, TypeVar
 
-from .attempt import Attempt, Change, CommandedValue, FENCE, Fence, Served, Target
+from .attempt import Attempt, Change, CommandedValue, FENCE, Fence, Proof, Served, Target
 from .requests import Goal, Request, Result
 
 S = TypeVar('S')
@@ -97,26 +97,26 @@ class Property(Generic[S]):
         if self._under_way:
             self._under_way = {value: end for value, end in self._under_way.items() if now < end}
         fence = Fence(self.fence_ends_at, self._frames if now < self.fence_ends_at else 0,
-                      self._is_proved(change, goal, now, newest))
+                      self._proof(change, goal, now, newest))
         self.attempt = Attempt(self._target, change, goal, parts, now, fence=fence, gap=gap)
 
-    def _is_proved(
+    def _proof(
         self, change: Change[S], goal: Goal, now: float, newest: S | None,
-    ) -> bool:
+    ) -> Proof:
         """
-        Return whether a status that shows a change proves it though other frames are under way.
+        Return what proves a change though other frames are under way.
 
-        It does if the newest status does not show it, and no other value has been sent between
-        an equal one and this one. Only a value that has no time to await the end of the fence
-        needs that: a program that sets it each second would be locked out by one failure.
+        Only a value that has no time to await the end of the fence needs that: one failure would
+        lock out a program that sets it each second.
         """
-        if goal.until > now + FENCE:
-            return False
         under_way = self._under_way
         has_others = bool(under_way.keys() - {change.value})
-        if has_others and (change.value in under_way or len(under_way) == MAX_VALUES):
-            return False
-        return newest is not None and change.shown_by(newest) is False
+        if goal.until > now + FENCE or has_others and (
+                change.value in under_way or len(under_way) == MAX_VALUES):
+            return Proof.NOTHING
+        if newest is not None and change.shown_by(newest) is False:
+            return Proof.STATUS
+        return Proof.NOTHING if has_others else Proof.ACKNOWLEDGED
 
     def withdraw(self, text: str, now: float) -> list[Served[S]]:
         """Send the command no more; return its open requests."""
@@ -158,10 +158,10 @@ class Property(Generic[S]):
             return []
         return self._ended(self.attempt, self.attempt.poll(now), now)
 
-    def restarted(self, now: float) -> None:
-        """Note that the device has restarted."""
+    def restarted(self, status: S, now: float) -> None:
+        """Receive the first status since a restart."""
         if self.attempt is not None:
-            self.attempt.restarted(now)
+            self.attempt.restarted(status, now)
 
     @property
     def due(self) -> float:

@@ -427,6 +427,29 @@ def test_overrides_that_wait_for_a_status_are_reported_once(fake: FakeLight) -> 
     assert fake.fields['brightness'] == 60.0
 
 
+@pytest.mark.parametrize('period', [0.9, 1.0, 1.2, 1.4])
+@pytest.mark.parametrize('values', [(80.0, 80.0), (80.0, 40.0)], ids=['equal', 'in turns'])
+def test_lost_answers_to_one_set_fail_no_later_one(
+    fake: FakeLight, values: tuple[float, float], period: float,
+) -> None:
+    fake.stream = 0.2
+    pair = Pair(fake).settle()
+    pair.far.wire.switch(is_open=False)
+    lost = pair.ask_configure(brightness=80.0)
+    pair.run(0.86)
+    pair.far.wire.switch(is_open=True)
+    pair.run(period - 0.86)
+
+    answers = []
+    for value in reversed(values * 5):
+        answers.append(pair.ask_configure(brightness=value))
+        pair.run(period)
+
+    assert lost.result is not None
+    assert not lost.result.success
+    assert [one.result.success for one in answers if one.result is not None] == [True] * 10
+
+
 # Restarts
 
 @pytest.fixture

@@ -260,22 +260,29 @@ def test_ten_minutes_of_loss_with_a_reboot_in_them_are_one_restart_and_the_light
     assert faked.enable(True).success
 
 
-@pytest.mark.parametrize('after', [0.0, 0.1])
-def test_a_brightness_that_is_set_while_the_light_restarts_is_not_lost_and_the_answer_says_it(
-    fake: FakeLight, faked: Pair, after: float,
+@pytest.mark.parametrize(('after', 'starts_with', 'success'), [
+    (0.0, {}, True), (0.1, {}, True),
+    (0.1, {'brightness': 70.0, 'strobe_period': 1.0, 'strobe_duty_cycle': 50.0}, False),
+    (1.5, {}, False)],
+    ids=['at once', 'later', 'the light starts with these values', 'after the limit'])
+def test_a_brightness_that_is_set_while_the_light_restarts_is_confirmed_or_leaves_nothing_behind(
+    fake: FakeLight, faked: Pair, after: float, starts_with: dict[str, float], success: bool,
 ) -> None:
     assert faked.configure(brightness=40.0, strobe_period=1.0).success
     faked.run(3.0)
     fake.results[CONFIGURE] = None
     answer = faked.ask_configure(brightness=70.0)
     faked.run(after)
-    fake.restart(faked.now)
+    fake.restart(faked.now, **starts_with)
     fake.results.clear()
-    assert 'the light restarted meanwhile' in faked.wait_for(answer).message
+    result = faked.wait_for(answer)
+    assert result.success is success
+    assert after > 1.0 or 'the light restarted meanwhile' in result.message
     faked.run(10.0)
-    assert (fake.fields['brightness'], fake.fields['strobe_period']) == (70.0, 1.0)
+    brightness = 70.0 if success else 40.0
+    assert (fake.fields['brightness'], fake.fields['strobe_period']) == (brightness, 1.0)
     assert faked.snapshot.configuration is not None
-    assert faked.snapshot.configuration.brightness == 70.0
+    assert faked.snapshot.configuration.brightness == brightness
 
 
 def test_an_on_after_a_restart_is_not_confirmed_by_what_came_from_before_it(

@@ -9,7 +9,15 @@ import math
 from typing import Any
 
 from illuminator_ros.mavlink.command_sender import CommandStatus, timing
-from illuminator_ros.payload.attempt import Attempt, Change, FENCE, Fence, Sending, Served
+from illuminator_ros.payload.attempt import (
+    Attempt,
+    Change,
+    FENCE,
+    Fence,
+    Proof,
+    Sending,
+    Served,
+)
 from illuminator_ros.payload.requests import Goal, Request, Result, Why
 import pytest
 from support.level_device import (
@@ -34,7 +42,8 @@ class CommandBench(LevelBench):
         """Send the command; return this bench."""
         self.result: Result | None = None
         self.ended_at = math.nan
-        fence = Fence(arguments.pop('fence', -math.inf), 0, arguments.pop('is_sole_cause', False))
+        fence = Fence(arguments.pop('fence', -math.inf),
+                      proof=arguments.pop('proof', Proof.NOTHING))
         request = Request({'level': 5}, Why.REQUEST, self.now, is_call=True)
         goal = Goal(5, (request,), self.now + arguments.pop('limit', math.inf), is_awaited=True,
                     **arguments)
@@ -145,11 +154,11 @@ SINGLE, REPEATED = ({'change': level_change(5, sending=Sending.ONCE)},
      'level 5 not confirmed: an earlier command may still be under way', [0.0, 0.25, 0.5, 0.75],
      0.9, ()),
     # But a status that only this command can have caused counts.
-    ({}, {'fence': FENCE, 'is_sole_cause': True}, True, SHOWN, ONCE, 0.02, ()),
-    ({'results': [DENIED]}, {'fence': 0.6, 'is_sole_cause': True}, False, DENIES, FENCED, 0.62,
+    ({}, {'fence': FENCE, 'proof': Proof.STATUS}, True, SHOWN, ONCE, 0.02, ()),
+    ({'results': [DENIED]}, {'fence': 0.6, 'proof': Proof.STATUS}, False, DENIES, FENCED, 0.62,
      PERMANENT),
-    (HIDES, {'fence': 0.6, 'is_sole_cause': True}, True, ACCEPTS, FENCED, 0.62, ()),
-    (OBEYS, {'is_sole_cause': True}, True, NOT_ACKNOWLEDGED, SILENT, 1.77, ()),
+    (HIDES, {'fence': 0.6, 'proof': Proof.STATUS}, True, ACCEPTS, FENCED, 0.62, ()),
+    (OBEYS, {'proof': Proof.STATUS}, True, NOT_ACKNOWLEDGED, SILENT, 1.77, ()),
     # At the end of the process a status counts after three tries, also within the fence.
     ({}, {'fence': FENCE, 'is_last': True, 'insists': True}, True, SHOWN, [0.0, 0.1, 0.2], 0.22,
      ()),
@@ -257,10 +266,10 @@ def test_a_lost_link_and_the_end_of_the_process_end_every_command(
 def test_a_restart_confirms_nothing_and_a_command_that_may_be_repeated_is_sent_again(
     device: dict[str, Any], change: Change[int | None], text: str, tries: int, ended_at: float,
 ) -> None:
-    bench = CommandBench(**device, sends_status=False).begin(change, is_sole_cause=True)
+    bench = CommandBench(**device, sends_status=False).begin(change, proof=Proof.STATUS)
     bench.run_until(0.1)
     bench.level, bench.sends_status = 0, True
-    bench.command.restarted(bench.now)
+    bench.command.restarted(0, bench.now)
     if change.sending is not Sending.ONCE:
         bench.later(0.0, lambda: bench.reported(5))
     bench.run_until()

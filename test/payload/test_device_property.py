@@ -184,13 +184,15 @@ def test_a_request_that_insists_waits_for_an_equal_command_and_the_end_does_not(
 @pytest.mark.parametrize(('values', 'first', 'is_proved_at_once'), [
     # Only this value can have caused a status that shows it.
     ([3, 4], 0, True), ([3, 4, 5], 0, True), ([3, 3], 0, True),
+    # All values are equal, and one is acknowledged.
+    ([0, 0], 0, True), ([3, 3], 3, True), ([3, 3], None, True),
     # The light shows it already, or has shown nothing.
     ([1, 0], 0, False), ([3, 4], 4, False), ([3, 4], None, False),
     # Another value was sent between an equal one and this one.
     ([3, 4, 3], 0, False), ([3, 4, 5, 4], 0, False),
     # Too many to remember.
     ([*range(1, MAX_VALUES + 1)], 0, True), ([*range(1, MAX_VALUES + 2)], 0, False)])
-def test_within_the_fence_a_status_counts_that_only_this_value_can_have_caused(
+def test_within_the_fence_a_status_counts_that_no_other_value_can_have_caused(
     values: list[int], first: int | None, is_proved_at_once: bool, limit: float,
 ) -> None:
     bench = PropertyBench(0 if first is None else first)
@@ -328,7 +330,7 @@ def test_the_first_status_after_a_restart_confirms_nothing() -> None:
     answer = bench.want(3)
     bench.run_until(0.1)
     bench.newest, bench.newest_at = 3, bench.now
-    bench.property.restarted(bench.now)
+    bench.property.restarted(3, bench.now)
     assert not answer
     bench.sends_status = True
     bench.run_until(3.0)
@@ -337,7 +339,8 @@ def test_the_first_status_after_a_restart_confirms_nothing() -> None:
 
 
 @given(strategies.lists(strategies.tuples(
-    strategies.sampled_from(['want', 'stream', 'report', 'ack', 'restart', 'cancel', 'wait']),
+    strategies.sampled_from(
+        ['want', 'set', 'stream', 'report', 'ack', 'restart', 'cancel', 'wait']),
     strategies.integers(0, 3)), max_size=40))
 def test_each_request_is_answered_once_and_each_success_is_shown_after_it_was_made(
     steps: list[tuple[str, int]],
@@ -347,16 +350,17 @@ def test_each_request_is_answered_once_and_each_success_is_shown_after_it_was_ma
     shown: list[int] = []
     checked: set[int] = set()
     for action, number in [*steps, ('cancel', 0)]:
-        if action in ('want', 'stream'):
+        if action in ('want', 'set', 'stream'):
             answers.append((number, len(shown), bench.want(
-                number, is_stream=action == 'stream')))
+                number, is_stream=action == 'stream',
+                limit=0.9 if action == 'set' else math.inf)))
         elif action == 'report':
             shown.append(number)
             bench.report(number)
         elif action == 'ack':
             bench.acknowledge(ACCEPTED if number else DENIED)
         elif action == 'restart':
-            bench.property.restarted(bench.now)
+            bench.property.restarted(number, bench.now)
         elif action == 'cancel':
             bench.withdraw()
         else:
