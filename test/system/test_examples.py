@@ -12,7 +12,6 @@ import math
 from pathlib import Path
 import re
 import signal
-import sys
 from typing import Any
 
 from illuminator_ros.gimbal.simulated_manager import ManagerProperties, SimulatedManager
@@ -35,6 +34,11 @@ from support.waiting import eventually, Log
 # s; the clocks of programs and devices are those of the machine, which may pause.
 LOST_AFTER = 60.0
 EARTH_RADIUS = 6_371_000.0
+BOTH = '[illuminator, gimbal]'
+
+
+def light_and_gimbal() -> tuple[SimulatedIlluminator, SimulatedManager]:
+    return (SimulatedIlluminator(IlluminatorProperties()), SimulatedManager(ManagerProperties()))
 
 
 @contextlib.contextmanager
@@ -56,6 +60,18 @@ def node(ros: Ros, name: str, port: int, *arguments: str, **parameters: Any) -> 
         env={'ROS_DOMAIN_ID': str(ros.domain)}))
 
 
+@contextlib.contextmanager
+def bridge(ros: Ros, *arguments_and_devices: str | SimulatedDevice, **parameters: Any) -> Any:
+    """Run a bridge that has found simulated devices; yield their link."""
+    port = free_port()
+    arguments = [one for one in arguments_and_devices if isinstance(one, str)]
+    devices = [one for one in arguments_and_devices if not isinstance(one, str)]
+    with (node(ros, 'bridge', port, *arguments, **parameters) as program,
+          served(port, *devices) as link):
+        program.wait_for(' connected', count=len(devices))
+        yield link
+
+
 def example(
     ros: Ros, name: str, folder: Path, *arguments: str, **changes: str,
 ) -> Any:
@@ -66,15 +82,15 @@ def example(
         marked, count = re.subn(rf'(?m)^{variable} = .*', f'{variable} = {value}', marked)
         assert count == 1
     (folder / f'{name}.py').write_text(head + marked + rest)
-    return Program(sys.executable, f'{name}.py', *arguments, cwd=folder,
-                   env={'ROS_DOMAIN_ID': str(ros.domain)})
+    return Program(name, *arguments, cwd=folder, env={'ROS_DOMAIN_ID': str(ros.domain)},
+                   forked=True)
 
 
 @pytest.mark.parametrize('number', [signal.SIGINT, signal.SIGTERM, signal.SIGKILL])
 def test_the_searchlight_dims_while_it_is_hot_and_goes_off_however_the_program_ends(
         own_ros: Ros, tmp_path: Path, number: int) -> None:
-    port, light = free_port(), SimulatedIlluminator(IlluminatorProperties())
-    with (node(own_ros, 'bridge', port, off_after_silence=2.0), served(port, light) as link,
+    light = SimulatedIlluminator(IlluminatorProperties())
+    with (bridge(own_ros, light, off_after_silence=2.0) as link,
           ended(example(own_ros, 'searchlight', tmp_path)) as program):
         def shines(brightness: float) -> Callable[[], bool]:
             return lambda: light.enabled and light.configuration.brightness == brightness
@@ -93,9 +109,9 @@ def test_the_searchlight_dims_while_it_is_hot_and_goes_off_however_the_program_e
 
 def test_the_searchlight_uses_the_light_of_its_namespace_and_its_diagnostics(
         own_ros: Ros, tmp_path: Path) -> None:
-    port, light = free_port(), SimulatedIlluminator(IlluminatorProperties())
+    light = SimulatedIlluminator(IlluminatorProperties())
     namespace = ['--ros-args', '-r', '__ns:=/uav1']
-    with (node(own_ros, 'bridge', port, '-r', '__ns:=/uav1'), served(port, light) as link,
+    with (bridge(own_ros, light, '-r', '__ns:=/uav1') as link,
           ended(example(own_ros, 'searchlight', tmp_path, *namespace))):
         eventually(lambda: light.enabled)
         link.ask(lambda now: light.heat_to(85.0, now))
@@ -109,12 +125,11 @@ def test_the_searchlight_uses_the_light_of_its_namespace_and_its_diagnostics(
                 'off failed: no light connected.*'])])
 def test_the_searchlight_says_why_it_cannot_be_used_each_failure_once(
         own_ros: Ros, tmp_path: Path, fault: str, lines: list[str]) -> None:
-    port, light = free_port(), SimulatedIlluminator(IlluminatorProperties())
-    with (node(own_ros, 'bridge', port), contextlib.ExitStack() as stack):
+    light = SimulatedIlluminator(IlluminatorProperties())
+    with (bridge(own_ros, *([light] if fault == 'refuse' else [])) as link,
+          contextlib.ExitStack() as stack):
         if fault == 'refuse':
-            link = stack.enter_context(served(port, light))
             link.ask(lambda now: light.behave(light.faults.add(light.behaviour, 'refuse'), now))
-            own_ros.subscribe(Bool, '/illuminator/connected').wait_value(True)
         program = stack.enter_context(ended(
             example(own_ros, 'searchlight', tmp_path, TIMEOUT='1.0')))
 
@@ -126,11 +141,9 @@ def test_the_searchlight_says_why_it_cannot_be_used_each_failure_once(
 
 def test_the_search_looks_in_each_direction_with_the_light_on_and_releases_the_gimbal(
         own_ros: Ros, tmp_path: Path) -> None:
-    port, light = free_port(), SimulatedIlluminator(IlluminatorProperties())
-    gimbal = SimulatedManager(ManagerProperties())
+    light, gimbal = light_and_gimbal()
     pattern = [(20, 30), (40, -10)]
-    with (node(own_ros, 'bridge', port, payloads='[illuminator, gimbal]', off_after_silence=1.5),
-          served(port, light, gimbal),
+    with (bridge(own_ros, light, gimbal, payloads=BOTH, off_after_silence=1.5),
           ended(example(own_ros, 'search_pattern', tmp_path, PATTERN=f'{pattern}',
                         DWELL='0.5')) as program):
         for down, left in pattern:
@@ -146,13 +159,11 @@ HERE, SPOT = (47.397742, 8.545594, 535.5), ('47.3987', '8.5466', '500.0')
 
 @contextlib.contextmanager
 def pointing(
-    ros: Ros, folder: Path, port: int, *devices: SimulatedDevice, **changes: str,
+    ros: Ros, folder: Path, *devices: SimulatedDevice, **changes: str,
 ) -> Iterator[Program]:
     """Run point_at.py for SPOT in a namespace, with a bridge that serves devices."""
     namespace = ['-r', '__ns:=/uav1']
-    with (node(ros, 'bridge', port, *namespace, payloads='[illuminator, gimbal]',
-               geoid_separation=47.5),
-          served(port, *devices),
+    with (bridge(ros, *devices, *namespace, payloads=BOTH, geoid_separation=47.5),
           ended(example(ros, 'point_at', folder, *SPOT, '--ros-args', *namespace,
                         **changes)) as program):
         yield program
@@ -160,14 +171,13 @@ def pointing(
 
 def test_place_is_lit_once_the_gimbal_is_on_target_until_the_program_ends(
         own_ros: Ros, tmp_path: Path) -> None:
-    port, light = free_port(), SimulatedIlluminator(IlluminatorProperties())
-    gimbal = SimulatedManager(ManagerProperties())
+    light, gimbal = light_and_gimbal()
     fixes = own_ros.node.create_publisher(NavSatFix, '/uav1/gimbal/fix', 10)
     latitude, longitude, altitude = HERE
     with (repeated(fixes, NavSatFix(
             status=NavSatStatus(status=NavSatStatus.STATUS_FIX), latitude=latitude,
             longitude=longitude, altitude=altitude), 0.05),
-          pointing(own_ros, tmp_path, port, light, gimbal, TIMEOUT='60.0') as program):
+          pointing(own_ros, tmp_path, light, gimbal, TIMEOUT='60.0') as program):
         own_ros.subscribe(Bool, '/uav1/gimbal/on_target').wait_value(True)
         eventually(lambda: light.enabled)
         assert points_to(gimbal, 15.2, -35.3)
@@ -178,12 +188,11 @@ def test_place_is_lit_once_the_gimbal_is_on_target_until_the_program_ends(
 
 def test_place_is_not_lit_where_the_position_of_the_vehicle_is_unknown(
         own_ros: Ros, tmp_path: Path) -> None:
-    port, light = free_port(), SimulatedIlluminator(IlluminatorProperties())
-    with pointing(own_ros, tmp_path, port, light, SimulatedManager(ManagerProperties()),
-                  TIMEOUT='3.0') as program:
+    light, gimbal = light_and_gimbal()
+    with pointing(own_ros, tmp_path, light, gimbal, TIMEOUT='1.0') as program:
         assert program.wait() == 1
         assert program.log == (
-            'not on target within 3 s: the position of the vehicle is unknown\n')
+            'not on target within 1 s: the position of the vehicle is unknown\n')
         assert not light.enabled
 
 
@@ -198,10 +207,8 @@ def points_to(gimbal: SimulatedManager, down: float, left: float) -> bool:
     (signal.SIGTERM, (0, ''))], ids=['the gimbal is taken', 'SIGINT', 'SIGTERM'])
 def test_the_search_ends_with_the_light_off_and_says_why(
         own_ros: Ros, tmp_path: Path, number: int, outcome: tuple[int, str]) -> None:
-    port, light = free_port(), SimulatedIlluminator(IlluminatorProperties())
-    gimbal = SimulatedManager(ManagerProperties())
-    with (node(own_ros, 'bridge', port, payloads='[illuminator, gimbal]'),
-          served(port, light, gimbal),
+    light, gimbal = light_and_gimbal()
+    with (bridge(own_ros, light, gimbal, payloads=BOTH),
           ended(example(own_ros, 'search_pattern', tmp_path, DWELL='60.0')) as program):
         eventually(lambda: light.enabled)
 
@@ -216,9 +223,8 @@ def test_the_search_ends_with_the_light_off_and_says_why(
 
 def test_the_search_with_a_gimbal_that_is_lost_says_so_and_switches_the_light_off(
         own_ros: Ros, tmp_path: Path) -> None:
-    port, light = free_port(), SimulatedIlluminator(IlluminatorProperties())
-    gimbal = SimulatedManager(ManagerProperties())
-    with (node(own_ros, 'bridge', port, payloads='[illuminator, gimbal]'),
+    port, (light, gimbal) = free_port(), light_and_gimbal()
+    with (node(own_ros, 'bridge', port, payloads=BOTH),
           served(port, light), contextlib.ExitStack() as gimbal_link,
           ended(example(own_ros, 'search_pattern', tmp_path, DWELL='60.0')) as program):
         gimbal_link.enter_context(served(port, gimbal))
@@ -233,10 +239,8 @@ def test_the_search_with_a_gimbal_that_is_lost_says_so_and_switches_the_light_of
 
 def test_the_search_releases_the_gimbal_of_a_light_that_refuses_to_go_off_and_says_why(
         own_ros: Ros, tmp_path: Path) -> None:
-    port, light = free_port(), SimulatedIlluminator(IlluminatorProperties())
-    gimbal = SimulatedManager(ManagerProperties())
-    with (node(own_ros, 'bridge', port, payloads='[illuminator, gimbal]'),
-          served(port, light, gimbal) as link,
+    light, gimbal = light_and_gimbal()
+    with (bridge(own_ros, light, gimbal, payloads=BOTH) as link,
           ended(example(own_ros, 'search_pattern', tmp_path, DWELL='60.0')) as program):
         eventually(lambda: light.enabled)
         link.ask(lambda now: light.behave(light.faults.add(light.behaviour, 'refuse'), now))
