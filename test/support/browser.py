@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 import contextlib
+import functools
 import json
 import re
 import shutil
@@ -45,10 +46,18 @@ window.WebSocket = class extends WebSocket {
   }
 };
 """
+# Waits in the page until it has received more than so many characters.
+GROWN = f"""
+const [length, done] = arguments, end = Date.now() + {PATIENCE * 1e3 - 1e3};
+const look = () => (window.received || '').length > length ? done(true)
+  : Date.now() > end ? done(false) : setTimeout(look, 20);
+look();
+"""
 _TOKEN = re.compile('\x1b\\[(\\d*);?(\\d*)H|\x1b][^\x1b\x07]*(?:\x1b\\\\|\x07)|'
                     '\x1b\\[[^@-~]*[@-~]|\x1b.|[^\x1b]', re.DOTALL)
 
 
+@functools.lru_cache(maxsize=1)
 def screen(output: str) -> list[str]:
     """Return the lines that a terminal shows after this output."""
     cells: dict[tuple[int, int], str] = {}
@@ -102,25 +111,6 @@ class Browser:
         self.cdp('Page.addScriptToEvaluateOnNewDocument', source=RECORDER)
         self._call('POST', '/url', {'url': url})
 
-    @property
-    def tab(self) -> str:
-        """Return the tab in use."""
-        return str(self._call('GET', '/window'))
-
-    def use(self, tab: str) -> None:
-        """Use another tab."""
-        self._call('POST', '/window', {'handle': tab})
-
-    def new_tab(self) -> str:
-        """Open a tab, use it, and return it."""
-        tab: str = self._call('POST', '/window/new', {'type': 'tab'})['handle']
-        self.use(tab)
-        return tab
-
-    def close_tab(self) -> None:
-        """Close the tab in use; another one must be used next."""
-        self._call('DELETE', '/window')
-
     def press(self, *keys: str) -> None:
         """Press keys, which go to the part of the page that has the focus."""
         self._call('POST', '/actions', {'actions': [{
@@ -135,14 +125,18 @@ class Browser:
     @property
     def lines(self) -> list[str]:
         """Return the lines of the terminal in the page."""
-        return screen(self.run('return window.received'))
+        return screen(self._received())
 
     def wait_for(self, text: str) -> None:
         """Wait until the terminal shows a text."""
-        try:
-            eventually(lambda: text in self.text, f'{text!r} on the page')
-        except AssertionError as error:
-            raise AssertionError(f'{error}: {self.text}') from None
+        while text not in ' '.join(' '.join(screen(received := self._received())).split()):
+            assert self._call('POST', '/execute/async', {
+                'script': GROWN, 'args': [len(received.encode('utf-16-le')) // 2]}), (
+                    f'{text!r} is not on the page: {self.text}')
+
+    def _received(self) -> str:
+        """Return all output that the page has received."""
+        return str(self.run('return window.received || ""'))
 
     def _place(self, label: str) -> tuple[int, int]:
         """Return row and column of a text."""
