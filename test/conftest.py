@@ -12,7 +12,8 @@ import pytest
 
 # The time of an example depends on the machine and on its other load.
 settings.register_profile(
-    'steady', deadline=None, derandomize=True, suppress_health_check=[HealthCheck.too_slow])
+    'steady', deadline=None, derandomize=True, max_examples=40,
+    suppress_health_check=[HealthCheck.too_slow])
 settings.load_profile('steady')
 # Files that take longer than 10 s.
 LONG = {f'test_{name}.py' for name in (

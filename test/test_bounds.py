@@ -11,7 +11,7 @@ import functools
 import itertools
 from types import SimpleNamespace
 from typing import Any, NamedTuple
-from unittest.mock import Mock
+from unittest.mock import Mock, patch
 
 from illuminator_ros.gimbal.client import MAX_COMPONENTS, MAX_GIMBALS
 from illuminator_ros.gimbal.manager_state import MAX_OTHER_DEVICES
@@ -22,11 +22,10 @@ from illuminator_ros.illuminator.simulated_properties import (
     IlluminatorBehaviour,
     IlluminatorProperties,
 )
-from illuminator_ros.mavlink import frame_writer
+from illuminator_ros.mavlink import duplicate_filter, frame_writer
 from illuminator_ros.mavlink.command_receiver import MAX_RESULTS
 from illuminator_ros.mavlink.command_sender import CommandSender, MAX_TARGETS
 from illuminator_ros.mavlink.component import Component, Endpoint
-from illuminator_ros.mavlink.duplicate_filter import MAX_FRAMES
 from illuminator_ros.mavlink.forward_queue import ForwardQueue, MAX_QUEUED
 from illuminator_ros.mavlink.forwarded_commands import MAX_COMMANDS
 from illuminator_ros.mavlink.listener import Listener
@@ -57,8 +56,9 @@ from support.signers import checker, signed_frame
 from support.simulated_link import SimulatedLink
 
 OURS = Address(1, 193)
-# More than any bound but MAX_FRAMES.
-COUNT = 1500
+# More than any bound but those of MANY.
+COUNT = 300
+MANY = 1500
 # Smaller stores belong to one device, or hold tables of the program.
 SMALL = 40
 COMMAND = CommandLong(*OURS, 1000, 0, 0, 0, 0, 0, 0, 0, 0)
@@ -83,9 +83,11 @@ def linked(
     return link
 
 
-def bridge(message: Message, *, pause: float = 0.003, **options: Any) -> object:
+def bridge(
+    message: Message, *, count: int = COUNT, pause: float = 0.003, **options: Any,
+) -> object:
     return linked(Client(OURS, LightSettings(), **options),
-                  *(frame_of(message, 0, one) for one in senders()), pause=pause)
+                  *(frame_of(message, 0, one) for one in senders(count)), pause=pause)
 
 
 def beginnings_of_frames() -> object:
@@ -94,7 +96,7 @@ def beginnings_of_frames() -> object:
 
 def signed_streams() -> object:
     frames = (signed_frame(ticks(1.7e9 + 1000.0), link_id=number % 256, source=source)
-              for number, source in enumerate(senders()))
+              for number, source in enumerate(senders(MANY)))
     return linked(Client(OURS, LightSettings()), *frames, signing=checker())
 
 
@@ -115,7 +117,8 @@ def requests() -> object:
     return link
 
 
-def forwarded(count: int, message: Message) -> object:
+@patch.object(duplicate_filter, 'MAX_FRAMES', COUNT)
+def forwarded(message: Message) -> object:
     """Frames between two lines of a router."""
     network = Network()
     ports = [network.port(name, has_clients=True) for name in ('first', 'second')]
@@ -125,7 +128,7 @@ def forwarded(count: int, message: Message) -> object:
         port.wires['peer'] = lambda data: None
         port.take('peer', frame_of(heartbeat(6), 0, LIGHT))
     network.settle()
-    for number, source in zip(range(count), itertools.cycle(senders()), strict=False):
+    for number, source in zip(range(2 * COUNT), itertools.cycle(senders()), strict=False):
         ports[0].take('peer', frame_of(message, number // COUNT, source))
         network._carried.clear()
     return router.lines
@@ -133,7 +136,7 @@ def forwarded(count: int, message: Message) -> object:
 
 def waiting_frames() -> object:
     queue = ForwardQueue(Counter())
-    for source in senders():
+    for source in senders(MANY):
         queue.put(only(frame_of(heartbeat(6), 0, source)), 0.0)
     return queue
 
@@ -182,11 +185,11 @@ def gimbals(*messages: Message) -> object:
     return rig.component
 
 
-def simulator(message: Message) -> object:
+def simulator(message: Message, count: int = COUNT) -> object:
     delayed = IlluminatorBehaviour(slow=30.0)
     lights = [SimulatedIlluminator(IlluminatorProperties(behaviour=delayed))]
     return linked(SimulatedComponents(lights, 1000.0),
-                  *(frame_of(message, 0, source) for source in senders()))
+                  *(frame_of(message, 0, source) for source in senders(count)))
 
 
 def discovered() -> object:
@@ -272,7 +275,7 @@ ROWS = {
         {**LINK, **SENT, **HEARTBEATS}),
     'heartbeats of other components': Row(
         functools.partial(bridge, heartbeat(2)), {**LINK, **HEARTBEATS}, SENT),
-    'statuses': Row(functools.partial(bridge, status_message(100)), {**LINK, **LIGHTS}, SENT),
+    'statuses': Row(functools.partial(bridge, status_message(100), count=MANY), {**LINK, **LIGHTS}, SENT),
     'lights that are not the target': Row(
         functools.partial(bridge, status_message(100), wanted=lambda one: False),
         {**LINK, 'Discovery.ignored': MAX_IGNORED}, SENT),
@@ -284,12 +287,12 @@ ROWS = {
     'requests to a light': Row(requests, {
         'Requests.standing': MAX_CALLS}),
     'forwarded frames': Row(
-        functools.partial(forwarded, MAX_FRAMES + COUNT, heartbeat(44)),
-        {'DuplicateFilter.arrivals': MAX_FRAMES, 'RoutingTable.routes': MAX_ROUTES,
+        functools.partial(forwarded, heartbeat(44)),
+        {'DuplicateFilter.arrivals': COUNT, 'RoutingTable.routes': MAX_ROUTES,
          'Traffic.sources': MAX_SOURCES}),
     'forwarded commands': Row(
         commanded, {'ForwardedCommands.sent': MAX_COMMANDS},
-        {'DuplicateFilter.arrivals': MAX_FRAMES}),
+        {'DuplicateFilter.arrivals': 2 * COUNT}),
     'frames for a slow line': Row(
         waiting_frames, {'ForwardQueue.held[]': MAX_QUEUED // len(frame_of(heartbeat(6)))}),
     'commands of players': Row(
@@ -313,7 +316,7 @@ ROWS = {
         functools.partial(simulator, heartbeat(18)),
         {**LINK, 'SimulatedComponents.peers': simulated.MAX_PEERS}, SENT),
     'delayed answers of the simulator': Row(
-        functools.partial(simulator, CommandLong(*LIGHT, 405, 0, 1, 0, 0, 0, 0, 0, 0)),
+        functools.partial(simulator, CommandLong(*LIGHT, 405, 0, 1, 0, 0, 0, 0, 0, 0), MANY),
         {**LINK, 'SimulatedComponents.peers': simulated.MAX_PEERS,
          'SimulatedComponent.delayed': simulated.MAX_DELAYED}, SENT),
     'components of discover': Row(

@@ -37,7 +37,7 @@ def assert_within_limits(pair: Pair) -> None:
         assert command.param3 == 0 or float32(command.param3) >= float32(0.34)
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=25)
 @given(strategies.lists(strategies.tuples(
     strategies.sampled_from(['configure', 'stream', 'override', 'restart', 'other sender']),
     percent, period, strategies.floats(0, 3)), max_size=12), strategies.integers(0, 99))

@@ -1,7 +1,7 @@
 # Copyright 2026 The illuminator_ros developers
 # SPDX-License-Identifier: Apache-2.0
 
-"""Thousands of commands over lines that lose, repeat, reorder, delay and corrupt frames."""
+"""Two thousand commands over lines that lose, repeat, reorder, delay and corrupt frames."""
 
 from __future__ import annotations
 
@@ -11,6 +11,7 @@ import pytest
 from support.lossy_line import CONFIRMED, Run
 from support.wire import Faults
 
+COMMANDS = 120
 KINDS = ('drop', 'duplicate', 'reorder', 'delay', 'corrupt')
 # Name -> faults of the line towards the lights, and faults on the way back.
 LINES: dict[str, tuple[tuple[str, ...], tuple[str, ...]]] = {
@@ -27,7 +28,7 @@ LEAST = {('drop', 0.0): 1.0, ('drop', 0.3): 0.98, ('drop', 0.5): 0.88}
 
 def play(line: str, share: float) -> Run:
     there, back = (Faults(**dict.fromkeys(kinds, share)) for kinds in LINES[line])
-    return Run(there, back, f'{line} {share}')
+    return Run(there, back, f'{line} {share}', commands=COMMANDS)
 
 
 @pytest.mark.parametrize(('line', 'share'), [

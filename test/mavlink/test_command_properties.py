@@ -74,4 +74,4 @@ class CommandSenderMachine(RuleBasedStateMachine):
 
 
 TestCommandSenderMachine = CommandSenderMachine.TestCase
-TestCommandSenderMachine.settings = settings(max_examples=80, stateful_step_count=30)
+TestCommandSenderMachine.settings = settings(max_examples=40, stateful_step_count=30)

@@ -82,7 +82,7 @@ def test_path_without_regular_file_is_refused_with_the_reason(tmp_path: Path) ->
 
 @given(st.binary(max_size=80) | st.text(max_size=80).map(str.encode)
        | st.binary(min_size=32, max_size=32))
-@settings(max_examples=100)
+@settings(max_examples=20)
 def test_any_content_is_a_key_of_32_bytes_or_refused_without_showing_it(
         tmp_path_factory: pytest.TempPathFactory, content: bytes) -> None:
     path = key_file(tmp_path_factory.getbasetemp(), content)

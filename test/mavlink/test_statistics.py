@@ -82,7 +82,7 @@ def journeys(draw: st.DrawFn) -> tuple[list[int], Counts]:
 
 
 @given(journeys())
-@settings(max_examples=30)
+@settings(max_examples=15)
 def test_counts_agree_with_numbers_that_do_not_wrap(journey: tuple[list[int], Counts]) -> None:
     order, expected = journey
     assert counts(after(order)) == expected
