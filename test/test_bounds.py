@@ -275,7 +275,8 @@ ROWS = {
         {**LINK, **SENT, **HEARTBEATS}),
     'heartbeats of other components': Row(
         functools.partial(bridge, heartbeat(2)), {**LINK, **HEARTBEATS}, SENT),
-    'statuses': Row(functools.partial(bridge, status_message(100), count=MANY), {**LINK, **LIGHTS}, SENT),
+    'statuses': Row(
+        functools.partial(bridge, status_message(100), count=MANY), {**LINK, **LIGHTS}, SENT),
     'lights that are not the target': Row(
         functools.partial(bridge, status_message(100), wanted=lambda one: False),
         {**LINK, 'Discovery.ignored': MAX_IGNORED}, SENT),

@@ -18,8 +18,7 @@ from textual.widgets import DataTable
 
 
 @pytest.mark.parametrize(('size', 'count'), [
-    ((500, 500), 40), ((200, 50), 40), ((80, 24), 0), ((80, 24), 40), ((40, 44), 40),
-    ((20, 6), 1), ((20, 6), 40), ((12, 3), 40), ((5, 2), 40), ((1, 1), 40), ((1, 1), 0)])
+    ((200, 50), 40), ((80, 24), 0), ((40, 44), 40), ((20, 6), 40), ((5, 2), 40), ((1, 1), 0)])
 def test_screen_fits_every_terminal_and_shows_the_selected_device(
     size: tuple[int, int], count: int,
 ) -> None:
@@ -191,23 +190,24 @@ def test_first_click_acts_in_a_window_without_the_focus() -> None:
     show(test, light(), gimbal())
 
 
-@pytest.mark.parametrize('before', [[], ['space'], ['end', 'p', '4', '7'], ['end', 'm']])
-def test_all_off_acts_at_once_whatever_is_shown(before: list[str]) -> None:
+BEFORE: tuple[list[str], ...] = ([], ['space'], ['end', 'p', '4', '7'], ['end', 'm'])
+
+
+def test_all_off_acts_at_once_whatever_is_shown() -> None:
     gone = light('/gone')
     gone.is_gone = True
 
     async def test(screen: Screen) -> None:
-        await screen.press(*before, 'a')
-        assert 'ALL OFF' in screen.text
+        for before in BEFORE:
+            await screen.press('escape', 'home', *before, 'a')
+            assert 'ALL OFF' in screen.text
 
     assert show(test, light(), gone, light('/stern', connected=False), gimbal()).asked == [
-        ('/bow', 'off'), ('/stern', 'off')]
+        ('/bow', 'off'), ('/stern', 'off')] * len(BEFORE)
 
 
 @pytest.mark.parametrize(('before', 'size'), [
-    ([], (200, 50)), ([], (20, 6)), (['space'], (80, 24)), (['space'], (20, 6)),
-    (['end', 'p', '4', '7'], (54, 12)), (['end', 'p', '4', '7'], (20, 6)),
-    (['end', 'm'], (54, 12)), (['end', 'm'], (20, 6))])
+    *((before, (20, 6)) for before in BEFORE), (['space'], (80, 24))])
 def test_all_off_is_one_touch_away_whatever_is_shown(
     before: list[str], size: tuple[int, int],
 ) -> None:
@@ -352,7 +352,7 @@ def test_each_key_to_quit_ends_the_monitor(key: str) -> None:
         await screen.press(key)
         assert not screen.app.is_running or screen.app._exit
 
-    show(test, light())
+    show(test, light(), size=(20, 6))
 
 
 def test_labels_of_keys_are_not_keys_of_others() -> None:

@@ -44,7 +44,7 @@ def test_keys_switch_and_dim_the_light(own_ros: Ros, port: int) -> None:
         assert (light.fake.fields['enable'], light.fake.fields['brightness']) == (1, 90.0)
 
 
-@pytest.mark.parametrize('way', ['q', '\x03', 'SIGTERM', 'SIGHUP', 'SIGSEGV', 'SIGRTMAX'])
+@pytest.mark.parametrize('way', ['\x03', 'SIGTERM', 'SIGSEGV'])
 def test_end_restores_the_terminal(own_ros: Ros, way: str) -> None:
     with monitor(own_ros) as screen:
         screen.wait_for('no devices in this ROS graph yet')
@@ -107,16 +107,6 @@ def test_monitor_ends_with_status_0_when_its_terminal_closes(own_ros: Ros) -> No
         screen.hang_up()
 
         assert screen.wait() == 0
-
-
-def test_screen_follows_the_size_of_the_terminal(own_ros: Ros) -> None:
-    with monitor(own_ros, size=(24, 100)) as screen:
-        screen.wait_for('a ALL OFF')
-
-        screen.forget()
-        screen.resize(5, 30)
-
-        screen.wait_for('ROS graph v colours')
 
 
 def test_bytes_that_are_not_utf_8_do_not_end_the_monitor(own_ros: Ros) -> None:
