@@ -25,7 +25,7 @@ from illuminator_ros.illuminator.light_queries import MESSAGE
 from illuminator_ros.illuminator.rules import REQUIRED
 from illuminator_ros.illuminator.simulated_properties import PROFILES
 from illuminator_ros.mavlink.retries import CLOSING, COMMAND, CONNECTION, REJECTED, RESOURCE
-from illuminator_ros.payload.attempt import STATUS, STILL_UNCONFIRMED, UNCONFIRMED
+from illuminator_ros.payload.attempt import REPEAT, SLOW_REPEAT, STATUS
 from illuminator_ros.rededge.conversions import FIELDS
 from illuminator_ros.rededge.pings import PING
 from illuminator_ros.rededge.simulated import COLUMNS
@@ -64,7 +64,7 @@ def tool_tables() -> Tables:
             [one.subject, f'{one.first:g}', f'{one.longest:g}',
              '' if one.tries == math.inf else f'{one.tries:g}']
             for one in (
-                CONNECTION, COMMAND, REJECTED, STATUS, UNCONFIRMED, STILL_UNCONFIRMED, CLOSING,
+                CONNECTION, COMMAND, REJECTED, STATUS, REPEAT, SLOW_REPEAT, CLOSING,
                 REQUIRED, MESSAGE, GIMBAL_MESSAGE, DEVICE_INFORMATION, ZERO_RATE, STILL_TURNING,
                 PING, RESOURCE)],
         ('ros', 'argument of `bridge.launch.xml`'): launch_arguments('bridge.launch.xml'),

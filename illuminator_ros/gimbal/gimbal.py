@@ -76,7 +76,7 @@ def describe(values: Values) -> str:
         return 'take control' if value else 'release control'
     if isinstance(value, SETPOINTS):
         return 'a setpoint'
-    return value.wish if isinstance(value, Flag) else point(0, value).goal
+    return value.wish if isinstance(value, Flag) else point(0, value).label
 
 
 @dataclass(frozen=True)
@@ -176,8 +176,8 @@ class Gimbal:
                     f'({format_seconds(now - one.since)})')), now)
         setpoints.reported(status, now)
         for one in self._releases:
-            if not setpoints.may_turn and one.due > now:
-                one.due, one.until = now, now + REQUEST_LIMIT
+            if not setpoints.may_turn and one.not_before > now:
+                one.not_before, one.deadline = now, now + REQUEST_LIMIT
         self._step(now)
         self._emit(events.AttitudeReceived(
             self.key, device.attitude, device.flags, device.errors))
@@ -256,15 +256,15 @@ class Gimbal:
             due = now + STOP_LIMIT_AT_END if self._commands.refusal else math.inf
         # Nothing that comes after the zero may turn the gimbal, as ArduPilot would let it.
         self._end_commands('superseded by a release of control', now, superseded=True)
-        self._request_control(False, now, done, due=due)
+        self._request_control(False, now, done, not_before=due)
 
     def _request_control(
-        self, take: bool, now: float, done: Done, *, due: float = -math.inf,
+        self, take: bool, now: float, done: Done, *, not_before: float = -math.inf,
     ) -> None:
         control, refusal = self.reports.control, self._commands.refusal
         new = Request(
             {CONTROL: take}, Why.END if refusal else Why.REQUEST, now, done=done, is_call=True,
-            due=due, until=now + REQUEST_LIMIT,
+            not_before=not_before, deadline=now + REQUEST_LIMIT,
             detail=f'superseded by {describe({CONTROL: take})}')
         if reason := (refusal if take else '') or self.reports.absence(now):
             self._end_one(new, Result(False, reason), now)
@@ -298,8 +298,8 @@ class Gimbal:
         for served in self._commanded.step(Goal.strongest(control, CONTROL, now),
                                            Goal.strongest(live, MOVE, now), now):
             self._end_one(served.request, served.result, now)
-        self.requests.answer(now)
-        self.control.answer(now)
+        self.requests.send_replies(now)
+        self.control.send_replies(now)
         self._set_due(now)
 
     def _end_one(self, one: Request, result: Result, now: float) -> None:
@@ -337,7 +337,7 @@ class Gimbal:
         self._settings = settings
         for one in self.requests.live():
             if isinstance(one.values.get(MOVE), Rates):
-                one.until = min(one.until, now + settings.setpoint_timeout)
+                one.deadline = min(one.deadline, now + settings.setpoint_timeout)
         if settings.sources:
             self.requests.claims.set_lease(settings.sources.timeout)
             self._expire(now)
@@ -407,7 +407,7 @@ class Gimbal:
                  math.inf if isinstance(wish, Attitude) else
                  LOCK_LIMIT if is_lock else REQUEST_LIMIT)
         new = Request({YAW_LOCK if is_lock else MOVE: wish}, Why.REQUEST, now, source, done,
-                      is_call, until=now + limit)
+                      is_call, deadline=now + limit)
         if not is_call and self._is_repetition(new, now):
             done(Result(False, 'repeated', superseded=True), now)
             return
@@ -465,7 +465,7 @@ class Gimbal:
 
         self.update(now)
         self._expire(now)
-        for one in self.requests.late(now) + self.control.late(now):
+        for one in self.requests.overdue(now) + self.control.overdue(now):
             self._end_one(one, self._out_of_time(one, now), now)
         self._step(now, self._commanded.poll(now))
         if self.reports.in_control:

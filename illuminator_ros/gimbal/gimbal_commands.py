@@ -60,7 +60,7 @@ class GimbalCommands:
         goals = {CONTROL: control}
         if move is not None and not isinstance(move.values, SETPOINTS):
             # Another place, of a topic, may be under way.
-            goals[POSE if isinstance(move.values, Flag) else PLACE] = move._replace(waits=True)
+            goals[POSE if isinstance(move.values, Flag) else PLACE] = move._replace(gives_way=True)
         return [served for name, one in self._properties.items() for served in one.steer(
             goals.get(name), now, None, self._gaps.get(name, (0.0, None))[1])]
 

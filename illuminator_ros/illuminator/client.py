@@ -166,7 +166,7 @@ class IlluminatorClient(Payload):
 
 def enable_all(
     lights: Sequence[Light], on: bool, now: float, done: Done, *,
-    name: Callable[[Light], str], detail: str = '', is_stream: bool = False,
+    name: Callable[[Light], str], detail: str = '', is_call: bool = True,
 ) -> None:
     """
     Switch all connected lights on or off, in parallel.
@@ -176,7 +176,7 @@ def enable_all(
         one light is connected and all connected lights succeeded; the message has the outcome of
         each light.
     :param name: returns the name of a light, for people.
-    :param detail: as for :meth:`.light.Light.enable`, and ``is_stream``.
+    :param detail: as for :meth:`.light.Light.enable`, and ``is_call``.
     """
     connected = [light for light in lights if light.connected]
     outcomes: dict[Light, Result] = {}
@@ -190,7 +190,7 @@ def enable_all(
     # A lost light fails at once, but an OFF replaces a remembered ON.
     for light in lights:
         light.enable(on, now, functools.partial(outcome, light), detail=detail,
-                     is_stream=is_stream)
+                     is_call=is_call)
 
 
 def _summary(

@@ -80,7 +80,7 @@ def decide(live: list[Request], shown: Shown, limits: SafetyLimits, now: float) 
         name: value for name, value in one.values.items()
         if name in FIELDS and (one.is_call or name not in left_out)})]
     # Rules that are not due yet go along with what is.
-    if not any(now >= one.due for one, _ in wanted):
+    if not any(now >= one.not_before for one, _ in wanted):
         return Goals(switch)
     return _configuration(wanted, shown, limits, now, may_light_up='brightness' not in left_out
                           )._replace(switch=switch)
@@ -115,6 +115,7 @@ def _configuration(
     configuration = limits.clipped(replace(base, **values), shown.strobe_range)
     calls = [one for one in serves if one.is_call]
     is_asked = any(one.is_wish for one in serves)
-    until = (max(one.until for one in calls) if calls
-             else now + CONFIGURE_LIMIT if is_asked else math.inf)
-    return Goals(None, Goal.of(configuration, serves, until=until, note=note, waits=not calls))
+    deadline = (max(one.deadline for one in calls) if calls
+                else now + CONFIGURE_LIMIT if is_asked else math.inf)
+    return Goals(None, Goal.of(
+        configuration, serves, deadline=deadline, note=note, gives_way=not calls))

@@ -254,20 +254,20 @@ class Light:
 
     def enable(
         self, on: bool, now: float, done: Done, *, detail: str = '', source: str = DEFAULT,
-        is_stream: bool = False,
+        is_call: bool = True,
     ) -> None:
         """
         Switch the light on or off; ``done`` is called once with the result.
 
-        While a higher source holds the light, a request is not sent. One of a stream is then
-        remembered, and any other is refused and leaves nothing behind.
+        While a higher source holds the light, a request is not sent. A message of a topic
+        is then remembered, and a call is refused and leaves nothing behind.
 
         :param detail: how it was requested, for :class:`LightSwitched`.
-        :param is_stream: whether it is one of a stream, which its publisher repeats: a newer one
-            replaces it.
+        :param is_call: whether a caller waits for the result; else it is a message of a topic,
+            which its publisher repeats: a newer one replaces it.
         """
         self._make(Request({'enabled': on}, Why.REQUEST, now, source, done,
-                           is_call=not is_stream, detail=detail), now)
+                           is_call=is_call, detail=detail), now)
 
     def configure(self, changes: Changes, now: float, done: Done) -> None:
         """
@@ -278,7 +278,7 @@ class Light:
         :param changes: values by name, see :data:`~.model.FIELDS`; if one is wrong none is sent.
         """
         self._make(Request({**changes}, Why.REQUEST, now, DEFAULT, done, is_call=True,
-                           until=now + CONFIGURE_LIMIT), now)
+                           deadline=now + CONFIGURE_LIMIT), now)
 
     def set_brightness(
         self, brightness: float, now: float, *, source: str = DEFAULT,
@@ -359,7 +359,7 @@ class Light:
         self.users.expire(now)
         if self.connected:
             self._control.step(now)
-        self._requests.answer(now)
+        self._requests.send_replies(now)
         self._commands.schedule.at(self.poll, min(
             self._control.due(now) if self.connected else math.inf,
             self._requests.next_due(now), self._queries.due,

@@ -20,7 +20,7 @@ from ..payload.device_property import plan_of, Property
 from ..payload.requests import Goal, Request, Requests, Result, WEAK, Why
 
 
-def _waits(one: Request, goal: Goal, name: str) -> bool:
+def _is_left_out(one: Request, goal: Goal, name: str) -> bool:
     """Return whether a field of a rule waits until the light is on."""
     return (name == 'brightness' and not goal.values.brightness
             and bool(one.values[name]) and one.why in WEAK)
@@ -29,7 +29,7 @@ def _waits(one: Request, goal: Goal, name: str) -> bool:
 def plan_configuration(goal: Goal) -> tuple[Change[Status], Mapping[Request, Change[Status]]]:
     """Return the command of a goal of the configuration, and what each request asks of it."""
     asked: dict[Request, list[str]] = {one: [
-        name for name in FIELDS if name in one.values and not _waits(one, goal, name)
+        name for name in FIELDS if name in one.values and not _is_left_out(one, goal, name)
         or goal.note and name == 'strobe_duty_cycle' and 'strobe_period' in one.values]
         for one in goal.serves}
     whole = [name for name in FIELDS if any(name in names for names in asked.values())]
@@ -85,7 +85,7 @@ class LightControl:
             self._tell_automatic('')
         attempt = self.switch.attempt
         failure = attempt.failure() if attempt is not None and attempt.goal.insists else ''
-        for one in self._requests.late(now):
+        for one in self._requests.overdue(now):
             if 'enabled' in one.values:
                 self._requests.end(one, Result(False, failure or (
                     'off not confirmed: no answer to an earlier OFF, which is sent again')), now)
@@ -117,16 +117,16 @@ class LightControl:
         self._withdrawn(self.configuration.withdraw(text, now), now)
         self.switch.fence_until(self.configuration.fence_ends_at)
 
-    def _steer(self, part: Property[Status], goal: Goal | None, now: float) -> bool:
+    def _steer(self, prop: Property[Status], goal: Goal | None, now: float) -> bool:
         """Have a goal under way; return whether a command was begun."""
-        before = part.attempt
+        before = prop.attempt
         if before is not None and self._requests.of_commander(before.serves) != before.serves:
-            self._withdrawn(part.withdraw('held by another source', now), now)
-        served = part.steer(goal, now, self._twin.status, self._twin.gap)
-        if part.attempt is before:
+            self._withdrawn(prop.withdraw('held by another source', now), now)
+        served = prop.steer(goal, now, self._twin.status, self._twin.gap)
+        if prop.attempt is before:
             return False
         self._withdrawn(served, now)
-        return part.attempt is not None
+        return prop.attempt is not None
 
     def _tell_automatic(self, failure: str) -> None:
         """Report an automatic OFF, and once why it is not confirmed."""
@@ -148,8 +148,8 @@ class LightControl:
 
     def cancel(self, text: str, now: float) -> None:
         """Send nothing any more of what is under way: the light is lost, or the process ends."""
-        for part in self.switch, self.configuration:
-            self._withdrawn(part.withdraw(text, now), now)
+        for prop in self.switch, self.configuration:
+            self._withdrawn(prop.withdraw(text, now), now)
 
     def cancel_configuration(self, now: float) -> None:
         """Send no configuration again that is beyond the limits, or that a limit has asked for."""
@@ -229,9 +229,9 @@ class LightControl:
     def reported(self, status: Status, now: float) -> None:
         """Take a status that is not older than those before."""
         twin, switch, configuration = self._twin, self.switch, self.configuration
-        gap, late = twin.gap or 0.0, configuration.unconfirmed(now)
-        sent_at = max(switch.sent_at, -math.inf if late else configuration.sent_at)
-        ours = OwnCommands(self.configuration.is_busy, late, sent_at + IMPLIED_TIME)
+        gap, unconfirmed = twin.gap or 0.0, configuration.unconfirmed(now)
+        sent_at = max(switch.sent_at, -math.inf if unconfirmed else configuration.sent_at)
+        ours = OwnCommands(self.configuration.is_busy, unconfirmed, sent_at + IMPLIED_TIME)
         before, was_off_by_heat = twin.enabled, twin.is_off_by_heat
         twin.update(status)
         origin = (events.LATE_EFFECT if self._is_late(now) else
@@ -257,7 +257,7 @@ class LightControl:
         twin.compare(rules.waiting if weak else (), ours)
         if weak and not was_agreed and twin.agreed is not None:
             for one in weak:
-                one.due = min(one.due, now)
+                one.not_before = min(one.not_before, now)
         rules.keep_limits(now, is_busy=self.configuration.is_busy)
 
     def restarted(self, status: Status, now: float) -> None:
@@ -268,24 +268,24 @@ class LightControl:
         attempt, wanted = self.configuration.attempt, self._twin.agreed
         self._rules.restore({} if wanted is None else {
             name: getattr(wanted, name) for name in FIELDS if name != 'mode' or wanted.mode}, now)
-        for part in self.switch, self.configuration:
-            part.restarted(status, now)
+        for prop in self.switch, self.configuration:
+            prop.restarted(status, now)
         self._twin.restarted(status)
         self._compare(status, OwnCommands(is_busy=attempt is not None), now)
 
     # Results
 
-    def _serve(self, part: Property[Status], ended: list[Served[Status]], now: float) -> bool:
+    def _serve(self, prop: Property[Status], ended: list[Served[Status]], now: float) -> bool:
         """Take the requests that a command has ended; return whether there are any."""
         for served in ended:
-            if part is self.switch:
+            if prop is self.switch:
                 self._switched(served, now)
             else:
                 self._configured(served, now)
-        for one in self._requests.live() if ended and part.attempt is None else ():
+        for one in self._requests.live() if ended and prop.attempt is None else ():
             # A call for the same values that has no time to wait for another command.
             if (one.is_call and one.values == ended[-1].request.values
-                    and now + self._target.commands.timeout > one.until):
+                    and now + self._target.commands.timeout > one.deadline):
                 self._requests.end(one, ended[-1].result, now)
         return bool(ended)
 
@@ -329,8 +329,8 @@ class LightControl:
 
     def poll(self, now: float) -> None:
         """Go on with the commands that are due."""
-        for part in self.switch, self.configuration:
-            self._serve(part, part.poll(now), now)
+        for prop in self.switch, self.configuration:
+            self._serve(prop, prop.poll(now), now)
 
     def silence_due(self, now: float) -> float:
         """Return when ``off_after_silence`` switches the light off, infinity for never."""

@@ -20,7 +20,7 @@ from .twin import Failure, Twin
 from ..mavlink.command_sender import format_seconds
 from ..mavlink.errors import InvalidValue
 from ..mavlink.retries import RetryPolicy
-from ..payload.attempt import Target, UNCONFIRMED
+from ..payload.attempt import REPEAT, Target
 from ..payload.requests import Request, Requests, Result, WEAK, Why
 
 REQUIRED = RetryPolicy('a restored configuration, overrides and limits', 2.0, 60.0)
@@ -82,7 +82,7 @@ class Rules:
             self._put_off(Why.END, 'the end', now)
         self.forget_silenced(now)
 
-    def release(self, reason: str, now: float) -> None:
+    def put_release_off(self, reason: str, now: float) -> None:
         """Put the OFF of a release."""
         self._put(Why.RELEASE, {'enabled': False}, reason, now)
 
@@ -93,7 +93,7 @@ class Rules:
     def switched(self, one: Request, on: bool, now: float) -> None:
         """Note that the light shows what a request wanted of its switch."""
         # Two lights with one address end an OFF and need the next at the speed of the line.
-        self._off_due = -math.inf if one.why is Why.REQUEST else now + UNCONFIRMED.first
+        self._off_due = -math.inf if one.why is Why.REQUEST else now + REPEAT.first
         if self.wants_off is not None:
             self.wants_off = on
 
@@ -105,14 +105,16 @@ class Rules:
 
     def _put_off(self, why: Why, reason: str, now: float) -> None:
         if not any(one.why is why for one in self._requests.standing):
-            self._put(why, {'enabled': False}, reason, now, due=self._off_due)
+            self._put(why, {'enabled': False}, reason, now, not_before=self._off_due)
 
     def _put(
-        self, why: Why, values: dict[str, Any], reason: str, now: float, *, due: float = -math.inf,
+        self, why: Why, values: dict[str, Any], reason: str, now: float, *,
+        not_before: float = -math.inf,
     ) -> None:
         # While the process ends, nothing else is wanted.
         if why is Why.END or not self._target.commands.refusal:
-            self._requests.put(Request(values, why, now, detail=reason, due=due), now)
+            self._requests.put(
+                Request(values, why, now, detail=reason, not_before=not_before), now)
 
     # The configuration
 
@@ -129,7 +131,7 @@ class Rules:
     def require(self, values: Changes, now: float) -> None:
         """Send values that were given at the start, once the light has reported its own."""
         self._put(Why.OVERRIDE, self.settings.limits.clip(values), 'override', now,
-                  due=self._first_due(now))
+                  not_before=self._first_due(now))
 
     def _first_due(self, now: float) -> float:
         return now if self._twin.agreed else now + FIRST_STATUS_TIMEOUT
@@ -137,7 +139,7 @@ class Rules:
     def begin_again(self, now: float) -> None:
         """Begin the tries again: the light is heard."""
         for one in self.weak:
-            one.tried, one.failure, one.due = 0, '', self._first_due(now)
+            one.tried, one.failure, one.not_before = 0, '', self._first_due(now)
 
     def restore(self, values: dict[str, Any], now: float) -> None:
         """
@@ -227,7 +229,7 @@ class Rules:
         one.failure = text
         one.tried += 1
         one.is_served = False
-        one.due = now + REQUIRED.wait(one.tried)
+        one.not_before = now + REQUIRED.wait(one.tried)
 
     def _report(self, success: bool, message: str, *, is_final: bool = True) -> None:
         self._emit(events.ConfigurationRestored(self._target.address, success, message, is_final))
@@ -265,7 +267,7 @@ class Rules:
             self._requests.end(known, ENDED, now)
             known = None
         if known is None and beyond and self.limits.exceeded.excess and not is_busy:
-            self._put(Why.LIMIT, beyond, 'limit', now, due=max(now, self.limits.due))
+            self._put(Why.LIMIT, beyond, 'limit', now, not_before=max(now, self.limits.due))
 
     def sent(self, now: float) -> None:
         """Note that a configuration was sent."""

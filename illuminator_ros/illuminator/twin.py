@@ -35,13 +35,13 @@ class OwnCommands(NamedTuple):
     The commands of ours that may have caused what a status shows.
 
     :param is_busy: whether one is under way.
-    :param late: the change that may have a late effect, None if there is none.
-    :param until: s; until then a change of another value counts as implied.
+    :param unconfirmed: the change that may have a late effect, None if there is none.
+    :param implied_until: s; until then a change of another value counts as implied.
     """
 
     is_busy: bool = False
-    late: Change[Status] | None = None
-    until: float = -math.inf
+    unconfirmed: Change[Status] | None = None
+    implied_until: float = -math.inf
 
 
 class Failure(NamedTuple):
@@ -219,9 +219,9 @@ class Twin:
         kind = events.ChangeCause.ROUNDING
         if far:
             kind = events.ChangeCause.LIGHT
-            if ours.late is not None and ours.late.shown_by(status):
+            if ours.unconfirmed is not None and ours.unconfirmed.shown_by(status):
                 kind = events.ChangeCause.LATE_EFFECT
-            elif self.order.newest_at <= ours.until:
+            elif self.order.newest_at <= ours.implied_until:
                 kind = events.ChangeCause.REQUEST
         self._adopt(replace(agreed, **{name: getattr(reported, name) for name in names}), kind)
 

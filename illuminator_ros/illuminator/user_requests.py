@@ -67,7 +67,7 @@ class UserRequests:
             attempt = self._switch.attempt
             if new.is_call and is_off and attempt is not None and attempt.goal.insists:
                 # It may never end, and a later call waits for the next one.
-                new.until = now + INSISTENT_LIMIT
+                new.deadline = now + INSISTENT_LIMIT
             requests.put(new, now)
 
     def _refuse_lost(self, new: Request, now: float, *, is_off: bool, is_held: bool) -> None:
@@ -152,7 +152,7 @@ class UserRequests:
         after, is_heard = change.after, self._liveness.connected
         if after is None:
             if self._rules.settings.off_on_release:
-                self._rules.release(f'on_release: {change.before} no longer holds it', now)
+                self._rules.put_release_off(f'on_release: {change.before} no longer holds it', now)
             return
         self._rules.forget_silenced(now)
         reason = f'{after}, which holds the light now'
@@ -162,7 +162,7 @@ class UserRequests:
                 one.done = self._failure_report(after)
             elif one.values.get('enabled') is False:
                 # It is sent when the light is heard again.
-                self._rules.release(reason, now)
+                self._rules.put_release_off(reason, now)
 
     def _failure_report(self, source: str) -> Done:
         """Return a function that reports that the light does not have what a source wants."""

@@ -246,7 +246,8 @@ class Transmission:
     follow_up: Command | None
     state: CommandState = CommandState.SENT
     tries: int = 0
-    # Tries that were answered with a result that is not final, and are not resends.
+    # Tries that are no resends of an unacknowledged one: those of a command before it, and those
+    # that were answered with a result that is not final.
     rejected: int = 0
     first_sent: float = -math.inf
     last_sent: float = -math.inf
@@ -376,9 +377,9 @@ class CommandSender:
         :param tried: how often it was sent before, which ``confirmation`` counts.
         :param follow_up: a request that is sent with each try.
         """
-        sending = Transmission(command, done, deadline,
-                               self.retries if retries is None else retries,
-                               command.position is not None, follow_up)
+        transmission = Transmission(
+            command, done, deadline, self.retries if retries is None else retries,
+            command.position is not None, follow_up)
         if self._is_refused(command):
             done(CommandResult(CommandStatus.CLOSED, reason=self.refusal), now)
         elif now >= deadline:
@@ -387,16 +388,16 @@ class CommandSender:
             key = command.key
             if older := self._pending.get(key):
                 self._end(older, CommandStatus.CANCELLED, now)
-            self._pending[key] = sending
+            self._pending[key] = transmission
             _keep(self.answers, key[:2], self.answers.get(key[:2], 0))
-            sending.first_sent = now
-            sending.tries = sending.rejected = tried
-            self._transmit(sending, now)
-        return sending
+            transmission.first_sent = now
+            transmission.tries = transmission.rejected = tried
+            self._transmit(transmission, now)
+        return transmission
 
-    def cancel(self, sending: Transmission, now: float) -> None:
+    def cancel(self, transmission: Transmission, now: float) -> None:
         """End a command with CANCELLED, if it has not ended."""
-        self._end(sending, CommandStatus.CANCELLED, now)
+        self._end(transmission, CommandStatus.CANCELLED, now)
 
     def acknowledge(self, source: Address, ack: messages.CommandAck, now: float) -> bool:
         """

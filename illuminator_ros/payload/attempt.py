@@ -40,9 +40,9 @@ from ..mavlink.retries import CLOSING, Retries, RetryPolicy
 
 STATUS = RetryPolicy('the request for a status, after one that does not show the change',
                      0.05, 0.25)
-UNCONFIRMED = RetryPolicy('an automatic OFF that no status shows, and a command that may be '
-                          'confused with an earlier one', 0.25, 0.25, 10)
-STILL_UNCONFIRMED = RetryPolicy('an automatic OFF after these', 2.0, 2.0)
+REPEAT = RetryPolicy('an automatic OFF that no status shows, and a command that may be '
+                     'confused with an earlier one', 0.25, 0.25, 10)
+SLOW_REPEAT = RetryPolicy('an automatic OFF after these', 2.0, 2.0)
 # s from the acknowledgement, or the last try, or the end of the fence, to the status that shows
 # the change.
 CONFIRMATION_TIMEOUT = 1.0
@@ -128,7 +128,7 @@ class Change(Generic[S]):
     Two changes are equal if they set the same values.
 
     :param command: the MAV_CMD that makes it, with ``params`` and ``position``.
-    :param goal: the state to be reached, for people.
+    :param label: the state to be reached, for people.
     :param note: a change that was not requested but comes with it, '' if there is none.
     :param sending: how it is sent where nothing insists on it.
     :param shown_by: returns whether a status shows the change; None if it cannot show it.
@@ -139,7 +139,7 @@ class Change(Generic[S]):
 
     command: int
     params: tuple[float, ...]
-    goal: str
+    label: str
     position: CommandPosition | None = None
     note: str = ''
     sending: Sending = Sending.UNTIL_ACKNOWLEDGED
@@ -196,6 +196,9 @@ class Received:
     """
     The answers to a command. No acknowledgement says which try it answers.
 
+    Try, acknowledgement, try, acknowledgement: no frame is under way. Try, try, acknowledgement:
+    the first one may have been lost, or it may come later, so the next command meets a fence.
+
     :param before: acknowledgements that its kind had got before.
     :ivar counted: acknowledgements that are known to be its own.
     :ivar in_step: whether each try, and each frame under way before, was answered before the next
@@ -231,17 +234,17 @@ class Attempt(Generic[S]):
         self.goal = goal
         self.began = now
         self._parts: dict[Request, Change[S]] = {}
-        self._sending = (Sending.AT_THE_END if goal.is_last else
+        self._sending = (Sending.AT_THE_END if goal.is_final else
                          Sending.UNTIL_SHOWN if goal.insists else change.sending)
         self._target = target
         self._fence = fence
         self._gap = gap
         # The end of the command protocol, which explains the result.
-        self._answer: CommandResult | None = None
+        self._outcome: CommandResult | None = None
         # The last status that counts and shows something else.
         self._instead: S | None = None
         self._ends_at = self._repeat_due = math.inf
-        self._requests = Retries(STATUS, math.inf)
+        self._status_retries = Retries(STATUS, math.inf)
         self._received = Received(self._acknowledgements())
         self.serve(parts)
         self._send(now)
@@ -273,15 +276,15 @@ class Attempt(Generic[S]):
         is_repeated = not is_single and (sending.insists or is_fenced or self._is_accepted)
         self._repeat_due = math.inf
         if is_repeated:
-            is_slow = sending is Sending.UNTIL_SHOWN and tried >= UNCONFIRMED.tries
+            is_slow = sending is Sending.UNTIL_SHOWN and tried >= REPEAT.tries
             policy = (CLOSING if sending is Sending.AT_THE_END else
-                      STILL_UNCONFIRMED if is_slow else UNCONFIRMED)
+                      SLOW_REPEAT if is_slow else REPEAT)
             self._repeat_due = now + policy.first
             if is_fenced:
                 self._repeat_due = min(self._repeat_due, self._fence.ends_at)
         elif is_fenced:
             self._ends_at = self._fence.ends_at + CONFIRMATION_TIMEOUT
-            self._requests = Retries(STATUS, self._fence.ends_at, 1)
+            self._status_retries = Retries(STATUS, self._fence.ends_at, 1)
         self._transmission = target.commands.start(
             Command(target.address, change.command, change.params, position=change.position),
             now, self._answered, deadline=self._limit, retries=0 if is_repeated or is_single
@@ -291,7 +294,7 @@ class Attempt(Generic[S]):
     def _limit(self) -> float:
         """Return when it ends even if the device still reports progress."""
         return (math.inf if self._sending.insists
-                else min(self.goal.until, self.began + PROGRESS_LIMIT))
+                else min(self.goal.deadline, self.began + PROGRESS_LIMIT))
 
     @property
     def last_sent(self) -> float:
@@ -328,14 +331,14 @@ class Attempt(Generic[S]):
         """
         self._received.has_restarted = True
         if self._sending is not Sending.ONCE:
-            fence, is_hurried = self._fence, self.goal.until <= now + FENCE
+            fence, is_hurried = self._fence, self.goal.deadline <= now + FENCE
             may_be_others = now < fence.ends_at and fence.proof is Proof.NOTHING
             self._fence = Fence(now + FENCE, proof=Proof.STATUS if (
                 is_hurried and not may_be_others and self.change.shown_by(status) is False
             ) else Proof.NOTHING)
-            self._answer = self._instead = None
+            self._outcome = self._instead = None
             self._ends_at = math.inf
-            self._requests.stop()
+            self._status_retries.stop()
             self._send(now, self._transmission.tries)
 
     def withdraw(self, now: float) -> None:
@@ -348,7 +351,7 @@ class Attempt(Generic[S]):
 
     @property
     def _is_accepted(self) -> bool:
-        return self._answer is not None and self._answer.accepted
+        return self._outcome is not None and self._outcome.accepted
 
     def _answered(self, answer: CommandResult, now: float) -> None:
         if answer.status is CommandStatus.ANSWERED:
@@ -357,21 +360,21 @@ class Attempt(Generic[S]):
             is_fenced = now < self._fence.ends_at
             if not (is_fenced and self.goal.is_awaited):
                 self._received.counted += 1
-            if is_fenced or self._answer is not None and not self._sending.insists:
+            if is_fenced or self._outcome is not None and not self._sending.insists:
                 return
-            if self._answer is None:
+            if self._outcome is None:
                 self._ends_at = now + CONFIRMATION_TIMEOUT
-                self._requests = Retries(STATUS, now + STATUS.first, 1)
-            self._answer = answer
+                self._status_retries = Retries(STATUS, now + STATUS.first, 1)
+            self._outcome = answer
             if self._target.status_id is None or answer.refused and self._gap is None:
                 self._ends_at = now
         elif answer.status is CommandStatus.NO_ANSWER:
             # A single try is followed by others.
             if self._repeat_due == math.inf:
-                self._answer = answer
+                self._outcome = answer
                 self._ends_at = self.last_sent + CONFIRMATION_TIMEOUT
         elif answer.status is not CommandStatus.CANCELLED:
-            self._answer = answer
+            self._outcome = answer
             self._ends_at = now
         self._target.wake(self.due)
 
@@ -389,7 +392,7 @@ class Attempt(Generic[S]):
         if sending is not Sending.ONCE and transmission.first_sent < self._fence.ends_at:
             # This turn is late: the try at the end of the fence is still due.
             return False
-        is_answered = transmission.result is not None or self._answer is not None
+        is_answered = transmission.result is not None or self._outcome is not None
         return is_answered or (
             transmission.tries >= ENOUGH_TRIES if sending.insists else transmission.is_last_try)
 
@@ -413,11 +416,11 @@ class Attempt(Generic[S]):
             elif shown is False:
                 self._instead = status
         if self._parts and not self._sending.insists:
-            if self._answer is not None and self._answer.refused:
+            if self._outcome is not None and self._outcome.refused:
                 return ended + self._expired(now)
             if (self._is_accepted and self._sending is Sending.UNTIL_OBEYED
                     and self._repeat_due == math.inf):
-                self._repeat_due = self.last_sent + UNCONFIRMED.first
+                self._repeat_due = self.last_sent + REPEAT.first
         return ended
 
     # Time
@@ -426,10 +429,10 @@ class Attempt(Generic[S]):
         """Send what is due, or end; return the requests that have ended."""
         if now >= self._end:
             return self._expired(now)
-        ended = [self._failed(one, now) for one in self.serves if now >= one.until]
+        ended = [self._failed(one, now) for one in self.serves if now >= one.deadline]
         if now >= self._repeat_due:
             self._send(now, self._transmission.tries)
-        if self._requests.begin_try(now) and (request := self._target.status_request):
+        if self._status_retries.begin_try(now) and (request := self._target.status_request):
             self._target.commands.send_once(request)
         return ended
 
@@ -438,14 +441,14 @@ class Attempt(Generic[S]):
         """Return when it ends without success, s."""
         if not self._sending.insists:
             return min(self._ends_at, self._limit)
-        is_over = self._answer is not None and self._answer.status in ENDS_REPEATING
+        is_over = self._outcome is not None and self._outcome.status in ENDS_REPEATING
         return self._ends_at if is_over else math.inf
 
     @property
     def due(self) -> float:
         """Return when :meth:`poll` has something to do, s."""
-        return min(self._end, self._repeat_due, self._requests.due,
-                   *(one.until for one in self.serves))
+        return min(self._end, self._repeat_due, self._status_retries.due,
+                   *(one.deadline for one in self.serves))
 
     # The result
 
@@ -454,16 +457,16 @@ class Attempt(Generic[S]):
         transmission = self._transmission
         unfinished = (CommandStatus.NO_ANSWER if transmission.result is None
                       else CommandStatus.OUT_OF_TIME)
-        return self._answer or CommandResult(
+        return self._outcome or CommandResult(
             unfinished, transmission.result, progress=transmission.progress)
 
     def failure(self) -> str:
         """Return why it is not confirmed so far, for people; '' if nothing has come."""
-        answer = self._answer
+        answer = self._outcome
         if answer is None or answer.refused:
             return '' if answer is None else answer.describe_failure()
         shown = self._shown_instead(self.change)
-        return (f'{self.change.goal} not confirmed: {answer.describe()}'
+        return (f'{self.change.label} not confirmed: {answer.describe()}'
                 f'{shown and ", but " + shown}')
 
     def _shown_instead(self, part: Change[S]) -> str:
@@ -476,7 +479,7 @@ class Attempt(Generic[S]):
         evidence = (part.evidence(status) if part.evidence else
                     f'confirmed by {self._target.status_name}')
         return self._result(
-            f'{part.goal}, {evidence}' + (
+            f'{part.label}, {evidence}' + (
                 ', without an acknowledgement' if answer.result is None
                 else f': {result_name(answer.result)}'), one, now, success=True, note=part.note)
 
@@ -490,11 +493,11 @@ class Attempt(Generic[S]):
         return Served(one, part, self._failed_result(part, one, now))
 
     def _failed_result(self, part: Change[S], one: Request, now: float) -> Result:
-        target, answer, shown = self._target, self._answer, self._shown_instead(part)
+        target, answer, shown = self._target, self._outcome, self._shown_instead(part)
         if answer is None and now < self._fence.ends_at:
             text = ('' if self._received.has_restarted
                     else ': an earlier command may still be under way')
-            return self._result(f'{part.goal} not confirmed{text}', one, now)
+            return self._result(f'{part.label} not confirmed{text}', one, now)
         if answer is None or not (answer.accepted or answer.refused):
             return self._result(
                 self._protocol().describe() + (f', and {shown}' if shown else ''), one, now,
@@ -506,7 +509,7 @@ class Attempt(Generic[S]):
             return self._result(answer.describe(), one, now, success=True, note=part.note)
         if self._gap is None and not target.needs_status:
             return self._result(
-                f'{part.goal}, accepted, not confirmed (the {target.kind} sends no '
+                f'{part.label}, accepted, not confirmed (the {target.kind} sends no '
                 f'{target.status_name}): {answer.describe()}', one, now, success=True,
                 note=part.note)
         if shown:
@@ -516,14 +519,14 @@ class Attempt(Generic[S]):
         else:
             reason = (f', but no {target.status_name} came within '
                       f'{format_seconds(CONFIRMATION_TIMEOUT)}')
-        return self._result(f'{part.goal} not confirmed: {answer.describe()}{reason}', one, now,
+        return self._result(f'{part.label} not confirmed: {answer.describe()}{reason}', one, now,
                             contradicted=bool(shown))
 
     def _result(
         self, text: str, one: Request, now: float, *, success: bool = False, note: str = '',
         **flags: bool,
     ) -> Result:
-        if self._answer is not None and self._answer.status is CommandStatus.CLOSED:
+        if self._outcome is not None and self._outcome.status is CommandStatus.CLOSED:
             return Result(False, text, superseded=True)
         if self._received.has_restarted:
             text += f'; the {self._target.kind} restarted meanwhile'

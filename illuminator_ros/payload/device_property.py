@@ -73,14 +73,14 @@ class Property(Generic[S]):
         if attempt is None and goal is None:
             return ended
         is_wanted = attempt is not None and bool(attempt.serves)
-        if attempt is not None and is_wanted and goal is not None and goal.waits:
+        if attempt is not None and is_wanted and goal is not None and goal.gives_way:
             return ended
         if attempt is not None and is_wanted and goal is not None and self._goes_on(attempt, goal):
             _, parts = self._plan(goal) if len(goal.serves) > len(attempt.serves) else (None, {})
             attempt.serve({one: part for one, part in parts.items() if one.since <= attempt.began})
             return ended
         if attempt is not None:
-            text = f'superseded by {self._plan(goal)[0].goal}' if goal else 'no longer wanted'
+            text = f'superseded by {self._plan(goal)[0].label}' if goal else 'no longer wanted'
             ended = self.withdraw(text, now)
         if goal is not None:
             self._start(goal, now, newest, gap)
@@ -89,8 +89,8 @@ class Property(Generic[S]):
     @staticmethod
     def _goes_on(attempt: Attempt[S], goal: Goal) -> bool:
         """Return whether the command under way is as good as a new one of the goal."""
-        return (attempt.goal.values == goal.values and goal.until >= attempt.goal.until
-                and (attempt.goal.is_last or not goal.is_last))
+        return (attempt.goal.values == goal.values and goal.deadline >= attempt.goal.deadline
+                and (attempt.goal.is_final or not goal.is_final))
 
     def _start(self, goal: Goal, now: float, newest: S | None, gap: float | None) -> None:
         change, parts = self._plan(goal)
@@ -111,7 +111,7 @@ class Property(Generic[S]):
         """
         under_way = self._under_way
         has_others = bool(under_way.keys() - {change.value})
-        if goal.until > now + FENCE or has_others and (
+        if goal.deadline > now + FENCE or has_others and (
                 change.value in under_way or len(under_way) == MAX_VALUES):
             return Proof.NOTHING
         if newest is not None and change.shown_by(newest) is False:

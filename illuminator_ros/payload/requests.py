@@ -86,8 +86,8 @@ class Request:
     :param is_call: whether a caller waits for the result. What a topic asks for stays as the
         wish of its source, for a hand-over.
     :param detail: how it was requested, or the reason of a rule, for people.
-    :param until: s; it fails at that time.
-    :param due: s; it is not sent before.
+    :param deadline: s; it fails at that time.
+    :param not_before: s; it is not sent before.
     :ivar is_open: whether it is still to be reached. What a status has shown is not sent again if
         another sender changes it; a hand-over opens it again.
     :ivar is_served: whether an attempt serves it, which ends it.
@@ -102,8 +102,8 @@ class Request:
     done: Done = no_reply
     is_call: bool = False
     detail: str = ''
-    until: float = math.inf
-    due: float = -math.inf
+    deadline: float = math.inf
+    not_before: float = -math.inf
     is_open: bool = True
     is_served: bool = False
     may_be_repeated: bool = True
@@ -135,22 +135,22 @@ class Goal(NamedTuple):
     """
     The values of one command, and the requests that it serves.
 
-    :param until: s; the command ends then, unless it insists.
+    :param deadline: s; the command ends then, unless it insists.
     :param note: a change that comes with it and that no request asks for, for people.
-    :param waits: whether it leaves another command that is under way alone.
+    :param gives_way: whether it leaves another command that is under way alone.
     :param is_awaited: whether a caller waits for it.
     :param insists: whether it is sent until a status shows it.
-    :param is_last: whether the process ends.
+    :param is_final: whether the process ends.
     """
 
     values: Any
     serves: tuple[Request, ...]
-    until: float = math.inf
+    deadline: float = math.inf
     note: str = ''
-    waits: bool = False
+    gives_way: bool = False
     is_awaited: bool = False
     insists: bool = False
-    is_last: bool = False
+    is_final: bool = False
 
     @classmethod
     def strongest(cls, some: Iterable[Request], field: str, now: float) -> Goal | None:
@@ -159,19 +159,19 @@ class Goal(NamedTuple):
 
         The newest is the strongest of those with one reason.
         """
-        due = [one for one in some if field in one.values and now >= one.due]
+        due = [one for one in some if field in one.values and now >= one.not_before]
         if not due:
             return None
         value = min(reversed(due), key=lambda one: (one.why, -one.since)).values[field]
         serves = tuple(one for one in due if one.values[field] == value)
-        return cls.of(value, serves, until=max(one.until for one in serves))
+        return cls.of(value, serves, deadline=max(one.deadline for one in serves))
 
     @classmethod
     def of(cls, values: Any, serves: tuple[Request, ...], **how: Any) -> Goal:
-        """Return the goal that serves some requests; ``how``: until, note, waits."""
+        """Return the goal that serves some requests; ``how``: deadline, note, gives_way."""
         reasons = {one.why for one in serves}
         return cls(values, serves, **how, is_awaited=any(one.is_call for one in serves),
-                   insists=not reasons.isdisjoint(INSISTENT), is_last=Why.END in reasons)
+                   insists=not reasons.isdisjoint(INSISTENT), is_final=Why.END in reasons)
 
 
 class Requests:
@@ -384,7 +384,7 @@ class Requests:
         if done is not no_reply:
             self._replies.append((done, result))
 
-    def answer(self, now: float) -> None:
+    def send_replies(self, now: float) -> None:
         """Call the replies that have come due, in their order, even if one of them raises."""
         while self._replies:
             replies, self._replies = self._replies, deque()
@@ -442,17 +442,17 @@ class Requests:
             self._report(change, now)
         return change
 
-    def late(self, now: float) -> list[Request]:
+    def overdue(self, now: float) -> list[Request]:
         """Return the open requests whose time is over, and that no attempt will end."""
         return [one for one in self.standing
-                if one.is_open and not one.is_served and now >= one.until]
+                if one.is_open and not one.is_served and now >= one.deadline]
 
     def next_due(self, now: float) -> float:
         """Return when a request becomes due or is late next, or when a claim ends, s."""
         due = self.claims.due if self.are_ranked else math.inf
         for one in self.standing:
             if one.is_open:
-                due = min(due, one.until, one.due if one.due > now else math.inf)
+                due = min(due, one.deadline, one.not_before if one.not_before > now else math.inf)
         return due
 
 

@@ -34,7 +34,7 @@ class Shared:
 
     def enable(self, source: str, on: bool) -> None:
         self.pair.light.enable(
-            on, self.pair.now, Answer(self.pair.now), source=source, is_stream=True)
+            on, self.pair.now, Answer(self.pair.now), source=source, is_call=False)
         self.pair.turn()
 
     def dim(self, source: str, brightness: float) -> None:

@@ -105,7 +105,7 @@ class Play:
                                  lambda change, now: self.held.append(change))
         for number, step in enumerate(script):
             self._play(number, step)
-            self.requests.answer(self.now)
+            self.requests.send_replies(self.now)
             self.now += 0.1
 
     def _play(self, number: int, step: Any) -> None:
@@ -122,8 +122,9 @@ class Play:
                 self.made[number] = Request(
                     dict(values), Why.REQUEST, now, source, done, is_call=isinstance(step, Call))
                 requests.put(self.made[number], now)
-            case Rule(why, values, due):
-                self.made[number] = Request(dict(values), why, now, detail=why.name, due=due)
+            case Rule(why, values, not_before):
+                self.made[number] = Request(
+                    dict(values), why, now, detail=why.name, not_before=not_before)
                 requests.put(self.made[number], now)
             case End(of, success):
                 requests.end(self.made[of], Result(success, 'shown' if success else 'failed'), now)
@@ -327,7 +328,7 @@ def test_a_period_outside_of_the_own_range_of_a_light_is_replaced_by_the_nearest
 
 
 # The script -> how the goal of the switch, else of the configuration, is sent.
-@pytest.mark.parametrize(('script', 'insists', 'waits', 'is_awaited', 'until'), [
+@pytest.mark.parametrize(('script', 'insists', 'gives_way', 'is_awaited', 'deadline'), [
     ([Call(ON)], False, False, True, math.inf),
     ([Topic(ON)], False, False, False, math.inf),
     ([Rule(Why.SILENCE, OFF)], True, False, False, math.inf),
@@ -336,14 +337,14 @@ def test_a_period_outside_of_the_own_range_of_a_light_is_replaced_by_the_nearest
     ([Rule(Why.RESTORED, b(10.0))], False, True, False, math.inf),
     ([Rule(Why.RESTORED, s(1.0)), Call(b(10.0))], False, False, True, math.inf)])
 def test_a_goal_says_how_its_command_is_sent(
-    script: list[Any], insists: bool, waits: bool, is_awaited: bool, until: float,
+    script: list[Any], insists: bool, gives_way: bool, is_awaited: bool, deadline: float,
 ) -> None:
     goals = Play(script).decide(LIGHT)
     goal = goals.switch or goals.configuration
 
     assert goal
-    assert (goal.insists, goal.waits, goal.is_awaited) == (insists, waits, is_awaited)
-    assert goal.until == pytest.approx(until)
+    assert (goal.insists, goal.gives_way, goal.is_awaited) == (insists, gives_way, is_awaited)
+    assert goal.deadline == pytest.approx(deadline)
 
 
 def test_a_goal_serves_the_requests_whose_values_it_has() -> None:

@@ -19,7 +19,7 @@ ON_OFF, CONFIGURE = mavlink.MAV_CMD_ILLUMINATOR_ON_OFF, mavlink.MAV_CMD_DO_ILLUM
 
 
 def enable(on: bool) -> Callable[[Pair], None]:
-    return lambda pair: pair.light.enable(on, pair.now, Answer(pair.now), is_stream=True)
+    return lambda pair: pair.light.enable(on, pair.now, Answer(pair.now), is_call=False)
 
 
 def dim(pair: Pair) -> None:
@@ -39,7 +39,7 @@ def hold(pair: Pair, ask: Callable[[Pair], None], seconds: float = 4.0) -> int:
 @pytest.fixture
 def held(fake: FakeLight) -> Pair:
     """Return a client and a light that is on at 30 %, as a topic has asked for repeatedly."""
-    pair = Pair(fake, settings=LightSettings(off_after_silence=3.0)).settle()
+    pair = Pair(fake, settings=LightSettings(off_after_silence=9.0)).settle()
     assert hold(pair, enable(True), 1.0) == 1
     assert hold(pair, dim, 1.0) == 1
     return pair
@@ -54,9 +54,9 @@ def test_a_message_that_is_repeated_while_the_light_shows_it_sends_nothing_but_a
 
 
 def test_a_repeated_message_counts_for_the_silence(held: Pair, fake: FakeLight) -> None:
-    hold(held, enable(True), 6.0)
+    hold(held, enable(True), 12.0)
     assert fake.fields['enable'] == 1
-    held.run(4.0)
+    held.run(10.0)
     assert fake.fields['enable'] == 0
 
 

@@ -118,7 +118,7 @@ def test_after_a_stop_of_the_process_a_request_that_may_be_old_is_refused_but_no
 ) -> None:
     faked.controller.sender.stalled(7.0, faked.now)
     sent = len(faked.commands(ON_OFF, CONFIGURE))
-    for answer in (faked.ask_enable(True), faked.ask_enable(True, is_stream=True),
+    for answer in (faked.ask_enable(True), faked.ask_enable(True, is_call=False),
                    faked.ask_configure(brightness=50)):
         assert answer.result.message == (
             'the request may be 7.00 s old, since this process was stopped as long; repeat it')
@@ -294,10 +294,10 @@ def three() -> Pair:
     return Pair([IlluminatorProperties(mav.Address(1, one)) for one in (243, 244, 245)]).settle()
 
 
-def ask_all(pair: Pair, on: bool = True, *, is_stream: bool = False) -> Answer:
+def ask_all(pair: Pair, on: bool = True, *, is_call: bool = True) -> Answer:
     answer = Answer(pair.now)
     enable_all(list(pair.controller.lights.values()), on, pair.now, answer,
-               name=lambda light: f'lamp {light.address}', is_stream=is_stream)
+               name=lambda light: f'lamp {light.address}', is_call=is_call)
     pair.turn()
     return answer
 

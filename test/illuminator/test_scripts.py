@@ -68,11 +68,11 @@ class Stage:
                 self.answers, self.marked = [], pair.now
             case ['all', *how, value]:
                 enable_all([pair.light], value == 'on', pair.now, Answer(0.0), name=str,
-                           is_stream=not how)
+                           is_call=bool(how))
             case [source, 'on' | 'off' as value] if source in NAMES:
-                self._enable(source, value, is_stream=True)
+                self._enable(source, value, is_call=False)
             case [source, 'calls', value]:
-                self._enable(source, value, is_stream=False)
+                self._enable(source, value, is_call=True)
             case [source, 'dims', value]:
                 pair.light.set_brightness(float(value), pair.now, source=source)
             case ['sets', value]:
@@ -114,11 +114,11 @@ class Stage:
             case [seconds]:
                 pair.run(float(seconds))
 
-    def _enable(self, source: str, value: str, *, is_stream: bool) -> None:
+    def _enable(self, source: str, value: str, *, is_call: bool) -> None:
         answer = Answer(self.pair.now)
         self.answers.append(answer)
         self.pair.light.enable(
-            value == 'on', self.pair.now, answer, source=source, is_stream=is_stream)
+            value == 'on', self.pair.now, answer, source=source, is_call=is_call)
 
     def _change(self, name: str, value: float) -> None:
         changes: dict[str, dict[str, Any]] = {

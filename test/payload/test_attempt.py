@@ -160,9 +160,9 @@ SINGLE, REPEATED = ({'change': level_change(5, sending=Sending.ONCE)},
     (HIDES, {'fence': 0.6, 'proof': Proof.STATUS}, True, ACCEPTS, FENCED, 0.62, ()),
     (OBEYS, {'proof': Proof.STATUS}, True, NOT_ACKNOWLEDGED, SILENT, 1.77, ()),
     # At the end of the process a status counts after three tries, also within the fence.
-    ({}, {'fence': FENCE, 'is_last': True, 'insists': True}, True, SHOWN, [0.0, 0.1, 0.2], 0.22,
+    ({}, {'fence': FENCE, 'is_final': True, 'insists': True}, True, SHOWN, [0.0, 0.1, 0.2], 0.22,
      ()),
-    ({}, {'is_last': True, 'insists': True}, True, SHOWN, ONCE, 0.02, ()),
+    ({}, {'is_final': True, 'insists': True}, True, SHOWN, ONCE, 0.02, ()),
     # A command that insists does without an acknowledgement after three tries, and is also sent
     # again while the device reports progress.
     ({'results': [IN_PROGRESS, ACCEPTED]}, {'insists': True}, True, SHOWN, [0.0, 0.25], 0.27, ()),
@@ -280,7 +280,7 @@ def test_a_restart_confirms_nothing_and_a_command_that_may_be_repeated_is_sent_a
 
 def test_each_request_ends_at_its_own_time_though_another_waits_longer() -> None:
     bench = CommandBench()
-    first, second = (Request({'level': 5}, Why.REQUEST, 0.0, is_call=True, until=until)
+    first, second = (Request({'level': 5}, Why.REQUEST, 0.0, is_call=True, deadline=until)
                      for until in (2.0, 3.0))
     attempt: Attempt[int | None] = Attempt(
         bench.target(), LEVEL_5, Goal(5, (first, second), 3.0), {first: LEVEL_5, second: LEVEL_5},

@@ -42,7 +42,7 @@ class PropertyBench(LevelBench):
         results: list[Result] = []
         self.table.put(Request(
             {'level': level}, why, self.now, detail=why.name, is_call=not is_stream,
-            done=lambda result, now: results.append(result), until=self.now + limit), self.now)
+            done=lambda result, now: results.append(result), deadline=self.now + limit), self.now)
         self.steer()
         return results
 
@@ -57,7 +57,7 @@ class PropertyBench(LevelBench):
         for one in served:
             if one.request not in self.table.standing:
                 self.table.end(one.request, one.result, self.now)
-        self.table.answer(self.now)
+        self.table.send_replies(self.now)
         self.flush()
 
     _gap = 0.0
@@ -148,7 +148,7 @@ def test_requests_of_one_time_share_a_command_and_are_answered_in_their_order() 
     for number in range(3):
         done = functools.partial(lambda number, result, now: order.append(number), number)
         bench.table.put(Request({'level': 3}, Why.REQUEST, bench.now, done=done, is_call=True,
-                                until=0.9), bench.now)
+                                deadline=0.9), bench.now)
     bench.steer()
     bench.run_until(1.0)
 
@@ -371,4 +371,6 @@ def test_each_request_is_answered_once_and_each_success_is_shown_after_it_was_ma
                 assert len(results) == 1
                 assert not results[0].success or (level in shown[since:] and action == 'report')
     assert all(len(results) == 1 for _, _, results in answers)
+    # A try that a status has confirmed awaits its acknowledgement.
+    bench.run_until(bench.now + 1.0)
     assert len(bench.commands) == 0

@@ -119,7 +119,7 @@ class Winch:
         """Send what is wanted, and answer those whose requests have ended."""
         goal = Goal.strongest(self._requests.live(), 'length', now)
         self._length.steer(goal, now, self._status, 0.0 if self._status else None)
-        self._requests.answer(now)
+        self._requests.send_replies(now)
         self._schedule.at(self.poll, min(self.liveness.silent_at, self._length.due))
 
     def _end(self, served: list[Served[WinchStatus]], now: float) -> None:

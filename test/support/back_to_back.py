@@ -111,11 +111,11 @@ class Pair(Line):
     # Requests
 
     def ask_enable(
-        self, on: bool, light: Light | None = None, *, is_stream: bool = False,
+        self, on: bool, light: Light | None = None, *, is_call: bool = True,
     ) -> Answer:
         """Begin to switch a light on or off."""
         answer = Answer(self.now)
-        (light or self.light).enable(on, self.now, answer, is_stream=is_stream)
+        (light or self.light).enable(on, self.now, answer, is_call=is_call)
         self.turn()
         return answer
 

@@ -58,7 +58,7 @@ class RandomUsers:
     def enable(self) -> None:
         if light := self.light():
             light.enable(self.draw.random() < 0.7, self.pair.now, self.answer(),
-                         source=self.source(), is_stream=self.draw.random() < 0.5)
+                         source=self.source(), is_call=self.draw.random() >= 0.5)
 
     def enable_all(self) -> None:
         if lights := [*self.pair.controller.lights.values()]:

@@ -234,7 +234,7 @@ class LightNode:
 
         if light := self._light_or_refusal(now, warn):
             light.enable(
-                on, now, done, detail=f'{prefix}topic', source=source, is_stream=True)
+                on, now, done, detail=f'{prefix}topic', source=source, is_call=False)
 
     def _refresh(self, request: Trigger.Request, now: float, answer: ros_node.Answer) -> None:
         if light := self._light_or_refusal(now, answer):

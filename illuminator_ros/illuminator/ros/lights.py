@@ -125,12 +125,12 @@ class Lights(ServedPayload):
             if not (result.success or result.superseded):
                 self._host.log.warning(f'~/cmd/enable_all: {result.message}', 'cmd/enable_all')
 
-        self._switch(on, now, done, is_stream=True)
+        self._switch(on, now, done, is_call=False)
 
-    def _switch(self, on: bool, now: float, done: Done, *, is_stream: bool = False) -> None:
+    def _switch(self, on: bool, now: float, done: Done, *, is_call: bool = True) -> None:
         if lights := self._client.lights_by_address:
             enable_all(lights, on, now, done, name=self._name_of, detail='enable_all',
-                       is_stream=is_stream)
+                       is_call=is_call)
         else:
             done(Result(False, self._nodes.first.absence(now)), now)
 
