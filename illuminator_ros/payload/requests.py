@@ -317,10 +317,12 @@ class Requests:
     def _remember(self, new: Request, now: float) -> None:
         """Keep the wish of a source in place of its older ones for the same fields."""
         self.claim(new.source, now)
+        if not new.values:
+            return
         text = f'superseded by {self._describe(new.values)}'
         for old in self.wishes(new.source):
             names = old.values.keys() & new.values.keys()
-            if not names or old.since > new.since:
+            if not names:
                 continue
             if old.is_served:
                 # Its attempt ends it. Other fields stay wanted.
@@ -346,6 +348,7 @@ class Requests:
     def end(self, one: Request, result: Result, now: float) -> None:
         """End a request. A call that has succeeded claims the device."""
         is_known, one.is_open, one.is_served = one in self.standing, False, False
+        later = self.standing[self.standing.index(one):] if is_known else []
         if is_known and not (one.is_wish and self.claims.is_claimed_by(one.source)):
             self.standing.remove(one)
         if result.success and one.why is Why.REQUEST:
@@ -355,7 +358,10 @@ class Requests:
                 elif old.why is Why.RELEASE and one.contradicts(old):
                     self.end(old, Result(False, result.message, superseded=True), now)
             if one.is_call:
-                self._remember(Request(one.values, one.why, one.since, one.source,
+                newer = {name for old in later if old.is_wish and old.source == one.source
+                         for name in old.values}
+                values = {name: value for name, value in one.values.items() if name not in newer}
+                self._remember(Request(values, one.why, one.since, one.source,
                                        is_open=False, may_be_repeated=False), now)
         self.reply(one, result)
 

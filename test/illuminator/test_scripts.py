@@ -410,6 +410,14 @@ ROWS: dict[str, Row] = {
         'strobes 1, 3', 'off, default', None, 'superseded by off', DONE, 'an OFF is under way',
         enable=1, **SWITCH),
     # Limits that change.
+    # Repeated messages.
+    'a repeated setpoint beside a set of another value is sent after it': row(
+        'default dims 30, 2, is CONFIGURE lost obeyed, mark, sets 60, default dims 30, 3',
+        'off, default', '60 30', brightness=30.0),
+    'and is what its source has asked for last': row(
+        'default dims 30, 2, is CONFIGURE lost obeyed, sets 60, default dims 30, 3, '
+        'safety calls on, 1, safety dims 80, 1, mark, release safety, 3', 'on, default', '30',
+        brightness=30.0),
     'a lower limit dims before a status': row('mark, limit 40, 0.1', 'off', '40', brightness=40.0),
     'a limit that is taken away is not sent again': row(
         'is CONFIGURE lost, limit 40, 1.2, mark, limit 100, is CONFIGURE obeyed, 10', 'off', '',
