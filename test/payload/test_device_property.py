@@ -209,6 +209,31 @@ def test_within_the_fence_a_status_counts_that_no_other_value_can_have_caused(
         assert bench.ended(values[-1]) == (True, FENCE + ROUND_TRIP)
 
 
+def test_within_the_fence_of_an_equal_value_a_status_without_an_acknowledgement_proves_nothing(
+) -> None:
+    bench = PropertyBench(0, None).report(0)
+    bench.want(0)
+    bench.withdraw()
+
+    assert bench.ended(0, limit=0.9) == (False, 0.9)
+
+
+@pytest.mark.parametrize(('before', 'is_proved'), [([], True), ([3, 4], False)])
+def test_after_a_restart_a_status_proves_a_set_that_alone_can_have_caused_it(
+    before: list[int], is_proved: bool,
+) -> None:
+    bench = PropertyBench(0, None, sends_status=False).report(0)
+    for value in before:
+        bench.want(value)
+        bench.withdraw()
+    answer = bench.want(3, limit=0.9)
+    bench.property.restarted(0, bench.now)
+
+    bench.report(3)
+
+    assert [one.success for one in answer] == [True] * is_proved
+
+
 @pytest.mark.parametrize(('results', 'between', 'seconds'), [
     # The end of the command before -> how long the next one takes, with the value between them.
     ([ACCEPTED], 0.0, ROUND_TRIP), ([DENIED, ACCEPTED], 0.0, ROUND_TRIP),
