@@ -99,12 +99,11 @@ def bridge(own_ros: Ros, port: int) -> Iterator[Program]:
         yield bridge
 
 
-def test_bridge_receives_through_no_port_in_shared_memory(bridge: Program) -> None:
+def test_bridge_receives_through_no_port_in_shared_memory_and_its_profile_is_valid(
+    bridge: Program,
+) -> None:
     # Other processes may keep writing to the old port of a bridge that was killed and restarted.
     # Each reader of a port keeps the port's lock file open.
     opened = [os.readlink(link) for link in Path(f'/proc/{bridge.pid}/fd').iterdir()]
     assert not [name for name in opened if re.match('/dev/shm/fast.*_port.*_el', name)]
-
-
-def test_middleware_has_no_warning_about_its_profile(bridge: Program) -> None:
     assert 'PROFILES_FILE' not in bridge.log

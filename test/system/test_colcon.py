@@ -5,6 +5,7 @@
 
 import configparser
 import contextlib
+import os
 from pathlib import Path
 import re
 import shlex
@@ -14,10 +15,9 @@ import subprocess
 import sys
 
 import pytest
-from support.light import eventually
 from support.ports import free_port
 from support.processes import ended, environment, Program, python, ROOT
-from support.ros import Parameters, Ros
+from support.ros import Ros
 
 COLCON = shutil.which('colcon', path=f'{Path(sys.executable).parent}:/usr/bin')
 LEFT_OUT = shutil.ignore_patterns(
@@ -71,32 +71,18 @@ def test_modules_and_files_that_ros_looks_for_are_installed(prefix: Path) -> Non
     assert (prefix / 'share/ament_index/resource_index/packages/illuminator_ros').is_file()
 
 
-@pytest.mark.parametrize('name', EXECUTABLES)
-def test_executable_is_where_ros2_run_looks_for_it_and_prints_its_help(
-    prefix: Path, installed: dict[str, str], name: str, tmp_path: Path,
+def test_executables_are_where_ros2_run_looks_for_them_and_print_their_help(
+    prefix: Path, installed: dict[str, str], tmp_path: Path,
 ) -> None:
-    outcome = subprocess.run(
-        [prefix / 'lib' / 'illuminator_ros' / name, '--help'], env=environment(installed),
-        cwd=tmp_path, text=True, capture_output=True, timeout=30)
+    folder = prefix / 'lib' / 'illuminator_ros'
+    assert [name for name in EXECUTABLES if not os.access(folder / name, os.X_OK)] == []
+    for name in ('bridge', 'simulator'):
+        outcome = subprocess.run(
+            [folder / name, '--help'], env=environment(installed), cwd=tmp_path, text=True,
+            capture_output=True, timeout=30)
 
-    assert (outcome.returncode, outcome.stderr) == (0, '')
-    assert outcome.stdout.startswith(f'usage: {name} ')
-
-
-def test_installed_programs_find_each_other(
-    own_ros: Ros, prefix: Path, installed: dict[str, str], tmp_path: Path,
-) -> None:
-    url = f'127.0.0.1:{free_port()}'
-    env = {**installed, 'ROS_DOMAIN_ID': str(own_ros.domain)}
-    executables = prefix / 'lib' / 'illuminator_ros'
-    with (ended(Program(str(executables / 'bridge'), '--ros-args', '-p',
-                        f'connection_url:=udpin://{url}', env=env, cwd=tmp_path)) as bridge,
-          ended(Program(str(executables / 'simulator'), f'udpout://{url}', env=env,
-                        cwd=tmp_path))):
-        bridge.wait_for('light 1/243 connected')
-
-        # Retry: these use the clock of the machine; if it pauses, a set may be too late.
-        eventually(lambda: Parameters(own_ros).set(brightness=60)[0].successful)
+        assert (outcome.returncode, outcome.stderr) == (0, '')
+        assert outcome.stdout.startswith(f'usage: {name} ')
 
 
 def test_the_systemd_unit_is_installed_for_a_user_and_runs_two_lights(

@@ -36,8 +36,7 @@ def default_port(port: int) -> Iterator[None]:
         yield
 
 
-@pytest.mark.parametrize('node_first', [True, False])
-@pytest.mark.parametrize('node', NODES)
+@pytest.mark.parametrize(('node', 'node_first'), [('bridge', True), ('rededge', False)])
 def test_programs_without_a_url_find_each_other_whichever_starts_first(
         domain: int, node: str, node_first: bool) -> None:
     port, arguments, found = NODES[node]

@@ -5,7 +5,6 @@
 
 from collections.abc import Callable, Iterator
 import contextlib
-import os
 import signal
 
 from illuminator_ros.mavlink.dialect import mavlink
@@ -50,8 +49,7 @@ def assert_ends(program: Program, number: int = signal.SIGTERM) -> None:
     assert (program.end(number), 'Traceback' in program.log) == (0, False), program.log
 
 
-@pytest.mark.parametrize('number', [
-    signal.SIGINT, signal.SIGTERM, signal.SIGRTMAX])
+@pytest.mark.parametrize('number', [signal.SIGTERM, signal.SIGRTMAX])
 def test_every_light_is_switched_off_and_named(own_ros: Ros, port: int, number: int) -> None:
     with (lit(own_ros, port) as (program, light),
           ServedLight(port, source=Address(1, 244), enable=1) as other):
@@ -90,14 +88,8 @@ def test_light_that_is_not_confirmed_off_is_an_error_that_does_not_delay_the_end
         assert [found[:7] for found in program.lines if line in found] == ['[ERROR]']
 
 
-# How often the next test is repeated.
-RUNS = int(os.environ.get('RUNS', '1'))
-
-
-@pytest.mark.parametrize('run', range(RUNS))
-@pytest.mark.parametrize('loss', [0.0, 0.3])
 def test_off_is_the_last_change_whatever_is_requested_at_the_end(
-    own_ros: Ros, port: int, loss: float, run: int,
+    own_ros: Ros, port: int,
 ) -> None:
     with (ServedLight(port, link=Link, enable=1) as light,
           ServedLight(port, link=Link, source=Address(1, 244), enable=1) as other):
@@ -111,7 +103,6 @@ def test_off_is_the_last_change_whatever_is_requested_at_the_end(
                 '/illuminator', '/illuminator_1_244'))
             with repeated(first, Bool(data=True)), repeated(second, Bool(data=True)):
                 eventually(lambda: all(one.commands(ON_OFF) for one in (light, other)))
-                light.fake.loss = other.fake.loss = loss
                 own_ros.start_enable()
                 Parameters(own_ros).start_set(brightness=20.0)
                 assert_ends(program)
@@ -119,11 +110,10 @@ def test_off_is_the_last_change_whatever_is_requested_at_the_end(
             program.kill()
 
         for one in (light, other):
+            assert_goes_off(one)
             # A busy machine may need more than 0.6 s.
-            may_be_on = program.count(f'light {one.fake.source} may still be on')
-            if not loss or not may_be_on:
-                assert_goes_off(one)
-            assert may_be_on or program.count(f'light {one.fake.source} is off'), program.log
+            assert any(program.count(f'light {one.fake.source} {end}')
+                       for end in ('may still be on', 'is off')), program.log
             changes = one.commands(ON_OFF, CONFIGURE)
             assert (changes[-1].command, changes[-1].param1) == (ON_OFF, 0.0)
 
