@@ -69,8 +69,10 @@ def test_checks_that_need_consent_are_skipped_without_it_and_change_nothing(kind
         assert one.runner.restored == 'nothing was changed'
 
 
-@all_lights
-@pytest.mark.parametrize('fault', [None, *FAULTS])
+@pytest.mark.parametrize(('light', 'fault'), [
+    *((LIGHTS['switch'], fault) for fault in (None, *FAULTS)),
+    *((LIGHTS['brightness is the switch'], fault) for fault in (
+        None, 'slow', 'lie', 'anything', 'disobey', 'on-bright'))])
 def test_without_consent_a_light_is_on_at_low_brightness_only(
         light: IlluminatorProperties, fault: str | None) -> None:
     one = start('illuminator', *([fault] if fault else []), of=light, consent=False,

@@ -61,7 +61,6 @@ COMPONENT = {
     'misaddress': {'acknowledged-to-us'},
 }
 GIMBAL = {
-    **COMPONENT,
     'no-request': set(),
     'jumps': {'continuous'},
     'no-frame': set(),
@@ -126,6 +125,7 @@ SEEDED: dict[str, dict[str, set[str]]] = {
         'extension': {'lengths'},
     },
     'gimbal': {
+        **COMPONENT,
         **GIMBAL,
         'type': {'heartbeat-type'},
         'autopilot': {'heartbeat-autopilot'},
@@ -155,11 +155,12 @@ SEEDED: dict[str, dict[str, set[str]]] = {
 }
 # Random fault -> a requirement that fails; others fail too, depending on its moment.
 RANDOM = {
-    **dict.fromkeys(KINDS, {
+    **dict.fromkeys(('illuminator', 'gimbal'), {
         'drop': 'acknowledged', 'duplicate': 'acknowledged-once', 'corrupt': 'checksums',
         'delay': 'acknowledged-promptly', 'reboot': 'uptime'}),
     'rededge': {'drop': 'heartbeat-rate', 'duplicate': 'ping-once', 'delay': 'ping',
                 'corrupt': 'checksums', 'reboot': 'capture-index'},
+    'gimbal_manager': {},
 }
 # Profile -> all requirements that fail.
 DEVIATIONS: dict[str, dict[str, set[str]]] = {
@@ -343,10 +344,14 @@ UNBROKEN = {'gimbal': {'address', 'finished', 'not-busy'},
 
 @every_kind
 def test_every_fault_is_seeded_and_every_requirement_can_fail(kind: str) -> None:
+    # The checks of a component are the same ones for a manager.
+    shared = {**COMPONENT, **{name: {one} for name, one in RANDOM['gimbal'].items()}} if (
+        kind == 'gimbal_manager') else {}
     assert set(PAYLOADS[kind].load('simulated').device.faults) == {
-        *(name.partition('=')[0] for name in SEEDED[kind]), *RANDOM[kind]}
+        *(name.partition('=')[0] for name in (*SEEDED[kind], *shared)), *RANDOM[kind]}
     found = set().union(
-        *SEEDED[kind].values(), RANDOM[kind].values(), *DEVIATIONS.get(kind, {}).values(),
+        *SEEDED[kind].values(), *shared.values(), RANDOM[kind].values(),
+        *DEVIATIONS.get(kind, {}).values(),
         {name for one, name in FAULTY if one == kind})
     assert {one.name for one in REQUIREMENTS[kind]} - found == UNBROKEN.get(kind, set())
 
