@@ -61,8 +61,7 @@ def light_of(ros: Ros, node: str, lights: list[ServedLight]) -> Address:
     ({}, (SECOND, FIRST), SECOND),
     ({'target_component': 244}, (FIRST, SECOND, OTHER), SECOND),
     ({'target_system': 7}, (FIRST, SECOND, OTHER), OTHER),
-    ({'target_system': 1, 'target_component': 244}, (FIRST, SECOND, OTHER), SECOND),
-], ids=['none', 'component', 'system', 'both'])
+], ids=['none', 'component', 'system'])
 def test_first_node_serves_the_target_or_else_the_first_light_heard(
     own_ros: Ros, start: Start, target: dict[str, int], sources: tuple[Address, ...],
     chosen: Address,
@@ -109,11 +108,8 @@ def test_remapping_that_gives_two_nodes_the_same_service_or_topic_is_logged(star
     assert bridge.count('has the same') == 1
 
 
-@pytest.mark.parametrize('remap', [('--remap', '__node:=spot'), ('-r', '__name:=spot')])
-def test_remapped_node_name_is_that_of_the_first_node_only(
-    own_ros: Ros, start: Start, remap: tuple[str, str],
-) -> None:
-    bridge, _ = start(*remap, names='["7/243=illuminator", "1/243=bow"]',
+def test_remapped_node_name_is_that_of_the_first_node_only(own_ros: Ros, start: Start) -> None:
+    bridge, _ = start('--remap', '__name:=spot', names='["7/243=illuminator", "1/243=bow"]',
                       sources=(FIRST, SECOND, OTHER))
 
     # The default name of the first node is free.

@@ -115,22 +115,22 @@ def test_exit_status_tells_whether_the_light_confirmed(own_ros: Ros, port: int) 
                 assert program.wait() == status
 
 
-@pytest.mark.parametrize(('line', 'words'), [
-    ('set /illu', {'/illuminator'}),
-    ('set /illuminator st', {'strobe_duty_cycle=', 'strobe_period='}),
-    ('set /belly ', set())])
 def test_shell_completes_names_of_nodes_and_settings(
-        own_ros: Ros, port: int, tmp_path: Path, line: str, words: set[str]) -> None:
+        own_ros: Ros, port: int, tmp_path: Path) -> None:
     pytest.importorskip('argcomplete')
     found = tmp_path / 'found'
-    # The variables that the function of register-python-argcomplete sets.
-    environment = {
-        'ROS_DOMAIN_ID': str(own_ros.domain), '_ARGCOMPLETE': '1', '_ARGCOMPLETE_IFS': '\n',
-        '_ARGCOMPLETE_STDOUT_FILENAME': str(found), 'COMP_LINE': line,
-        'COMP_POINT': str(len(line))}
-    with (ServedLight(port), running_bridge(own_ros.domain, port, until='connected'),
-          ended(python('illuminator_ros.set', env=environment)) as program):
-        assert program.wait() == 0
+    with ServedLight(port), running_bridge(own_ros.domain, port, until='connected'):
+        for line, words in (
+                ('set /illu', {'/illuminator'}),
+                ('set /illuminator st', {'strobe_duty_cycle=', 'strobe_period='}),
+                ('set /belly ', set())):
+            # The variables that the function of register-python-argcomplete sets.
+            environment = {
+                'ROS_DOMAIN_ID': str(own_ros.domain), '_ARGCOMPLETE': '1',
+                '_ARGCOMPLETE_IFS': '\n', '_ARGCOMPLETE_STDOUT_FILENAME': str(found),
+                'COMP_LINE': line, 'COMP_POINT': str(len(line))}
+            with ended(python('illuminator_ros.set', env=environment)) as program:
+                assert program.wait() == 0
 
-    given = {word.strip() for word in found.read_text().split('\n')}
-    assert {word for word in given if word and not word.startswith('-')} == words
+            given = {word.strip() for word in found.read_text().split('\n')}
+            assert {word for word in given if word and not word.startswith('-')} == words

@@ -45,7 +45,10 @@ MODULES = (
     'illuminator_ros.gimbal.simulated_device', 'illuminator_ros.illuminator.ros.lights',
     'illuminator_ros.illuminator.simulated', 'illuminator_ros.rededge.ros.camera_node',
     'illuminator_ros.rededge.simulated', 'illuminator_ros.ros.bridge', 'rosidl_generator_py',
-    'rosidl_parser.parser', 'service_msgs.msg', 'type_description_interfaces.msg')
+    'rosidl_parser.parser', 'service_msgs.msg', 'type_description_interfaces.msg',
+    'encodings.idna', *(f'{package}.{package}_s__rosidl_typesupport_c' for package in (
+        'builtin_interfaces', 'diagnostic_msgs', 'geometry_msgs', 'rcl_interfaces', 'sensor_msgs',
+        'service_msgs', 'std_msgs', 'std_srvs', 'type_description_interfaces')))
 
 
 def handle_signals_by_default() -> None:
