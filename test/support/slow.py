@@ -154,7 +154,7 @@ def time_passes() -> Iterator[None]:
     ended = threading.Event()
 
     def run() -> None:
-        while not ended.wait(0.005):
+        while not ended.wait(0.01):
             # Shorter than any limit that must hold, see pass_time_until.
             CLOCK.step(0.2)
 
