@@ -15,17 +15,18 @@ settings.register_profile(
     'steady', deadline=None, derandomize=True, max_examples=40,
     suppress_health_check=[HealthCheck.too_slow])
 settings.load_profile('steady')
-# Files that take longer than 10 s.
-LONG = {f'test_{name}.py' for name in (
-    'app', 'conformance', 'findings', 'gimbal_node', 'manager_node', 'mavsdk', 'packaging',
-    'rededge')}
+# Files that take longer than 10 s, the longest first; they begin before all others.
+LONG = [f'test_{name}.py' for name in (
+    'app', 'examples', 'findings', 'gimbal_node', 'rededge', 'conformance', 'monitor',
+    'monitor_web', 'flight', 'soak', 'mavsdk', 'packaging', 'manager_node', 'demo',
+    'command_line')]
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     """Begin with long files: at the end, one would run alone; then mix those of all folders."""
     items.sort(key=lambda item: (
-        item.path.name not in LONG, item.path.parent.name not in ('lint', 'system'),
-        item.path.name))
+        item.path.parent.name != 'lint',
+        LONG.index(item.path.name) if item.path.name in LONG else len(LONG), item.path.name))
 
 
 def pytest_collection_finish() -> None:

@@ -139,9 +139,11 @@ def running(ros: Ros) -> Iterator[Running]:
         recorder, reported = ros.subscribe(DiagnosticArray, '/diagnostics', STREAM), {}
 
         def all_report() -> bool:
+            arrays = recorder.messages
+            recorder.clear()
             reported.update({
                 status.name: {'level', *(value.key for value in status.values)}
-                for array in list(recorder.messages) for status in array.status})
+                for array in arrays for status in array.status})
             return set().union(*STATUSES.values()) <= reported.keys()
         eventually(all_report)
         interfaces = {name: interface(ros, name, [

@@ -25,8 +25,8 @@ from support.slow import CLOCK, SlowLink, SPEED
 from support.waiting import eventually, Log
 
 LIGHT = Address(1, 243)
-# s of the slow clock between statuses: ten in a real second.
-STREAM = 0.1 * SPEED
+# Real s between statuses.
+STREAM = 0.1
 ON_OFF, CONFIGURE = mavlink.MAV_CMD_ILLUMINATOR_ON_OFF, mavlink.MAV_CMD_DO_ILLUMINATOR_CONFIGURE
 T = TypeVar('T')
 
@@ -82,7 +82,8 @@ class ServedLight:
                  **how: Any) -> None:
         self.port = port
         self._kind = link
-        self.fake = _Recorder(source, **{'stream': STREAM, **how})
+        self._stream = STREAM * SPEED if link is SlowLink else STREAM
+        self.fake = _Recorder(source, **{'stream': self._stream, **how})
         self._link: EndpointLink[_Recorder] | None = None
 
     def __enter__(self) -> ServedLight:
@@ -113,7 +114,7 @@ class ServedLight:
         self.fake.silent = False
         self.fake.pushes = True
         self.fake.answers.add(STATUS_ID)
-        self.fake.stream = STREAM
+        self.fake.stream = self._stream
 
     def do(self, action: Callable[[float], T]) -> T:
         """Call ``action(now)`` in the light's thread, and return its result."""
