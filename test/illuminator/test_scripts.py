@@ -410,6 +410,10 @@ ROWS: dict[str, Row] = {
         'strobes 1, 3', 'off, default', None, 'superseded by off', DONE, 'an OFF is under way',
         enable=1, **SWITCH),
     # Limits that change.
+    'within the fence sets that share a command succeed only together': row(
+        'is CONFIGURE lost, sets 30, 1, mark, sets 50, strobes 1, 2', 'off', '50',
+        'brightness 50 % not confirmed', 'strobe_period 1 s, strobe_duty_cycle 50 % not confirmed',
+        brightness=50.0),
     # Repeated messages.
     'a repeated setpoint beside a set of another value is sent after it': row(
         'default dims 30, 2, is CONFIGURE lost obeyed, mark, sets 60, default dims 30, 3',
