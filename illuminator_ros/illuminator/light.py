@@ -64,8 +64,7 @@ from .messages import STATUS_ID
 from .model import Changes, Status
 from .rules import Rules
 from .settings import LightSettings
-from .silence import Silence
-from .status_order import ChangingStates, Order
+from .status_order import Order
 from .twin import Twin
 from .user_requests import UserRequests
 from ..mavlink.command_sender import CommandSender
@@ -119,14 +118,9 @@ class Light:
         demand: an atomic set that fails takes them back before.
         """
         rules = self._rules
-        before, rules.settings = rules.settings, settings
-        if settings.limits != before.limits:
-            rules.change_limits(now)
+        if rules.change_settings(settings, now):
             self._control.cancel_configuration(now)
             rules.keep_limits(now, is_busy=self._control.configuration.is_busy)
-        if settings.off_after_silence != before.off_after_silence:
-            rules.forget_silenced(now)
-            rules.silence = Silence(settings.off_after_silence, now)
         if settings.sources:
             self._requests.claims.set_lease(settings.sources.timeout)
         self._commands.schedule.by(self.poll, -math.inf)
@@ -148,12 +142,11 @@ class Light:
     def receive_status(self, status: Status, now: float) -> None:
         """Receive an ILLUMINATOR_STATUS; a late status is ignored."""
         self.heard(now)
-        twin, control, before = self.twin, self._control, self.twin.order.newest_at
+        twin, control = self.twin, self._control
         has_news = not (self._is_settled and status.repeats(twin.status))
         order = twin.order.add(status, now, control.expects)
         if order is Order.LATE:
             return
-        twin.gap = now - before if math.isfinite(before) else 0.0
         if order is Order.RESTARTED:
             # Lights that share an address seem to restart at each status.
             if not self._queries.serials.shared(now):
@@ -181,7 +174,7 @@ class Light:
         """Note that the light is not heard any more."""
         if self.liveness.lose(now):
             self.twin.order.lost()
-            self.twin.changing = ChangingStates()
+            self.twin.changing.reset()
             self._queries.end()
             self._emit(DeviceDisconnected(self.address, reason))
             text = self.unreachable(now)
@@ -370,7 +363,7 @@ class Light:
         if now >= self.liveness.silent_at:
             self.lose(self.liveness.silence(now), now)
         if now >= self.twin.changing.until:
-            self.twin.changing = ChangingStates()
+            self.twin.changing.reset()
             self._emit(events.StatesChanging(self.address, False))
         self._queries.poll(now)
         self._control.poll(now)

@@ -13,7 +13,7 @@ from .commands import Configure, OFF, ON, SWITCHES
 from .decide import decide, Goals
 from .model import FIELDS, Status
 from .rules import Rules
-from .twin import Failure, IMPLIED_TIME, OwnCommands, Twin
+from .twin import IMPLIED_TIME, OwnCommands, Twin
 from .user_requests import not_reported
 from ..payload.attempt import Change, Served, Target
 from ..payload.device_property import plan_of, Property
@@ -122,7 +122,7 @@ class LightControl:
         before = prop.attempt
         if before is not None and self._requests.of_commander(before.serves) != before.serves:
             self._withdrawn(prop.withdraw('held by another source', now), now)
-        served = prop.steer(goal, now, self._twin.status, self._twin.gap)
+        served = prop.steer(goal, now, self._twin.status, self._twin.order.gap)
         if prop.attempt is before:
             return False
         self._withdrawn(served, now)
@@ -163,7 +163,8 @@ class LightControl:
 
     def switch_off_finally(self, now: float, report: Callable[[Result, float], None]) -> None:
         """Report the results of the OFF at the end of the process."""
-        self._report, self._rules.wants_off = report, True
+        self._report = report
+        self._rules.want_off()
         is_fenced = now < self.switch.fence_ends_at
         report(Result(False, 'sent, not confirmed' if is_fenced else ''), now)
 
@@ -229,7 +230,7 @@ class LightControl:
     def reported(self, status: Status, now: float) -> None:
         """Take a status that is not older than those before."""
         twin, switch, configuration = self._twin, self.switch, self.configuration
-        gap, unconfirmed = twin.gap or 0.0, configuration.unconfirmed(now)
+        gap, unconfirmed = twin.order.gap or 0.0, configuration.unconfirmed(now)
         sent_at = max(switch.sent_at, -math.inf if unconfirmed else configuration.sent_at)
         ours = OwnCommands(self.configuration.is_busy, unconfirmed, sent_at + IMPLIED_TIME)
         before, was_off_by_heat = twin.enabled, twin.is_off_by_heat
@@ -312,8 +313,7 @@ class LightControl:
         if result.success:
             self._twin.agree(change.configuration, change.names, served.status)
         elif result.contradicted:
-            self._twin.failure = Failure(
-                result.message, change.configuration, self._twin.status)
+            self._twin.fail(result.message, change.configuration)
         if one.why in WEAK:
             self._rules.ended(one, change.names, result, now)
         else:

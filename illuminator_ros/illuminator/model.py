@@ -320,10 +320,12 @@ class Status:
                 invalid.append(f'{name} {number:g}')
         brightness, strobe_period, strobe_duty_cycle, temperature = numbers
         return cls(
-            message.uptime_ms, enabled, mode or Mode.UNKNOWN, message.mode_bitmask,
-            message.error_status, brightness, strobe_period, strobe_duty_cycle, temperature,
-            StrobeRange(message.min_strobe_period, message.max_strobe_period), tuple(invalid),
-            message.gimbal_device_id)
+            uptime_ms=message.uptime_ms, enabled=enabled, mode=mode or Mode.UNKNOWN,
+            mode_bitmask=message.mode_bitmask, error_flags=message.error_status,
+            brightness=brightness, strobe_period=strobe_period,
+            strobe_duty_cycle=strobe_duty_cycle, temperature=temperature,
+            strobe_range=StrobeRange(message.min_strobe_period, message.max_strobe_period),
+            invalid=tuple(invalid), gimbal_device_id=message.gimbal_device_id)
 
     def repeats(self, other: Status | None) -> bool:
         """Return whether it is equal to another one in all but its uptime."""

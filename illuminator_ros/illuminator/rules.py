@@ -16,7 +16,7 @@ from .limit_watch import LimitWatch
 from .model import Changes, checked, SafetyLimits, Status
 from .settings import LightSettings
 from .silence import Silence
-from .twin import Failure, Twin
+from .twin import Twin
 from ..mavlink.command_sender import format_seconds
 from ..mavlink.errors import InvalidValue
 from ..mavlink.retries import RetryPolicy
@@ -85,6 +85,14 @@ class Rules:
     def put_release_off(self, reason: str, now: float) -> None:
         """Put the OFF of a release."""
         self._put(Why.RELEASE, {'enabled': False}, reason, now)
+
+    def note_call(self, now: float) -> None:
+        """Note a call beside which no other is under way."""
+        self.silence.calling_since = now
+
+    def want_off(self) -> None:
+        """Want the OFF at the end of the process."""
+        self.wants_off = True
 
     def finish(self) -> None:
         """Want only the OFF at the end of the process."""
@@ -217,7 +225,7 @@ class Rules:
         elif result.permanent:
             for rule in self.weak:
                 self._requests.end(rule, result, now)
-            self._twin.failure = Failure(result.message)
+            self._twin.fail(result.message)
             self._report(False, result.message)
         elif not result.superseded:
             self.failed(one, result.message, now)
@@ -234,9 +242,20 @@ class Rules:
     def _report(self, success: bool, message: str, *, is_final: bool = True) -> None:
         self._emit(events.ConfigurationRestored(self._target.address, success, message, is_final))
 
+    def change_settings(self, settings: LightSettings, now: float) -> bool:
+        """Take other settings; return whether the limits differ."""
+        before, self.settings = self.settings, settings
+        if settings.off_after_silence != before.off_after_silence:
+            self.forget_silenced(now)
+            self.silence = Silence(settings.off_after_silence, now)
+        if settings.limits == before.limits:
+            return False
+        self._change_limits(now)
+        return True
+
     # Limits
 
-    def change_limits(self, now: float) -> None:
+    def _change_limits(self, now: float) -> None:
         """Apply other limits to what is wanted."""
         limits, self.limits.limited_at = self.settings.limits, -math.inf
         for one in [*self._requests.standing]:

@@ -47,12 +47,14 @@ class StatusOrder:
     Nothing else is concluded from the uptime, which may stand still, run slow, or count seconds.
 
     :ivar newest: the newest status, None before the first, and ``newest_at``, when it came.
+    :ivar gap: the time between the last two statuses that were not late, None before the first.
     :ivar restarts: how often the light has restarted.
     """
 
     def __init__(self) -> None:
         self.newest: Status | None = None
         self.newest_at = -math.inf
+        self.gap: float | None = None
         self.restarts = 0
         self._lower_since = math.inf
         self._restarted_at = -math.inf
@@ -78,6 +80,7 @@ class StatusOrder:
             self.restarts += 1
             self._restarted_at = now
             self._recent.clear()
+        self.gap = 0.0 if self.newest is None else now - self.newest_at
         self.newest, self.newest_at = status, now
         self._lower_since, self._was_lost = math.inf, False
         self._recent.pop(status, None)
@@ -127,6 +130,12 @@ class ChangingStates:
         self.until = math.inf
         self._states: deque[Status] = deque(maxlen=MAX_STATES)
         self._returns: deque[float] = deque(maxlen=MAX_RETURNS)
+
+    def reset(self) -> None:
+        """Forget all states: the light was lost, or it has been calm for long enough."""
+        self.are_changing, self.until = False, math.inf
+        self._states.clear()
+        self._returns.clear()
 
     def add(self, status: Status, now: float, *, is_commanded: bool) -> bool:
         """

@@ -65,7 +65,6 @@ class Twin:
     :param emit: takes the events.
     :ivar order: the newest status, and the order of those before.
     :ivar changing: whether the state goes back and forth.
-    :ivar gap: the time between the last two statuses, None before the first.
     :ivar enabled: as reported, None if unknown; while heat keeps the light off, as before, since
         it may light up once it has cooled down.
     :ivar is_off_by_heat: whether heat has switched it off, and it has not been on since.
@@ -79,7 +78,6 @@ class Twin:
     def __init__(self, target: Target, emit: Callable[[events.LightEvent], None]) -> None:
         self.order = StatusOrder()
         self.changing = ChangingStates()
-        self.gap: float | None = None
         self.enabled: bool | None = None
         self.is_off_by_heat = False
         self.agreed: Configuration | None = None
@@ -244,6 +242,14 @@ class Twin:
         agreed = self.agreed or goal
         self._adopt(replace(agreed, **{name: getattr(goal, name) for name in names}),
                     events.ChangeCause.REQUEST)
+
+    def fail(self, text: str, goal: Configuration | None = None) -> None:
+        """
+        Note why the light does not have the last configuration that was requested.
+
+        :param goal: that configuration, None if it was not sent.
+        """
+        self.failure = Failure(text, goal, self.status)
 
     def keep(self, name: str) -> None:
         """Agree on the value of a field that the light has, in place of one that it must not."""

@@ -63,7 +63,7 @@ class UserRequests:
             requests.reply(new, Result(False, 'repeated', superseded=True))
         elif is_held or self._is_right(new):
             if new.is_call and not is_held and not requests.are_calling:
-                self._rules.silence.calling_since = now
+                self._rules.note_call(now)
             attempt = self._switch.attempt
             if new.is_call and is_off and attempt is not None and attempt.goal.insists:
                 # It may never end, and a later call waits for the next one.
