@@ -126,7 +126,7 @@ def _ros() -> tuple[list[str], list[Finding]]:
 
     statuses: dict[tuple[str, str], DiagnosticStatus] = {}
 
-    def take(message: DiagnosticArray) -> None:
+    def receive(message: DiagnosticArray) -> None:
         for status in message.status:
             if node := {one.key: one.value for one in status.values}.get('node'):
                 statuses[node, status.name] = status
@@ -134,7 +134,7 @@ def _ros() -> tuple[list[str], list[Finding]]:
     rclpy.init()
     own = rclpy.create_node('_doctor', enable_rosout=False, start_parameter_services=False)
     try:
-        own.create_subscription(DiagnosticArray, '/diagnostics', take, 100)
+        own.create_subscription(DiagnosticArray, '/diagnostics', receive, 100)
         end = time.monotonic() + ROS_TIME
         while (left := end - time.monotonic()) > 0:
             rclpy.spin_once(own, timeout_sec=left)

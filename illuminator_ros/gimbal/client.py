@@ -112,7 +112,7 @@ class GimbalClient(Payload):
         """See :meth:`Payload.receive`."""
         if isinstance(message, GimbalDeviceAttitudeStatus):
             if gimbal := self._sender(source, message.gimbal_device_id, now):
-                gimbal.take_attitude(message, now)
+                gimbal.receive_attitude(message, now)
         elif isinstance(message, Heartbeat):
             self._hear(source, message, now)
             for gimbal in self.gimbals.values():
@@ -120,7 +120,7 @@ class GimbalClient(Payload):
                     gimbal.update(now)
         elif isinstance(message, GimbalManagerStatus):
             if gimbal := self._managed(source, message.gimbal_device_id, now):
-                gimbal.take_status(source, message, now)
+                gimbal.receive_status(source, message, now)
                 if gimbal.reports.lacks_information_of(source):
                     self._reopen(source, now)
         elif isinstance(message, GimbalManagerInformation):
@@ -136,10 +136,10 @@ class GimbalClient(Payload):
         elif isinstance(message, Attitude | GlobalPositionInt):
             if (source.component == mavlink.MAV_COMP_ID_AUTOPILOT1
                     and (vehicle := self._vehicles.get(source.system))):
-                vehicle.take(message, now)
+                vehicle.receive(message, now)
         elif (isinstance(message, GimbalDeviceInformation)
                 and (gimbal := self._sender(source, message.gimbal_device_id, now))):
-            gimbal.reports.device.take_information(message)
+            gimbal.reports.device.receive_information(message)
 
     # Gimbals
 

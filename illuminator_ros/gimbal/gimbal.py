@@ -151,20 +151,20 @@ class Gimbal:
         self.update(now)
         self._step(now)
 
-    def take_status(
+    def receive_status(
         self, source: Address, status: gimbal.GimbalManagerStatus, now: float,
     ) -> None:
-        """Take GIMBAL_MANAGER_STATUS of the gimbal."""
+        """Receive GIMBAL_MANAGER_STATUS of the gimbal."""
         manager = self.reports.announce(source, now)
-        if manager is not None and manager.take_status(status, now):
+        if manager is not None and manager.receive_status(status, now):
             self.update(now)
             self._step(now, self._commanded.reported(CONTROL, status, now)
                        if manager is self.reports.manager else ())
 
-    def take_attitude(self, status: GimbalDeviceAttitudeStatus, now: float) -> None:
-        """Take GIMBAL_DEVICE_ATTITUDE_STATUS of the device."""
+    def receive_attitude(self, status: GimbalDeviceAttitudeStatus, now: float) -> None:
+        """Receive GIMBAL_DEVICE_ATTITUDE_STATUS of the device."""
         device, setpoints = self.reports.device, self.setpoints
-        if not device.take_status(status, now):
+        if not device.receive_status(status, now):
             return
         self.update(now)
         self._step(now, self._commanded.reported(POSE, status, now))

@@ -65,7 +65,7 @@ class GimbalCommands:
             goals.get(name), now, None, self._gaps.get(name, (0.0, None))[1])]
 
     def reported(self, name: str, status: Any, now: float) -> list[Served[Any]]:
-        """Take a status that shows a property; return the requests that have ended."""
+        """Receive a status that shows a property; return the requests that have ended."""
         before, _ = self._gaps.get(name, (now, 0.0))
         self._gaps[name] = now, now - before
         return self._properties[name].reported(status, now - before, now)

@@ -93,8 +93,8 @@ class RemoteManager:
         age = now - self.status_at
         return f'{text} for {format_seconds(age)}' if math.isfinite(age) else text
 
-    def take_status(self, status: gimbal.GimbalManagerStatus, now: float) -> bool:
-        """Take a status; return whether it counts: late ones do not."""
+    def receive_status(self, status: gimbal.GimbalManagerStatus, now: float) -> bool:
+        """Receive a status; return whether it counts: late ones do not."""
         if _is_late(status.time_boot_ms, self._status_time):
             return False
         self._status_time = status.time_boot_ms
@@ -190,12 +190,12 @@ class RemoteDevice:
         self._identity_query = Retries(GIMBAL_MESSAGE)
         self.request.connected(now)
 
-    def take_information(self, message: gimbal.GimbalDeviceInformation) -> None:
-        """Take its identity and its ranges."""
+    def receive_information(self, message: gimbal.GimbalDeviceInformation) -> None:
+        """Receive its identity and its ranges."""
         self.identity, self.ranges = events.DeviceIdentity.of(message), known_ranges(message)
         self._identity_query.stop()
 
-    def take_status(self, status: GimbalDeviceAttitudeStatus, now: float) -> bool:
+    def receive_status(self, status: GimbalDeviceAttitudeStatus, now: float) -> bool:
         """Take its attitude and its flags; return whether the status counts: late ones do not."""
         self.liveness.hear(now)
         if _is_late(status.time_boot_ms, self._status_time):

@@ -99,8 +99,8 @@ class ManagedDevice:
         if self._tracker.has_mavlink:
             self.information, self.capabilities, self.ranges = None, 0, UNLIMITED
 
-    def take_information(self, message: GimbalDeviceInformation) -> None:
-        """Take GIMBAL_DEVICE_INFORMATION."""
+    def receive_information(self, message: GimbalDeviceInformation) -> None:
+        """Receive GIMBAL_DEVICE_INFORMATION."""
         self.information = message
         self.capabilities, self.ranges = read_capabilities(message), known_ranges(message)
         self.request.stop()
@@ -122,8 +122,8 @@ class ManagedDevice:
 
     # Reports
 
-    def take_status(self, status: GimbalDeviceAttitudeStatus, now: float) -> None:
-        """Take GIMBAL_DEVICE_ATTITUDE_STATUS."""
+    def receive_status(self, status: GimbalDeviceAttitudeStatus, now: float) -> None:
+        """Receive GIMBAL_DEVICE_ATTITUDE_STATUS."""
         self.newest, self._newest_at = status, now
 
     def status(self, now: float) -> GimbalDeviceAttitudeStatus | None:

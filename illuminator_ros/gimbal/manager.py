@@ -150,7 +150,7 @@ class GimbalManager(Payload):
         """See :meth:`Payload.receive`."""
         self._commands.schedule.by(self.poll, now)
         if isinstance(message, AnySetpoint):
-            self.take_setpoint(source, message, now)
+            self.receive_setpoint(source, message, now)
         elif isinstance(message, mav.Heartbeat):
             if self.control.heard(source, message, now):
                 self.events.emit(AddressShared(source))
@@ -162,16 +162,16 @@ class GimbalManager(Payload):
                     or not self.tracker.hear_device(source, now)):
                 return
             if isinstance(message, GimbalDeviceAttitudeStatus):
-                self._take_attitude(message, now)
+                self._receive_attitude(message, now)
             else:
-                self._device.take_information(message)
+                self._device.receive_information(message)
         elif isinstance(message, gimbal.GimbalManagerInformation | gimbal.GimbalManagerStatus):
             self.tracker.hear_manager(source, message.gimbal_device_id, now)
         elif source == Address(self.address.system, mavlink.MAV_COMP_ID_AUTOPILOT1):
             if isinstance(message, gimbal.AutopilotStateForGimbalDevice):
                 self.vehicle.autopilot_sent(now)
             elif isinstance(message, Attitude | GlobalPositionInt):
-                self.vehicle.take(message, now)
+                self.vehicle.receive(message, now)
                 self.vehicle_changed(now)
 
     def receive_conflicting(self, message: mav.Message, now: float) -> None:
@@ -194,7 +194,7 @@ class GimbalManager(Payload):
             if not self.is_measured(now):
                 # The setpoint of a device that reports no attitude is its attitude.
                 sent = self.setpoints.sent
-                self._take_attitude(self._measured(
+                self._receive_attitude(self._measured(
                     sent and sent.attitude or Quaternion(), YawFrame.VEHICLE, now), now)
         if now >= self.setpoints.due:
             self.setpoints.poll(now)
@@ -235,10 +235,10 @@ class GimbalManager(Payload):
 
     # The device and the vehicle, from the link or from ROS
 
-    def take_attitude(self, value: tuple[Quaternion, YawFrame], now: float) -> None:
-        """Take the attitude of a device without MAVLink, from ROS."""
+    def receive_attitude(self, value: tuple[Quaternion, YawFrame], now: float) -> None:
+        """Receive the attitude of a device without MAVLink, from ROS."""
         self._measured_at = now
-        self._take_attitude(self._measured(to_mavlink(*value), value[1], now), now)
+        self._receive_attitude(self._measured(to_mavlink(*value), value[1], now), now)
         self._commands.schedule.by(self.poll, now)
 
     def is_measured(self, now: float) -> bool:
@@ -254,8 +254,8 @@ class GimbalManager(Payload):
             0, 0, mav.time_boot_ms(now), int(frame.flag), q, math.nan, math.nan, math.nan, 0,
             math.nan if heading is None else heading, math.nan)
 
-    def _take_attitude(self, status: GimbalDeviceAttitudeStatus, now: float) -> None:
-        self._device.take_status(status, now)
+    def _receive_attitude(self, status: GimbalDeviceAttitudeStatus, now: float) -> None:
+        self._device.receive_status(status, now)
         self.setpoints.rate_stop.reported(status, now)
         if not self.tracker.has_mavlink and self.is_active:
             setpoints = self.setpoints
@@ -273,8 +273,8 @@ class GimbalManager(Payload):
 
     # Players
 
-    def take_setpoint(self, source: Address, message: AnySetpoint, now: float) -> None:
-        """Take a setpoint of a player."""
+    def receive_setpoint(self, source: Address, message: AnySetpoint, now: float) -> None:
+        """Receive a setpoint of a player."""
         if source == self.address and self._commands.refusal:
             # The client in this process ends its own rate, which has ended already.
             return

@@ -127,15 +127,15 @@ class StateTracker:
     def link_opened(self, now: float) -> None:
         """Record that the link is open."""
         if not self.has_mavlink:
-            self._take(ManagerInput.DEVICE_HEARD, now)
+            self._advance(ManagerInput.DEVICE_HEARD, now)
 
     def link_closed(self, now: float) -> None:
         """Record that the link is closed."""
         self.other = None
-        self._take(ManagerInput.DEVICE_LOST, now)
+        self._advance(ManagerInput.DEVICE_LOST, now)
 
     def hear_device(self, source: Address, now: float) -> bool:
-        """Take a message of a gimbal device; return whether it is the manager's."""
+        """Receive a message of a gimbal device; return whether it is the manager's."""
         if (not self.has_mavlink or source.system != self._address.system
                 or self._wanted not in (0, source.component)
                 or self.device not in (None, source)):
@@ -143,28 +143,28 @@ class StateTracker:
                 self._other_devices.add(source)
             return False
         self.device, self._device_heard = source, now
-        self._take(ManagerInput.DEVICE_HEARD, now)
+        self._advance(ManagerInput.DEVICE_HEARD, now)
         return True
 
     def hear_manager(self, source: Address, device_id: int, now: float) -> None:
-        """Take the announcement of a device by a manager."""
+        """Receive the announcement of a device by a manager."""
         if source != self.device and (
                 source.system != self._address.system or device_id != self.device_id):
             return
         self.other, self._other_heard = source, now
-        self._take(ManagerInput.MANAGER_HEARD, now)
+        self._advance(ManagerInput.MANAGER_HEARD, now)
 
     def poll(self, now: float) -> None:
         """Act on each time-out that is over."""
         if self.device and now >= self._device_heard + DEVICE_TIMEOUT:
-            self._take(ManagerInput.DEVICE_LOST, now)
+            self._advance(ManagerInput.DEVICE_LOST, now)
             # If no id is configured, the next device may be another one.
             self.device = None
         if self.other and now >= self._other_heard + MANAGER_TIMEOUT:
             self.other = None
-            self._take(ManagerInput.MANAGER_LOST, now)
+            self._advance(ManagerInput.MANAGER_LOST, now)
         if now >= self._listening_until:
-            self._take(ManagerInput.TIME_OVER, now)
+            self._advance(ManagerInput.TIME_OVER, now)
 
     @property
     def due(self) -> float:
@@ -174,7 +174,7 @@ class StateTracker:
             self._device_heard + DEVICE_TIMEOUT if self.device else math.inf,
             self._other_heard + MANAGER_TIMEOUT if self.other else math.inf)
 
-    def _take(self, input_: ManagerInput, now: float) -> None:
+    def _advance(self, input_: ManagerInput, now: float) -> None:
         before = self.state
         self.state = TRANSITIONS.get((before, input_), before)
         if self.state is before:

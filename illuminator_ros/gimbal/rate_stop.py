@@ -121,7 +121,7 @@ class RateStop:
         self._detector.reset()
 
     def reported(self, status: GimbalDeviceAttitudeStatus, now: float) -> None:
-        """Take a status of the device."""
+        """Receive a status of the device."""
         turns = self._detector.turns(status, now)
         # An earlier status may be older than the message.
         is_early = now < self.begun + ATTITUDE_SPACING or self._must_be_sent

@@ -210,7 +210,7 @@ class SetpointStream:
         return self._frame if self._frame_at > now - LOCK_DELAY else self._reported_frame
 
     def reported(self, status: GimbalDeviceAttitudeStatus, now: float) -> None:
-        """Take a status of the device."""
+        """Receive a status of the device."""
         is_locked = status.flags & mavlink.GIMBAL_DEVICE_FLAGS_YAW_LOCK
         self._reported_frame = YawFrame.EARTH if is_locked else YawFrame.VEHICLE
         self.rate_stop.reported(status, now)

@@ -184,7 +184,7 @@ class SimulatedMount(simulated.SimulatedDevice):
         return time_boot_ms(now - self._booted_at)
 
     def obey(self, setpoint: Setpoint, now: float) -> None:
-        """Take a setpoint, see :meth:`GimbalMotion.obey`."""
+        """Receive a setpoint, see :meth:`GimbalMotion.obey`."""
         stop = setpoint.has_rates_only and not any(
             rate for rate in setpoint.rates if math.isfinite(rate))
         if not self.behaviour.ignores_changes and (self.behaviour.stops or not stop):
@@ -307,7 +307,7 @@ class SimulatedGimbal(SimulatedMount):
                 self.manager, self._announced_at = source, now
         elif isinstance(message, gimbal.AutopilotStateForGimbalDevice):
             if source.system == own.system:
-                self._take_heading(message, now)
+                self._receive_heading(message, now)
         elif (source == self.manager or not behaviour.enforces_control) and (
                 isinstance(message, gimbal.GimbalDeviceSetAttitude)
                 or isinstance(message, gimbal.GimbalManagerSetAttitude)
@@ -319,13 +319,13 @@ class SimulatedGimbal(SimulatedMount):
         if self.properties.manager is None and now - self._announced_at >= MANAGER_TIMEOUT:
             self.manager = None
 
-    def _take_heading(self, message: gimbal.AutopilotStateForGimbalDevice, now: float) -> None:
+    def _receive_heading(self, message: gimbal.AutopilotStateForGimbalDevice, now: float) -> None:
         try:
             roll, pitch, yaw = Quaternion(*message.q).normalized().euler()
         except ValueError:
             return
         # An angular velocity of 0 means unknown.
-        self.motion.take_heading(
+        self.motion.receive_heading(
             roll, pitch, yaw, message.angular_velocity_z or math.nan, now)
 
     def _obey(

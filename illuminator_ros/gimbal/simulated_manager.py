@@ -173,7 +173,7 @@ class SimulatedManager(SimulatedMount):
         self.primary = self.secondary = NO_COMPONENT
         self._roi: GeoPoint | None = None
         self._base = UNSET_VECTOR
-        self.motion.take_heading(
+        self.motion.receive_heading(
             0.0, 0.0, math.radians(self.properties.heading), 0.0, now, math.inf)
 
     def reports(self) -> Mapping[type[Message], simulated.Report]:
@@ -203,7 +203,7 @@ class SimulatedManager(SimulatedMount):
         """See :meth:`SimulatedDevice.receive`."""
         if isinstance(message, Attitude | GlobalPositionInt):
             if source.system == self.properties.address.system:
-                self._take_vehicle(message, now)
+                self._receive_vehicle(message, now)
         elif isinstance(message, AnySetpoint) and self._is_for_device(message.gimbal_device_id):
             with contextlib.suppress(ValueError):
                 setpoint = self._read(message)
@@ -211,10 +211,10 @@ class SimulatedManager(SimulatedMount):
                     self._obey(source, setpoint, now)
         return ()
 
-    def _take_vehicle(self, message: Attitude | GlobalPositionInt, now: float) -> None:
+    def _receive_vehicle(self, message: Attitude | GlobalPositionInt, now: float) -> None:
         if isinstance(message, Attitude):
             if is_plausible(message):
-                self.motion.take_heading(
+                self.motion.receive_heading(
                     message.roll, message.pitch, message.yaw, message.yawspeed, now, math.inf)
         else:
             self._position = place_of(message)

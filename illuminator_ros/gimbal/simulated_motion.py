@@ -191,9 +191,11 @@ class GimbalMotion:
         lost = max(0.0, now - max(self.vehicle.until, 0.0))
         return wrapped(self.vehicle.yaw + math.radians(self.mechanics.drift) * lost)
 
-    def take_heading(self, roll: float, pitch: float, yaw: float, rate: float, now: float,
-                     valid: float = HEADING_TIMEOUT) -> None:
-        """Take the attitude of the vehicle, rad, and its turning rate, rad/s."""
+    def receive_heading(
+        self, roll: float, pitch: float, yaw: float, rate: float, now: float,
+        valid: float = HEADING_TIMEOUT,
+    ) -> None:
+        """Receive the attitude of the vehicle, rad, and its turning rate, rad/s."""
         self.advance(now)
         self.vehicle = VehicleAttitude(roll, pitch, yaw, rate, now + valid)
 
@@ -212,7 +214,7 @@ class GimbalMotion:
 
     def obey(self, setpoint: Setpoint, now: float) -> None:
         """
-        Take a setpoint (GIMBAL_DEVICE_SET_ATTITUDE).
+        Receive a setpoint (GIMBAL_DEVICE_SET_ATTITUDE).
 
         A rate with an angle is the speed at which the axis approaches the angle; an axis with
         neither keeps its angle.

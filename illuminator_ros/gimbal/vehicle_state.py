@@ -74,8 +74,8 @@ class VehicleState:
         self.home_altitude: float | None = None
         self._autopilot_at = self._sent_at = -math.inf
 
-    def take(self, message: Attitude | GlobalPositionInt, now: float) -> None:
-        """Take a message of the autopilot; ignore values that cannot be right, or no position."""
+    def receive(self, message: Attitude | GlobalPositionInt, now: float) -> None:
+        """Receive a message of the autopilot; ignore impossible values, or no position."""
         if isinstance(message, Attitude):
             if is_plausible(message) and is_rate(message.yawspeed):
                 self.attitude.set((Quaternion.from_euler(
@@ -87,7 +87,7 @@ class VehicleState:
             self.home_altitude = (message.alt - message.relative_alt) / 1e3
 
     def set_velocity(self, velocity: Vector, now: float) -> None:
-        """Take a velocity from ROS, m/s, unless it is not finite."""
+        """Receive a velocity from ROS, m/s, unless it is not finite."""
         if all(map(math.isfinite, velocity)):
             self._velocity.set(velocity, now)
 

@@ -80,8 +80,8 @@ class ParameterServices:
         qos = QoSProfile(depth=QUEUE_DEPTH,
                          reliability=qos_profile_services_default.reliability)
 
-        def serve(type_: type[Any], name: str, take: Handler) -> None:
-            DeferredService(node, type_, f'~/{name}', take, qos, log)
+        def serve(type_: type[Any], name: str, handle: Handler) -> None:
+            DeferredService(node, type_, f'~/{name}', handle, qos, log)
 
         reads: tuple[tuple[type[Any], str, str, Callable[[str], object]], ...] = (
             (srv.DescribeParameters, 'describe_parameters', 'descriptors',

@@ -436,7 +436,7 @@ def test_an_accepted_change_passes_where_the_light_reports_no_status() -> None:
 def test_the_heading_of_another_component_leaves_north_unchecked() -> None:
     names = {'north-needs-heading', 'earth-frame', 'yaw-lock'}
     one = start('gimbal', only=tuple(names))
-    one.device.motion.take_heading(0.0, 0.0, 0.3, 0.0, one.link.now, math.inf)
+    one.device.motion.receive_heading(0.0, 0.0, 0.3, 0.0, one.link.now, math.inf)
     assert one.finish().names(SKIPPED) == names
 
 

@@ -929,7 +929,7 @@ def test_gm_22_the_manager_answers_for_a_device_without_mavlink() -> None:
     [_, device], [_, manager] = (
         rig.give(PILOT, request(cls)) for cls in (GimbalDeviceInformation,
                                                   GimbalManagerInformation))
-    rig.manager.take_attitude((flip(Quaternion(*HALF)), YawFrame.VEHICLE), rig.now)
+    rig.manager.receive_attitude((flip(Quaternion(*HALF)), YawFrame.VEHICLE), rig.now)
     rig.give(PILOT)
 
     assert (device.gimbal_device_id, manager.gimbal_device_id) == (1, 1)
@@ -946,7 +946,7 @@ def test_gm_22_a_limit_that_neutral_leaves_is_not_reported_any_more() -> None:
     flags = []
     for setpoint in (pitch_yaw(1.0, 0.0), pitch_yaw(flags=NEUTRAL)):
         rig.give(PILOT, setpoint)
-        rig.manager.take_attitude((Quaternion(), YawFrame.VEHICLE), rig.now)
+        rig.manager.receive_attitude((Quaternion(), YawFrame.VEHICLE), rig.now)
         rig.give(PILOT)
         flags.append(rig.messages(GimbalDeviceAttitudeStatus)[-1].failure_flags)
 

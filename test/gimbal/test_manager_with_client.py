@@ -187,7 +187,7 @@ def test_setpoint_that_is_reported_as_the_attitude_is_not_measured() -> None:
     is_measured = rig.both.client.is_measured
 
     assert not is_measured(rig.now)
-    rig.manager.take_attitude((Quaternion(), YawFrame.VEHICLE), rig.now)
+    rig.manager.receive_attitude((Quaternion(), YawFrame.VEHICLE), rig.now)
     assert is_measured(rig.now)
     assert not is_measured(rig.now + 1.0)
     assert Rig().both.client.is_measured(0.0)

@@ -19,7 +19,7 @@ DEVICE = Address(1, 154)
     GlobalPositionInt(0, 0, 0, 0, 0, 0, 0, 0, 0)], ids=str)
 def test_values_that_cannot_be_right_are_ignored(wrong: Attitude | GlobalPositionInt) -> None:
     vehicle = VehicleState()
-    vehicle.take(wrong, 1.0)
+    vehicle.receive(wrong, 1.0)
     assert vehicle.heading(1.0) is None
     assert vehicle.position.get(1.0) is None
     assert vehicle.for_device(DEVICE, 1.0) is None

@@ -91,7 +91,7 @@ class Winch:
         self.liveness.hear(now)
         self._step(now)
 
-    def take_status(self, status: WinchStatus, now: float) -> None:
+    def receive_status(self, status: WinchStatus, now: float) -> None:
         gap = now - self.liveness.heard_at
         self.liveness.hear(now)
         self._status = status
@@ -152,7 +152,7 @@ class WinchClient(Payload):
     def receive(self, source: Address, message: Message, now: float) -> None:
         if isinstance(message, WinchStatus):
             if winch := self._hear(source, now, proved=True):
-                winch.take_status(message, now)
+                winch.receive_status(message, now)
                 self.events.emit(WinchReport(source, message.line_length))
         elif (isinstance(message, Heartbeat) and message.type == mavlink.MAV_TYPE_WINCH
                 and (winch := self._hear(source, now, proved=False))):

@@ -118,7 +118,7 @@ class GraphDevice(Device):
         self._node = node
         self._may_request = may_request
         self._subscriptions = {topic: node.create_subscription(
-            one.type, f'{name}/{topic}', _taken_by_poll,
+            one.type, f'{name}/{topic}', _received_by_poll,
             STATE_QOS if one.is_state else SAMPLE_QOS) for topic, one in view.topics.items()}
         # Clients and publishers, untyped: each has a type of its own.
         self._endpoints: dict[str, Any] = {}
@@ -131,11 +131,11 @@ class GraphDevice(Device):
         # The text of the last message on each topic, by its name.
         self._published: dict[str, str] = {}
 
-    def take(self, now: float) -> None:
-        """Take the newest values."""
+    def receive(self, now: float) -> None:
+        """Receive the newest values."""
         self.now = now
         for topic, subscription in self._subscriptions.items():
-            for message in _taken(subscription):
+            for message in _received(subscription):
                 self.heard_at = now
                 self.learn(topic, sane(self.view.topics[topic].read(message)))
         if self.view.off is not None and self._may_request:
@@ -287,8 +287,8 @@ class Graph:
         self._only = only
         self.devices: list[GraphDevice] = []
         self._diagnostics = node.create_subscription(
-            DiagnosticArray, '/diagnostics', _taken_by_poll, DIAGNOSTICS_QOS)
-        self._log = node.create_subscription(Log, '/rosout', _taken_by_poll, DIAGNOSTICS_QOS)
+            DiagnosticArray, '/diagnostics', _received_by_poll, DIAGNOSTICS_QOS)
+        self._log = node.create_subscription(Log, '/rosout', _received_by_poll, DIAGNOSTICS_QOS)
         self._polls = 0
         self._off_at = -math.inf
 
@@ -330,18 +330,18 @@ class Graph:
         if not self._polls % QUERY_POLLS:
             self._query(now)
         for device in self.devices:
-            device.take(now)
+            device.receive(now)
             if not self._polls % TREND_POLLS:
                 device.trend.append(device.view.trend(device) if device.view.trend is not None
                                     and not device.is_stale else None)
         self._polls += 1
         by_name = {device.name: device for device in self.devices}
-        for array in _taken(self._diagnostics, MAX_DIAGNOSTICS):
+        for array in _received(self._diagnostics, MAX_DIAGNOSTICS):
             for status in array.status:
                 values = {sane(one.key): sane(one.value) for one in status.values[:MAX_VALUES]}
                 if known := by_name.get(values.get('node', '')):
                     known.diagnose(status, values)
-        for line in _taken(self._log, MAX_DIAGNOSTICS):
+        for line in _received(self._log, MAX_DIAGNOSTICS):
             # The name of a logger has dots instead of slashes.
             known = by_name.get(f'/{line.name.replace(".", "/")}')
             if known and line.level >= Log.INFO:
@@ -362,7 +362,7 @@ class Graph:
         self.devices.sort(key=lambda device: (self.views.index(device.view), device.name))
 
 
-def _taken(subscription: Subscription, limit: int = 1) -> Iterator[Any]:
+def _received(subscription: Subscription, limit: int = 1) -> Iterator[Any]:
     """Return messages that have come; skip large and broken ones."""
     # An executor would deserialize each one, and would wake the view for each.
     for _ in range(limit):
@@ -381,5 +381,5 @@ def _deliver_answers(client: Any) -> None:
             client.get_pending_request(taken[0].request_id.sequence_number).set_result(taken[1])
 
 
-def _taken_by_poll(message: object) -> None:
+def _received_by_poll(message: object) -> None:
     """Do nothing: no executor calls this."""

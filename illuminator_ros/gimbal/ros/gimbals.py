@@ -75,13 +75,13 @@ class Gimbals(ServedPayload):
                     change=self._change_parameters)),
             lambda node, log: GimbalNode(node, host, log, client, why_none, transforms),
             GimbalNode.bind)
-        client.events.subscribe(self._take)
+        client.events.subscribe(self._handle)
 
     def _change_parameters(self, values: Values, now: float) -> None:
         """Take parameters that were set."""
         self._client.change_settings(settings(values), now)
 
-    def _take(self, event: GimbalEvent) -> None:
+    def _handle(self, event: GimbalEvent) -> None:
         if not self._nodes.handle(event) and isinstance(event, DeviceConnected):
             self._serve(event)
 

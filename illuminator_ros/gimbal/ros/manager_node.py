@@ -149,33 +149,33 @@ class ManagerNode(ServedPayload):
             commands=tuple(self._topics()))
         host.diagnostics.add(DiagnosticsSource(
             host.node.get_fully_qualified_name(), self._take_snapshot))
-        manager.events.subscribe(self._take)
+        manager.events.subscribe(self._handle)
 
     def _topics(self) -> list[AnyCommandTopic]:
         topics: list[AnyCommandTopic] = [
-            CommandTopic(IMU, self._take_imu, _read_imu),
-            CommandTopic(ODOMETRY, self._take_odometry, _read_odometry)]
+            CommandTopic(IMU, self._receive_imu, _read_imu),
+            CommandTopic(ODOMETRY, self._receive_odometry, _read_odometry)]
         if not self._manager.tracker.has_mavlink:
             topics.append(CommandTopic(
-                DEVICE_ATTITUDE, self._manager.take_attitude, self._frames.read_attitude))
+                DEVICE_ATTITUDE, self._manager.receive_attitude, self._frames.read_attitude))
         return topics
 
     # The vehicle and the device
 
-    def _take_imu(self, value: tuple[Quaternion, float], now: float) -> None:
+    def _receive_imu(self, value: tuple[Quaternion, float], now: float) -> None:
         self._manager.vehicle.attitude.set(value, now)
         self._manager.vehicle_changed(now)
 
-    def _take_odometry(
+    def _receive_odometry(
         self, value: tuple[tuple[Quaternion, float], Vector], now: float,
     ) -> None:
         attitude, velocity = value
         self._manager.vehicle.set_velocity(velocity, now)
-        self._take_imu(attitude, now)
+        self._receive_imu(attitude, now)
 
     # Events
 
-    def _take(self, event: ManagerEvent) -> None:
+    def _handle(self, event: ManagerEvent) -> None:
         log = self._log
         match event:
             case SetpointSent(setpoint):

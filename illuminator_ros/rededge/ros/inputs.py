@@ -109,12 +109,12 @@ def subscriptions(node: Node, link: Link, feeder: Feeder) -> Iterable[AnyCommand
     reader = StampReader(node, lambda: link.call(lambda now: feeder.clock_jumped()))
 
     def topic(
-        name: Input, values: Callable[[Any], tuple[object, ...]], take: Callable[..., None],
+        name: Input, values: Callable[[Any], tuple[object, ...]], receive: Callable[..., None],
     ) -> AnyCommandTopic:
         def read(message: Any) -> tuple[object, ...]:
             return *values(message), reader.read(message.header)
 
-        return CommandTopic(TOPICS[name], lambda taken, now: take(*taken, now), read)
+        return CommandTopic(TOPICS[name], lambda received, now: receive(*received, now), read)
 
     return (
         topic(Input.FIX, lambda one: (position(one),), feeder.receive_fix),
