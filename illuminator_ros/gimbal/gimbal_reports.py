@@ -167,7 +167,7 @@ class RemoteDevice:
     :param interval: between its attitudes; 0 for its own.
     :ivar without_id: of attitudes that may be those of another gimbal.
     :ivar problem: why the last status has no attitude, '' if it has one.
-    :ivar request: of its attitudes.
+    :ivar request: of its attitudes; likewise ``identity_query``.
     """
 
     def __init__(self, address: Address, commands: CommandSender, interval: float) -> None:
@@ -180,20 +180,18 @@ class RemoteDevice:
         self.identity: events.DeviceIdentity | None = None
         self.ranges: Ranges | None = None
         self._status_time = 0
-        self._address = address
-        self._commands = commands
         self.request = AttitudeRequest(address, commands, interval)
-        self._identity_query = Retries(GIMBAL_MESSAGE)
+        self.identity_query = Retries(GIMBAL_MESSAGE)
 
     def connected(self, now: float) -> None:
         """Request everything from now on: the device may have restarted."""
-        self._identity_query = Retries(GIMBAL_MESSAGE)
+        self.identity_query = Retries(GIMBAL_MESSAGE)
         self.request.connected(now)
 
     def receive_information(self, message: gimbal.GimbalDeviceInformation) -> None:
         """Receive its identity and its ranges."""
         self.identity, self.ranges = events.DeviceIdentity.of(message), known_ranges(message)
-        self._identity_query.stop()
+        self.identity_query.stop()
 
     def receive_status(self, status: GimbalDeviceAttitudeStatus, now: float) -> bool:
         """Take its attitude and its flags; return whether the status counts: late ones do not."""
@@ -212,17 +210,6 @@ class RemoteDevice:
     def seen_from(self, frame: YawFrame) -> Quaternion | None:
         """Return its rotation relative to a frame, None if it is not known."""
         return None if self.attitude is None else self.attitude.seen_from(frame)
-
-    def request_identity(self, now: float) -> None:
-        """Request GIMBAL_DEVICE_INFORMATION if that is due."""
-        if self._identity_query.begin_try(now):
-            self._commands.start(
-                request_message(self._address, gimbal.GimbalDeviceInformation.id), now)
-
-    @property
-    def identity_due(self) -> float:
-        """Return when :meth:`request_identity` is due, s."""
-        return self._identity_query.due
 
 
 class GimbalReports:
@@ -449,10 +436,12 @@ class GimbalReports:
     def poll(self, now: float) -> None:
         """Request what a connected gimbal does not send by itself."""
         if self.is_connected:
-            if self.manager.status_query.begin_try(now):
-                self._commands.start(
-                    request_message(self.manager.address, gimbal.GimbalManagerStatus.id), now)
-            self.device.request_identity(now)
+            for query, address, message in (
+                    (self.manager.status_query, self.manager.address, gimbal.GimbalManagerStatus),
+                    (self.device.identity_query, self._key.address,
+                     gimbal.GimbalDeviceInformation)):
+                if query.begin_try(now):
+                    self._commands.start(request_message(address, message.id), now)
         if self._can_request_attitudes:
             self.device.request.poll(now)
 
@@ -464,5 +453,5 @@ class GimbalReports:
             manager.liveness.silent_at, manager.status_at + STATUS_LIMIT)
         if self.is_connected:
             due = min(due, manager.liveness.silent_at, manager.status_query.due,
-                      self.device.liveness.silent_at, self.device.identity_due)
+                      self.device.liveness.silent_at, self.device.identity_query.due)
         return min(due, self.device.request.due) if self._can_request_attitudes else due
