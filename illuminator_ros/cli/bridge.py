@@ -17,6 +17,7 @@ from typing import NamedTuple, TYPE_CHECKING
 
 from .entry_point import (
     CANNOT_CREATE,
+    complainer,
     own_arguments,
     print_output,
     Refusal,
@@ -55,11 +56,7 @@ class Executable(NamedTuple):
 
     def show(self, text: str) -> int:
         """Print a text, and return the exit status."""
-        return 0 if print_output(self.complain, text, end='') else 1
-
-    def complain(self, reason: str) -> None:
-        """Print why something failed."""
-        print(f'{self.name}: {reason}', file=sys.stderr)
+        return 0 if print_output(complainer(self.name), text, end='') else 1
 
 
 def usage(executable: Executable) -> str:

@@ -12,12 +12,11 @@ import os
 from pathlib import Path
 import platform
 import signal
-import sys
 import time
 from typing import Any
 
 from .arguments import option, Parser
-from .entry_point import escape_output, explained, OLDEST, package, print_output
+from .entry_point import complainer, escape_output, explained, OLDEST, package, print_output
 
 # A check: what was found, for people, with the next step where it has failed; whether it passed.
 Finding = tuple[bool, str]
@@ -63,8 +62,8 @@ def _run(args: list[str] | None) -> int:
 
     def show(findings: Iterable[Finding]) -> None:
         for is_fine, text in findings:
-            written = print_output(lambda reason: print(f'doctor: {reason}', file=sys.stderr),
-                                   f'{"pass" if is_fine else "FAIL"}  {text}')
+            written = print_output(
+                complainer('doctor'), f'{"pass" if is_fine else "FAIL"}  {text}')
             passed.append(written and is_fine)
 
     show(machine(time.time(), os.environ))

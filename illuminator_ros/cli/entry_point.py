@@ -132,6 +132,11 @@ def package(module: str) -> tuple[str, str]:
         f'{name} {found} is too old; {oldest} or newer is needed: {remedy}')
 
 
+def complainer(name: str) -> Callable[[str], None]:
+    """Return what prints why a program failed."""
+    return lambda reason: print(f'{name}: {reason}', file=sys.stderr)
+
+
 def print_output(complain: Callable[[str], object], *texts: str, end: str = '\n') -> bool:
     """
     Print texts, so that a reader at the other end of a pipe sees them immediately.

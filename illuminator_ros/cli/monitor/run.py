@@ -78,9 +78,7 @@ def parser() -> argparse.ArgumentParser:
     return made
 
 
-def complain(reason: str) -> None:
-    """Print why something failed."""
-    print(f'monitor: {reason}', file=sys.stderr)
+complain = entry_point.complainer('monitor')
 
 
 def run(

@@ -92,9 +92,7 @@ def parser() -> argparse.ArgumentParser:
     return made
 
 
-def complain(reason: str) -> None:
-    """Print why something failed."""
-    print(f'set: {reason}', file=sys.stderr)
+complain = entry_point.complainer('set')
 
 
 def run(args: list[str] | None, termination: Termination) -> int:
