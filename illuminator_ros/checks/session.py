@@ -19,6 +19,7 @@ from .coroutines import CoroutineRunner
 from .outcomes import DeviceLost, Failed, Skipped
 from .record import History, Record
 from ..mavlink import messages
+from ..mavlink.command_sender import Command
 from ..mavlink.component import Endpoint, HeartbeatTimer
 from ..mavlink.dialect import line_of, mavlink
 from ..mavlink.frame import Frame
@@ -401,11 +402,8 @@ class Session(Endpoint):
         self, one: Transaction, target: Address, confirmation: int = 0, *, as_int: bool = False,
         source: Address | None = None,
     ) -> None:
-        p1, p2, p3, p4, p5, p6, p7 = (*map(float, one.params), *[0.0] * (7 - len(one.params)))
-        message = messages.CommandInt(
-            *target, 0, one.command, 0, 0, p1, p2, p3, p4, int(p5), int(p6), p7,
-        ) if as_int else messages.CommandLong(
-            *target, one.command, min(confirmation, 255), p1, p2, p3, p4, p5, p6, p7)
+        message = Command(target, one.command, (*map(float, one.params),)).message(
+            confirmation, as_int)
         one.sent.append(self.now)
         one.lines.append(self.send(
             message, source, f'{message.get_type()} to {target}: {one.text}'

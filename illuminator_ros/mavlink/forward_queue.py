@@ -70,7 +70,7 @@ class ForwardQueue:
         self._size += len(frame.data)
         for priority in reversed(Priority):
             while self._size > self._capacity and self._held[priority]:
-                self._drop(priority)
+                self._dropped[self._remove(priority).message_id] += 1
 
     def pop(self, now: float) -> bytes:
         """Return the next frame that is still worth sending, b'' if there is none."""
@@ -79,19 +79,14 @@ class ForwardQueue:
             if not urgent:
                 self._turns.rotate()
             priority = next(one for one in (Priority.URGENT, *self._turns) if self._held[one])
-            if now - self._oldest(priority).since < MAX_AGES[priority]:
-                return self._remove(priority).data
-            self._drop(priority)
+            held = self._remove(priority)
+            if now - held.since < MAX_AGES[priority]:
+                return held.data
+            self._dropped[held.message_id] += 1
         return b''
-
-    def _oldest(self, priority: Priority) -> _Held:
-        return next(iter(self._held[priority].values()))
 
     def _remove(self, priority: Priority) -> _Held:
         held = self._held[priority]
         one = held.pop(next(iter(held)))
         self._size -= len(one.data)
         return one
-
-    def _drop(self, priority: Priority) -> None:
-        self._dropped[self._remove(priority).message_id] += 1

@@ -5,7 +5,6 @@
 
 from __future__ import annotations
 
-from abc import ABC, abstractmethod
 from collections import Counter
 from collections.abc import Callable, Sequence
 import contextlib
@@ -15,6 +14,7 @@ import logging
 import math
 import selectors
 import threading
+from typing import Protocol
 
 from .connector import Connector
 from .frame import Frame
@@ -40,19 +40,16 @@ ANNOUNCE_INTERVAL = 0.25
 _frame_log = logging.getLogger('illuminator_ros')
 
 
-class LineUser(ABC):
+class LineUser(Protocol):
     """The user of a line, which the line calls in the thread that waits with the selector."""
 
     @property
-    @abstractmethod
     def is_behind(self) -> bool:
         """Whether it has not taken all received frames yet: no more must be read."""
 
-    @abstractmethod
     def opened(self, now: float) -> None:
         """Note that a line can carry messages, or that a new peer may receive them."""
 
-    @abstractmethod
     def lost(self, heard: Sequence[Address], reason: str, now: float) -> None:
         """
         Note that a line is closed; it opens again by itself.
@@ -60,15 +57,12 @@ class LineUser(ABC):
         :param heard: the components that were heard over it.
         """
 
-    @abstractmethod
     def silent(self, line: Line, now: float) -> None:
         """Note that no peer is heard over an open line; repeated."""
 
-    @abstractmethod
     def behind(self, line: Line, peer: Peer, now: float) -> None:
         """Note that the signing clock of a sender that is not a peer is behind."""
 
-    @abstractmethod
     def receive(
         self, line: Line, peer: Peer, frames: Sequence[Frame], now: float,
     ) -> None:

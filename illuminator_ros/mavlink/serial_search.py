@@ -13,12 +13,13 @@ import selectors
 import threading
 import time
 
+from .command_sender import request_message
 from .component_kinds import listed
 from .device_kind import DeviceKind
 from .dialect import mavlink
 from .frame_writer import FrameWriter
 from .listener import Listener
-from .messages import Address, CommandLong, heartbeat, INFORMATION_ID
+from .messages import Address, heartbeat, INFORMATION_ID
 from .transport import Channel, open_channel
 from .transport.ports import serial_ports
 from .url import AutoUrl, SerialUrl, Url
@@ -143,9 +144,9 @@ class SerialSearch:
         for one in self._listeners.values() if self._url.serial else ():
             frames = [self._writer.frame(
                 self._address, message, now, time.time()) for message in (
-                    heartbeat(mavlink.MAV_TYPE_ONBOARD_CONTROLLER), *(CommandLong(
-                        *address, mavlink.MAV_CMD_REQUEST_MESSAGE, 0, INFORMATION_ID,
-                        0, 0, 0, 0, 0, 0) for address in one.components))]
+                    heartbeat(mavlink.MAV_TYPE_ONBOARD_CONTROLLER), *(
+                        request_message(address, INFORMATION_ID).message(0, as_int=False)
+                        for address in one.components))]
             if one.channel and one.components:
                 one.channel.send(frames, one.channel.peers(now))
 
