@@ -217,15 +217,12 @@ class GimbalClient(Payload):
 
     def _request_information(self, now: float) -> None:
         if now >= self._query_due():
-            self._request_next(now)
+            address, component = min(self._components.items(), key=lambda item: item[1].query.due)
+            component.query.note_try(now)
+            self._next_query = now + REQUEST_SPACING
+            if now < component.heard_at + FORGET_AFTER:
+                self._commands.start(request_message(address, GimbalManagerInformation.id), now)
         self._set_due()
-
-    def _request_next(self, now: float) -> None:
-        address, component = min(self._components.items(), key=lambda item: item[1].query.due)
-        component.query.note_try(now)
-        self._next_query = now + REQUEST_SPACING
-        if now < component.heard_at + FORGET_AFTER:
-            self._commands.start(request_message(address, GimbalManagerInformation.id), now)
 
     def _set_due(self) -> None:
         self._commands.schedule.at(self._request_information, self._query_due())

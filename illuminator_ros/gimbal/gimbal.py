@@ -249,7 +249,7 @@ class Gimbal:
         """
         self._begin(now)
         reports, due = self.reports, -math.inf
-        if (self.setpoints.may_turn and reports.may_have_control
+        if (self.setpoints.may_turn and (reports.control is None or reports.in_control)
                 and reports.manager.liveness.is_heard(now)):
             # No command stops a gimbal everywhere: PX4 reads unset angles as 0.
             self.setpoints.stop(now, can_send=True)

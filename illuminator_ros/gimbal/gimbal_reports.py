@@ -388,11 +388,6 @@ class GimbalReports:
         """Whether this component has primary control, and the manager is heard."""
         return self.control is not None and self.control.primary == self._us
 
-    @property
-    def may_have_control(self) -> bool:
-        """Whether this component has primary control, unless it is known that it has not."""
-        return self.control is None or self.in_control
-
     def lack_of_control(self, now: float) -> str:
         """Return why this component does not control the gimbal, for people; '' if it does."""
         if reason := self.absence(now):

@@ -435,7 +435,9 @@ class CommandSender:
         elif state is CommandState.BACKOFF:
             pending.rejected += 1
             self._wait_until(pending, now + REJECTED.wait(pending.rejected))
-            if pending.due >= min(pending.first_sent + self._patience, pending.deadline):
+            # s from the first try of a command to its end without an acknowledgement.
+            patience = sum(map(self._wait, range(self.retries + 1)))
+            if pending.due >= min(pending.first_sent + patience, pending.deadline):
                 self._end(pending, CommandStatus.ANSWERED, now)
                 return
         elif state is CommandState.SENT and not pending.as_int:
@@ -446,11 +448,6 @@ class CommandSender:
             self._end(pending, CommandStatus.ANSWERED, now)
             return
         pending.state = state
-
-    @property
-    def _patience(self) -> float:
-        """Return s from the first try of a command to its end without an acknowledgement."""
-        return sum(map(self._wait, range(self.retries + 1)))
 
     def _wait(self, resends: int) -> float:
         """Return the wait for an acknowledgement after so many resends, s."""

@@ -24,8 +24,3 @@ class DeviceKind(NamedTuple):
     messages: tuple[int, ...] = ()
     component: int | None = None
     option: str = ''
-
-    @property
-    def url_option(self) -> str:
-        """Return its name in a URL."""
-        return self.option or self.name.replace(' ', '_')

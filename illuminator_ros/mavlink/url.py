@@ -284,7 +284,8 @@ class _Parser:
 
     def auto(self, baud: str | None, query: str | None) -> Url:
         url = AutoUrl(RATES if baud is None else (self.baud(baud),), known=self.known)
-        kinds = {**{one.url_option: one.name for one in self.known}, AUTOPILOT: AUTOPILOT}
+        kinds = {**{one.option or one.name.replace(' ', '_'): one.name for one in self.known},
+                 AUTOPILOT: AUTOPILOT}
         for option in query.split('&') if query else ():
             name, _, value = option.partition('=')
             if not value or name not in ('ports', 'serial', 'kind'):

@@ -44,10 +44,6 @@ class _Section(NamedTuple):
     def pattern(self) -> str:
         return '/'.join(self.parts)
 
-    @property
-    def has_wildcard(self) -> bool:
-        return not _WILDCARDS.keys().isdisjoint(self.parts)
-
     def matches(self, node: str) -> bool:
         return re.fullmatch(''.join(
             _WILDCARDS.get(part, '/' + re.escape(part)) for part in self.parts), node) is not None
@@ -103,7 +99,7 @@ def ignored_parameters(
         return frozenset().union(*found) if found else None
 
     def is_for_others(section: _Section, declared: Set[str]) -> bool:
-        return (section.is_file and section.has_wildcard
+        return (section.is_file and not _WILDCARDS.keys().isdisjoint(section.parts)
                 and declared.isdisjoint(section.names - _OF_RCLPY))
 
     sections = [(section, declared_for(section)) for section in given_sections(arguments)]

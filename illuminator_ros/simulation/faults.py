@@ -78,11 +78,6 @@ class Fault:
         """Return how it is typed."""
         return f'{self.name}={self.value.metavar}' if self.value else self.name
 
-    @property
-    def default_text(self) -> str:
-        """Return the default value for people, '' if the fault has no value."""
-        return (self.text(self.default) or 'for ever') if self.value else ''
-
     def text(self, value: object) -> str:
         """Return a value as it is typed, '' if there is none to type."""
         return '' if self.value is None or value == math.inf else self.value.text(value)
@@ -268,7 +263,8 @@ class FaultTable(dict[str, Fault]):
         lines = []
         for name, fault in self.items():
             shown = f'{name}[={fault.value.metavar}]' if fault.value else name
-            default = f' (default: {fault.default_text})' if fault.value else ''
+            default = (f' (default: {fault.text(fault.default) or "for ever"})' if fault.value
+                       else '')
             lines.append(f'  {shown:20} {fault.description}{default}')
         return '\n'.join(lines)
 

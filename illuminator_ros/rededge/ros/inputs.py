@@ -13,7 +13,7 @@ from typing import Any
 
 from geometry_msgs.msg import QuaternionStamped, TwistStamped, TwistWithCovarianceStamped
 from nav_msgs.msg import Odometry
-from rclpy.clock import JumpThreshold, TimeJump
+from rclpy.clock import JumpThreshold
 from rclpy.duration import Duration
 from rclpy.node import Node
 from sensor_msgs.msg import Imu, NavSatFix, TimeReference
@@ -70,10 +70,7 @@ class StampReader:
         self._handle = self._clock.create_jump_callback(
             JumpThreshold(min_forward=Duration(seconds=SIMULATED_JUMP),
                           min_backward=Duration(nanoseconds=-1), on_clock_change=True),
-            post_callback=self._handle_jump)
-
-    def _handle_jump(self, jump: TimeJump) -> None:
-        self._jumped()
+            post_callback=lambda jump: jumped())
 
     def read(self, header: Header) -> Stamp:
         """Return the stamp of a message that was received just now."""
