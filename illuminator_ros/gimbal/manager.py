@@ -28,7 +28,7 @@ from .vehicle_state import VehicleState
 from ..geometry.mount_attitude import AXES, to_mavlink, YawFrame
 from ..geometry.rotation import Quaternion
 from ..mavlink import messages as mav
-from ..mavlink.command_sender import Command, CommandSender
+from ..mavlink.command_sender import Command, CommandSender, request_message
 from ..mavlink.component import Payload
 from ..mavlink.dialect import mavlink, replaced
 from ..mavlink.messages import Address, AnyCommand, params_of
@@ -212,9 +212,8 @@ class GimbalManager(Payload):
             self.setpoints.deactivate(now, forget=after is not ManagerState.LISTENING)
         if after is ManagerState.LISTENING:
             # Another manager may send no status, but answers a request.
-            self._commands.send(Command(
-                Address(0, 0), mavlink.MAV_CMD_REQUEST_MESSAGE,
-                (gimbal.GimbalManagerInformation.id,)).message(0, as_int=False))
+            self._commands.send(request_message(
+                Address(0, 0), gimbal.GimbalManagerInformation.id).message(0, as_int=False))
             self._device.found(now)
         elif after is ManagerState.NO_DEVICE:
             self._device.lost()
