@@ -36,7 +36,7 @@ demo:
 
 # The types of rclpy differ: mypy checks with those of Jazzy.
 test: $(if $(filter-out jazzy,$(ROS)),environment,check)
-	@$(PYTHON_IN_VENV) -m pytest -n 6 --dist loadfile --no-loadscope-reorder $(TESTS)
+	@$(PYTHON_IN_VENV) -m pytest -n 4 --dist loadfile --no-loadscope-reorder $(TESTS)
 
 unit: environment
 	@$(PYTHON_IN_VENV) -m pytest -p support.no_ros test/mavlink test/transport test/geometry test/payload \
