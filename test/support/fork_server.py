@@ -37,6 +37,7 @@ _LOCK = threading.Lock()
 # Open them here and not on demand: tests count the open descriptors.
 _REQUESTS, _SERVER_END = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
 MAX_REQUEST = 1 << 17
+TEST = Path(__file__).parents[1]
 MODULES = (
     'illuminator_ros.cli.bridge', 'illuminator_ros.cli.conformance.run',
     'illuminator_ros.cli.discover.run',
@@ -112,14 +113,14 @@ class ForkedProcess:
 
 
 @functools.cache
-def _start(path: str) -> None:
+def _start() -> None:
     """Start the process that forks."""
     # A fork whose parent has ended becomes a child of this process.
     PRCTL(PR_SET_CHILD_SUBREAPER, 1)
     number = _SERVER_END.fileno()
     subprocess.Popen(
         [sys.executable, '-c', f'from {__name__} import serve; serve({number})'],
-        env={**os.environ, 'PYTHONPATH': path}, cwd=Path(__file__).parents[2],
+        env={**os.environ, 'PYTHONPATH': f'{TEST.parent}:{TEST}'}, cwd=TEST.parent,
         stdin=subprocess.DEVNULL, pass_fds=[number], start_new_session=True,
         preexec_fn=handle_signals_by_default)
     _SERVER_END.close()
@@ -133,12 +134,12 @@ def fork(
     Run a module.
 
     :param command: its name and arguments.
-    :param environment: its environment; Python has read the variables PYTHON... before.
+    :param environment: its environment; of PYTHON... only PYTHONPATH has an effect.
     :param streams: descriptors of standard input, output and error.
     """
     request = json.dumps([command, {**environment}, str(directory)])
     with _LOCK:
-        _start(environment['PYTHONPATH'])
+        _start()
         socket.send_fds(_REQUESTS, [request.encode()], streams)
         return ForkedProcess(int(_REQUESTS.recv(MAX_REQUEST)))
 
@@ -182,5 +183,6 @@ def serve(descriptor: int) -> None:
     LIBC.on_exit(LIBC._exit, None)
     os.environ.clear()
     os.environ.update(variables)
+    sys.path[:0] = variables['PYTHONPATH'].split(os.pathsep)
     os.chdir(directory)
     runpy.run_module(module, run_name='__main__', alter_sys=True)

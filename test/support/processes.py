@@ -159,7 +159,9 @@ PYTHON_VARIABLES = _python_variables(os.environ)
 
 
 def _can_be_forked(env: Mapping[str, str] | None) -> bool:
-    return _python_variables({**os.environ, **(env or {})}) == PYTHON_VARIABLES
+    # A fork takes that of this process, but runs no sitecustomize, for which a test gives another.
+    path = {'PYTHONPATH': ''}
+    return _python_variables({**os.environ, **path, **(env or {})}) == PYTHON_VARIABLES | path
 
 
 def is_running(pid: str) -> bool:
