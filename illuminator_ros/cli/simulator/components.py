@@ -18,8 +18,6 @@ from ...simulation.settings import Setting, SettingValues
 from ...simulation.simulated import SimulatedDevice, SimulatedType
 
 MAX_COMPONENTS = 200
-# MAX_COMPONENTS with all their settings need a tenth of it.
-MAX_FILE_CHARACTERS = 1 << 20
 
 Type = SimulatedType[SimulatedDevice]
 Types = Sequence[Type]
@@ -76,19 +74,13 @@ def load(path: str, types: Types) -> Scenario:
         ) from error
     try:
         with open(path, encoding='utf-8') as file:
-            text = file.read(MAX_FILE_CHARACTERS + 1)
-        if len(text) > MAX_FILE_CHARACTERS:
-            raise SettingError(f'{path}: it has more than {MAX_FILE_CHARACTERS} characters')
-        return scenario(yaml.safe_load(text), path, types)
+            return scenario(yaml.safe_load(file), path, types)
     except SettingError:
         raise
-    except RecursionError:
-        # A YAML list can contain itself.
-        raise SettingError(f'{path}: it is nested too deeply') from None
     except OSError as error:
         raise SettingError(f'{path}: {error.strerror}') from error
-    except (yaml.YAMLError, ValueError) as error:
-        # For example, PyYAML raises a plain ValueError for 2026-02-30.
+    except (yaml.YAMLError, ValueError, RecursionError) as error:
+        # For example, PyYAML raises a plain ValueError for 2026-02-30; a list can contain itself.
         raise SettingError(f'{path}: not YAML: {" ".join(str(error).split())}') from error
 
 
