@@ -159,7 +159,7 @@ def test_protocol_modules_do_no_io_and_have_no_clock_and_no_thread() -> None:
     sans_io = [module for module in MODULES if folder(module) and (
         # The folder itself imports a public name only when that is used.
         folder(module) == ('mavlink',) and module != f'{PACKAGE}.mavlink'
-        and not set(module.split('.')[2:3]) & MAVLINK_IO
+        and not set(module.split('.')[2:]) & MAVLINK_IO
         or folder(module)[0] in {'payload', 'simulation', 'checks'} | PAYLOADS
         and folder(module)[1:] != ('ros',))]
     above = tuple(f'{PACKAGE}.mavlink.{name}' for name in (

@@ -22,16 +22,17 @@ from illuminator_ros.illuminator.simulated_properties import (
     IlluminatorBehaviour,
     IlluminatorProperties,
 )
-from illuminator_ros.mavlink import duplicate_filter, frame_writer
+from illuminator_ros.mavlink import frame_writer
 from illuminator_ros.mavlink.command_receiver import MAX_RESULTS
 from illuminator_ros.mavlink.command_sender import CommandSender, MAX_TARGETS
 from illuminator_ros.mavlink.component import Component, Endpoint
-from illuminator_ros.mavlink.forward_queue import ForwardQueue, MAX_QUEUED
-from illuminator_ros.mavlink.forwarded_commands import MAX_COMMANDS
-from illuminator_ros.mavlink.listener import Listener
+from illuminator_ros.mavlink.forwarding import duplicate_filter
+from illuminator_ros.mavlink.forwarding.forward_queue import ForwardQueue, MAX_QUEUED
+from illuminator_ros.mavlink.forwarding.forwarded_commands import MAX_COMMANDS
+from illuminator_ros.mavlink.forwarding.routing_table import MAX_ROUTES
 from illuminator_ros.mavlink.messages import Address, CommandLong, heartbeat, Message
 from illuminator_ros.mavlink.receiver import MAX_DECODERS
-from illuminator_ros.mavlink.routing_table import MAX_ROUTES
+from illuminator_ros.mavlink.search.listener import Listener
 from illuminator_ros.mavlink.signing import MAX_STREAMS, ticks
 from illuminator_ros.mavlink.statistics import MAX_SOURCES
 from illuminator_ros.mavlink.transport.udp import MAX_PEERS

@@ -9,8 +9,8 @@ from collections.abc import Collection
 import math
 
 from .outcomes import Skipped
-from ..mavlink.component_kinds import listed
 from ..mavlink.messages import Address
+from ..mavlink.search.component_kinds import listed
 
 
 def names(addresses: Collection[Address]) -> str:

@@ -101,7 +101,7 @@ def on_ports(reports: Sequence[Mapping[str, Any]]) -> Iterator[Finding]:
     """
     from .discover.report import lines
     from .discover.run import CONSOLE
-    from ..mavlink.listener import NOT_SENT_HERE
+    from ..mavlink.search.listener import NOT_SENT_HERE
 
     addresses: dict[str, list[str]] = {}
     for one in reports:

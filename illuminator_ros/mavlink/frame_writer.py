@@ -9,8 +9,8 @@ from collections import deque
 import random
 
 from .dialect import base_size, encode
-from .duplicate_filter import DuplicateFilter, OWN
 from .errors import InvalidValue
+from .forwarding.duplicate_filter import DuplicateFilter, OWN
 from .frame import encode_frame, Frame
 from .messages import Address, Message
 from .signing import Signing, stamp_of

@@ -24,7 +24,7 @@ from .messages import Address
 from .receiver import Receiver
 from .retries import RESOURCE
 from .schedule import Schedule
-from .silent_port import SilentPort
+from .search.silent_port import SilentPort
 from .transport import Channel, Peer
 from .url import Url
 

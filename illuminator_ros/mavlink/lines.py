@@ -14,9 +14,10 @@ import selectors
 
 from .component import Endpoint
 from .dialect import decode, line_of
-from .duplicate_filter import DuplicateFilter
 from .errors import InvalidValue
-from .forwarded_commands import ForwardedCommands
+from .forwarding.duplicate_filter import DuplicateFilter
+from .forwarding.forwarded_commands import ForwardedCommands
+from .forwarding.routing_table import grouped, Router
 from .frame import Frame, MAX_ID_V1
 from .frame_writer import FrameWriter
 from .line import ANNOUNCE_INTERVAL, Line, LineUser, SILENCE
@@ -24,9 +25,8 @@ from .link_state import LinkSnapshot
 from .link_thread import FaultLog
 from .messages import Address
 from .receiver import Receiver
-from .routing_table import grouped, Router
+from .search.serial_search import SerialSearch
 from .sender import Sender
-from .serial_search import SerialSearch
 from .signing import Signing
 from .statistics import RECENT, SequenceCounter
 from .transport import Peer

@@ -10,11 +10,11 @@ import math
 from typing import NamedTuple
 
 from .dialect import CRC_EXTRA
-from .duplicate_filter import DuplicateFilter, Path
+from .forwarding.duplicate_filter import DuplicateFilter, Path
+from .forwarding.routing_table import RoutingTable
 from .frame import Decoder, DecoderCounters, ForeignFrames, Frame
 from .frame_writer import FrameWriter
 from .messages import Address
-from .routing_table import RoutingTable
 from .signing import Signing, Verdict
 from .statistics import SequenceCounter, Traffic
 from .transport import Peer

@@ -12,11 +12,11 @@ import struct
 
 from .conflating_queue import ConflatingQueue, StreamGroup
 from .dialect import line_of
+from .forwarding.routing_table import grouped, Peers, Router
 from .frame_writer import FrameWriter
 from .line import Line
 from .link_thread import FaultLog
 from .messages import Address, Heartbeat, Message, target_of
-from .routing_table import grouped, Peers, Router
 
 # s for which the line may still be busy when the next group of a stream is written, so that it has
 # no gaps. The most urgent group may wait behind one more in the line.

@@ -14,10 +14,10 @@ import ipaddress
 import re
 from typing import Literal, NamedTuple, NoReturn
 
-from .component_kinds import AUTOPILOT
 from .device_kind import DeviceKind
 from .errors import UrlError
-from .rate_scan import RATES
+from .search.component_kinds import AUTOPILOT
+from .search.rate_scan import RATES
 
 MAVROS_UDP_BIND_PORT = 14555
 MAVROS_UDP_REMOTE_PORT = 14550

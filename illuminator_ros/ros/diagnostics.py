@@ -21,12 +21,12 @@ from diagnostic_msgs.msg import DiagnosticStatus, KeyValue
 from ..mavlink import link_state
 from ..mavlink.command_sender import format_seconds
 from ..mavlink.component import Component
-from ..mavlink.component_kinds import described
 from ..mavlink.device_kind import DeviceKind
-from ..mavlink.duplicate_filter import OWN
+from ..mavlink.forwarding.duplicate_filter import OWN
 from ..mavlink.link import Link
 from ..mavlink.message_traits import name_of
 from ..mavlink.messages import Address, Heartbeat
+from ..mavlink.search.component_kinds import described
 from ..mavlink.transport.udp import MAX_PEERS
 
 OK, WARN, ERROR = DiagnosticStatus.OK, DiagnosticStatus.WARN, DiagnosticStatus.ERROR

@@ -22,9 +22,9 @@ from illuminator_ros.cli.discover.run import CONSOLE, parse, ports_of, UDP_PORTS
 from illuminator_ros.gimbal.messages import GimbalManagerStatus
 from illuminator_ros.illuminator.messages import IlluminatorStatus
 from illuminator_ros.mavlink.dialect import decode, mavlink
-from illuminator_ros.mavlink.listener import Listener
 from illuminator_ros.mavlink.messages import Address, Heartbeat, heartbeat, Message
-from illuminator_ros.mavlink.rate_scan import RATES
+from illuminator_ros.mavlink.search.listener import Listener
+from illuminator_ros.mavlink.search.rate_scan import RATES
 from illuminator_ros.mavlink.transport import Channel, open_channel, Peer
 from illuminator_ros.mavlink.transport.ports import serial_ports
 from illuminator_ros.mavlink.url import HostPort, parse_url, SerialUrl, UdpUrl, Url

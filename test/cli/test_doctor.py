@@ -10,7 +10,7 @@ from typing import Any
 
 from illuminator_ros.cli.discover.run import CONSOLE
 from illuminator_ros.cli.doctor import machine, OLDEST_TIME, on_ports, shared_names
-from illuminator_ros.mavlink.listener import NOT_SENT_HERE, SILENT
+from illuminator_ros.mavlink.search.listener import NOT_SENT_HERE, SILENT
 import pytest
 
 LIGHT = {'address': '1/243', 'kinds': ['light'], 'mavlink_versions': [2], 'signed': False,

@@ -4,10 +4,10 @@
 """The kind of a component, by its heartbeat and the messages that it sends."""
 
 from illuminator_ros.cli.payloads import devices, PAYLOADS
-from illuminator_ros.mavlink.component_kinds import described, kinds
 from illuminator_ros.mavlink.device_kind import DeviceKind
 from illuminator_ros.mavlink.dialect import mavlink
 from illuminator_ros.mavlink.messages import Address, Heartbeat
+from illuminator_ros.mavlink.search.component_kinds import described, kinds
 import pytest
 
 AUTOPILOT = mavlink.MAV_TYPE_SUBMARINE, mavlink.MAV_AUTOPILOT_ARDUPILOTMEGA

@@ -5,7 +5,12 @@
 
 from __future__ import annotations
 
-from illuminator_ros.mavlink.duplicate_filter import DuplicateFilter, MAX_FRAMES, MEMORY, Path
+from illuminator_ros.mavlink.forwarding.duplicate_filter import (
+    DuplicateFilter,
+    MAX_FRAMES,
+    MEMORY,
+    Path,
+)
 import pytest
 
 FIRST, SECOND = Path(0, 'a'), Path(1, 'b')

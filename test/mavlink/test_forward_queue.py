@@ -11,7 +11,7 @@ import math
 from hypothesis import given
 from hypothesis import strategies as st
 from illuminator_ros.mavlink.dialect import mavlink
-from illuminator_ros.mavlink.forward_queue import (
+from illuminator_ros.mavlink.forwarding.forward_queue import (
     ForwardQueue,
     MAX_AGES,
     MAX_DELAY,

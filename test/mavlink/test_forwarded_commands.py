@@ -5,7 +5,7 @@
 
 from __future__ import annotations
 
-from illuminator_ros.mavlink.forwarded_commands import ForwardedCommands, MEMORY
+from illuminator_ros.mavlink.forwarding.forwarded_commands import ForwardedCommands, MEMORY
 from illuminator_ros.mavlink.messages import Address, CommandInt, CommandLong, Message
 import pytest
 from support.frames import frame_of, heartbeat_frame, LIGHT, only

@@ -5,7 +5,7 @@
 
 from __future__ import annotations
 
-from illuminator_ros.mavlink.rate_scan import ENOUGH, other_protocol, RateScan, SHARE
+from illuminator_ros.mavlink.search.rate_scan import ENOUGH, other_protocol, RateScan, SHARE
 import pytest
 
 NMEA = b'$GPGLL,4916.45,N,12311.12,W,225444,A*31\r\n'

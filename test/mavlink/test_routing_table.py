@@ -8,8 +8,7 @@ from __future__ import annotations
 import math
 
 from illuminator_ros.mavlink.dialect import mavlink
-from illuminator_ros.mavlink.messages import Address, CommandLong, heartbeat, Message
-from illuminator_ros.mavlink.routing_table import (
+from illuminator_ros.mavlink.forwarding.routing_table import (
     EXPIRY,
     EXPIRY_INTERVAL,
     MAX_ROUTE_PEERS,
@@ -17,6 +16,7 @@ from illuminator_ros.mavlink.routing_table import (
     Router,
     RoutingTable,
 )
+from illuminator_ros.mavlink.messages import Address, CommandLong, heartbeat, Message
 import pytest
 from support.frames import frame_of, LIGHT, only, raw_v2
 

@@ -12,11 +12,11 @@ from typing import Any
 from hypothesis import given
 from hypothesis import strategies as st
 from illuminator_ros.mavlink.dialect import CRC_EXTRA, mavlink
-from illuminator_ros.mavlink.duplicate_filter import MEMORY
 from illuminator_ros.mavlink.errors import ChannelLost
+from illuminator_ros.mavlink.forwarding.duplicate_filter import MEMORY
+from illuminator_ros.mavlink.forwarding.routing_table import EXPIRY
 from illuminator_ros.mavlink.line import ANNOUNCE_INTERVAL, SILENCE
 from illuminator_ros.mavlink.messages import Address, CommandLong, heartbeat, Message
-from illuminator_ros.mavlink.routing_table import EXPIRY
 from illuminator_ros.mavlink.signing import Signing, SigningMode
 from illuminator_ros.mavlink.url import parse_url
 import pytest

@@ -23,7 +23,7 @@ from illuminator_ros.mavlink.messages import (
     ComponentInformationBasic,
     heartbeat,
 )
-from illuminator_ros.mavlink.serial_search import (
+from illuminator_ros.mavlink.search.serial_search import (
     AGAIN,
     DECISION,
     OTHERS,
@@ -244,8 +244,8 @@ def test_a_light_that_is_unplugged_is_found_under_another_name(
     run: live_link.Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     pytest.importorskip('serial', reason='pyserial is not installed')
-    monkeypatch.setattr('illuminator_ros.mavlink.serial_search.DECISION', 0.0)
-    monkeypatch.setattr('illuminator_ros.mavlink.serial_search.INTERVAL', 0.1)
+    monkeypatch.setattr('illuminator_ros.mavlink.search.serial_search.DECISION', 0.0)
+    monkeypatch.setattr('illuminator_ros.mavlink.search.serial_search.INTERVAL', 0.1)
     bridge = run(live_link.Bridge(parse_url(
         f'serial://auto?ports={tmp_path}/tty*', known=devices(PAYLOADS))))
     for count, name in enumerate(('ttyFIRST', 'ttySECOND'), 1):

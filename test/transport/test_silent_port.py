@@ -12,7 +12,7 @@ from unittest.mock import Mock
 
 from illuminator_ros.mavlink.dialect import mavlink
 from illuminator_ros.mavlink.messages import Address, heartbeat
-from illuminator_ros.mavlink.silent_port import SILENCE, SilentPort
+from illuminator_ros.mavlink.search.silent_port import SILENCE, SilentPort
 from illuminator_ros.mavlink.transport import Channel
 from illuminator_ros.mavlink.url import SerialUrl
 import pytest
@@ -109,7 +109,7 @@ def test_a_program_that_reads_the_port_too_is_named() -> None:
 @pytest.fixture
 def _at_once(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
     monkeypatch.setattr('illuminator_ros.mavlink.line.SILENCE', -math.inf)
-    monkeypatch.setattr('illuminator_ros.mavlink.silent_port.SILENCE', 0.0)
+    monkeypatch.setattr('illuminator_ros.mavlink.search.silent_port.SILENCE', 0.0)
     yield
 
 

@@ -14,7 +14,7 @@ import selectors
 import socket
 
 from illuminator_ros.mavlink.dialect import mavlink
-from illuminator_ros.mavlink.forward_queue import MAX_DELAY, MAX_QUEUED
+from illuminator_ros.mavlink.forwarding.forward_queue import MAX_DELAY, MAX_QUEUED
 from illuminator_ros.mavlink.frame import Decoder, Frame, MAX_FRAME
 from illuminator_ros.mavlink.messages import Address, CommandLong, heartbeat, Message
 from illuminator_ros.mavlink.transport.base import FORWARD_AHEAD, FORWARD_SIZE, StreamChannel

@@ -11,8 +11,8 @@ from typing import Any
 
 from ..arguments import invocation
 from ..payloads import devices, OWN_PAYLOADS, PAYLOADS
-from ...mavlink.component_kinds import AUTOPILOT
-from ...mavlink.listener import Listener, NOT_ASKED
+from ...mavlink.search.component_kinds import AUTOPILOT
+from ...mavlink.search.listener import Listener, NOT_ASKED
 from ...mavlink.url import SerialUrl
 
 CAMERA = ['rededge']

@@ -22,8 +22,8 @@ from .setup import set_up, SIGNALS
 from ..arguments import invocation, option, Parser
 from ..entry_point import print_output
 from ...mavlink.link_thread import Waker
-from ...mavlink.listener import Listener
-from ...mavlink.rate_scan import RATES, SHARE
+from ...mavlink.search.listener import Listener
+from ...mavlink.search.rate_scan import RATES, SHARE
 from ...mavlink.transport.ports import serial_ports
 from ...mavlink.url import HostPort, parse_url, SerialUrl, UdpUrl, Url
 from ...simulation.settings import number

@@ -26,9 +26,9 @@ from ...illuminator.model import SafetyLimits
 from ...illuminator.settings import LightSettings
 from ...mavlink.command_sender import CommandSender
 from ...mavlink.component import Component
-from ...mavlink.component_kinds import AUTOPILOT
 from ...mavlink.link import Link
 from ...mavlink.messages import Address
+from ...mavlink.search.component_kinds import AUTOPILOT
 from ...mavlink.url import parse_url
 from ...payload.device_events import DeviceConnected
 from ...payload.requests import Result

@@ -17,7 +17,7 @@ from ..client import GimbalClient
 from ..events import GimbalEvent, GimbalKey
 from ..gimbal import GimbalSettings
 from ..setpoint_mixer import STEP_LIMIT
-from ...mavlink.component_kinds import AUTOPILOT
+from ...mavlink.search.component_kinds import AUTOPILOT
 from ...payload.device_events import DeviceConnected
 from ...payload.requests import Result
 from ...ros.command_sources import SOURCE_PARAMETERS, source_settings

@@ -17,7 +17,7 @@ import socket
 from typing import cast
 
 from ..errors import ChannelLost
-from ..forward_queue import ForwardQueue
+from ..forwarding.forward_queue import ForwardQueue
 from ..frame import Frame
 from ..url import HostPort, SerialUrl
 

@@ -10,7 +10,7 @@ import os
 from pathlib import Path
 import termios
 
-from ..rate_scan import RATES
+from ..search.rate_scan import RATES
 from ..url import SerialUrl, UdpUrl, Url
 
 # The longest command line of a program that is shown, characters.

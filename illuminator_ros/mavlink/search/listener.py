@@ -12,18 +12,18 @@ import selectors
 import time
 
 from .component_kinds import kinds
-from .device_kind import DeviceKind
-from .dialect import CRC_EXTRA, decode
-from .frame import Frame
-from .frame_writer import FrameWriter
-from .messages import Address, ComponentInformationBasic, Heartbeat
 from .rate_scan import RateScan, SHARE
-from .receiver import Receiver
-from .signing import Signing
-from .statistics import MAX_SOURCES
-from .transport import Channel, open_channel
-from .transport.ports import IN_USE, OTHER_USER, users_of
-from .url import SerialUrl, UdpUrl, Url
+from ..device_kind import DeviceKind
+from ..dialect import CRC_EXTRA, decode
+from ..frame import Frame
+from ..frame_writer import FrameWriter
+from ..messages import Address, ComponentInformationBasic, Heartbeat
+from ..receiver import Receiver
+from ..signing import Signing
+from ..statistics import MAX_SOURCES
+from ..transport import Channel, open_channel
+from ..transport.ports import IN_USE, OTHER_USER, users_of
+from ..url import SerialUrl, UdpUrl, Url
 
 SILENT = ('nothing is received: check the power of the device, ground, and the wire from its TX '
           'to the RX of this port, which may be swapped; PX4 on USB may send only after it has '

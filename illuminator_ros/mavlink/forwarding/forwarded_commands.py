@@ -7,9 +7,9 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from .dialect import decode
-from .frame import Frame
-from .messages import Address, AnyCommand, CommandInt, CommandLong
+from ..dialect import decode
+from ..frame import Frame
+from ..messages import Address, AnyCommand, CommandInt, CommandLong
 
 # s; a device shows the effect of a command within its status interval.
 MEMORY = 3.0

@@ -7,9 +7,9 @@ from __future__ import annotations
 
 from collections.abc import Collection, Mapping
 
-from .device_kind import DeviceKind
-from .dialect import mavlink, short_names
-from .messages import Address, Heartbeat
+from ..device_kind import DeviceKind
+from ..dialect import mavlink, short_names
+from ..messages import Address, Heartbeat
 
 AUTOPILOT = 'autopilot'
 # By MAV_TYPE. Each other type is a device of a payload, an autopilot, or called as in the dialect.

@@ -10,8 +10,8 @@ import itertools
 import math
 from typing import NamedTuple
 
-from .frame import Frame
-from .message_traits import Priority, traits_of
+from ..frame import Frame
+from ..message_traits import Priority, traits_of
 
 # Bytes that may wait, and s: a slow line gets less, so that its delay is bounded.
 MAX_QUEUED = 16 * 1024

@@ -10,10 +10,10 @@ from collections.abc import Container, Iterable, Iterator, Sequence
 import math
 from typing import TypeVar
 
-from .frame import Frame
-from .message_traits import NEVER_FORWARDED, target_of
-from .messages import Address
-from .transport import Peer
+from ..frame import Frame
+from ..message_traits import NEVER_FORWARDED, target_of
+from ..messages import Address
+from ..transport import Peer
 
 # Components with a route, and peers of one route. Messages to other components go to all peers.
 MAX_ROUTES = 256

@@ -10,12 +10,12 @@ import contextlib
 import math
 import threading
 
-from .frame import Decoder
 from .listener import NOISE
 from .rate_scan import ENOUGH, other_protocol, RATES, SHARE
-from .transport import Channel
-from .transport.ports import IN_USE, users_of
-from .url import SerialUrl
+from ..frame import Decoder
+from ..transport import Channel
+from ..transport.ports import IN_USE, users_of
+from ..url import SerialUrl
 
 # s without a frame until the reason is looked for, and between two other baud rates.
 SILENCE = 10.0

@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections import OrderedDict
 from typing import NamedTuple
 
-from .transport import Peer
+from ..transport import Peer
 
 # s for which a frame is remembered: a loop through a radio is slow.
 MEMORY = 5.0

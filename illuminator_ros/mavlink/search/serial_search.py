@@ -13,16 +13,16 @@ import selectors
 import threading
 import time
 
-from .command_sender import request_message
 from .component_kinds import listed
-from .device_kind import DeviceKind
-from .dialect import mavlink
-from .frame_writer import FrameWriter
 from .listener import Listener
-from .messages import Address, heartbeat, INFORMATION_ID
-from .transport import Channel, open_channel
-from .transport.ports import serial_ports
-from .url import AutoUrl, SerialUrl, Url
+from ..command_sender import request_message
+from ..device_kind import DeviceKind
+from ..dialect import mavlink
+from ..frame_writer import FrameWriter
+from ..messages import Address, heartbeat, INFORMATION_ID
+from ..transport import Channel, open_channel
+from ..transport.ports import serial_ports
+from ..url import AutoUrl, SerialUrl, Url
 
 # s from the first device that fits to the decision, in which a second one may be heard.
 DECISION = 3.0
