@@ -48,8 +48,9 @@ from .gimbal_reports import GimbalReports
 from .setpoint_stream import MOVE, SetpointStream, YAW_LOCK
 from ..geometry.mount_attitude import YawFrame
 from ..geometry.rotation import Quaternion, Vector
-from ..mavlink.command_sender import CommandSender, format_seconds
+from ..mavlink.command_sender import CommandSender
 from ..mavlink.dialect import mavlink
+from ..mavlink.durations import format_seconds
 from ..mavlink.messages import Address
 from ..payload.attempt import Served
 from ..payload.command_sources import DEFAULT, SourceSettings

@@ -14,14 +14,9 @@ from .axes import known_ranges, Ranges
 from .commands import Control
 from ..geometry.mount_attitude import MountAttitude, YawFrame
 from ..geometry.rotation import Quaternion
-from ..mavlink.command_sender import (
-    Command,
-    CommandResult,
-    CommandSender,
-    format_seconds,
-    request_message,
-)
+from ..mavlink.command_sender import Command, CommandResult, CommandSender, request_message
 from ..mavlink.dialect import mavlink, short_names
+from ..mavlink.durations import format_seconds
 from ..mavlink.messages import Address, result_name
 from ..mavlink.retries import Retries, RetryPolicy
 from ..payload.device_events import DeviceConnected, DeviceDisconnected

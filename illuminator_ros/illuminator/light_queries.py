@@ -11,14 +11,9 @@ import math
 
 from .messages import IlluminatorStatus, STATUS_ID
 from .serial_numbers import SerialNumbers
-from ..mavlink.command_sender import (
-    Command,
-    CommandResult,
-    CommandStatus,
-    format_seconds,
-    request_message,
-)
+from ..mavlink.command_sender import Command, CommandResult, CommandStatus, request_message
 from ..mavlink.dialect import mavlink
+from ..mavlink.durations import format_seconds
 from ..mavlink.messages import ComponentInformationBasic
 from ..mavlink.retries import Retries, RetryPolicy
 from ..payload.attempt import Target

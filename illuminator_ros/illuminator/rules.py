@@ -17,7 +17,7 @@ from .model import Changes, checked, SafetyLimits, Status
 from .settings import LightSettings
 from .silence import Silence
 from .twin import Twin
-from ..mavlink.command_sender import format_seconds
+from ..mavlink.durations import format_seconds
 from ..mavlink.errors import InvalidValue
 from ..mavlink.retries import RetryPolicy
 from ..payload.attempt import REPEAT, Target

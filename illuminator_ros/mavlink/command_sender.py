@@ -21,6 +21,7 @@ from typing import NamedTuple, TypeVar
 
 from . import messages
 from .dialect import mavlink
+from .durations import format_seconds, timing
 from .errors import InvalidValue
 from .messages import Address, Message
 from .retries import CLOSING, COMMAND, REJECTED
@@ -187,16 +188,6 @@ class CommandResult(NamedTuple):
 
 
 CommandDone = Callable[[CommandResult, float], None]
-
-
-def format_seconds(seconds: float) -> str:
-    """Return a duration for people: ms below a second, else s."""
-    return f'{seconds * 1000:.0f} ms' if seconds < 0.9995 else f'{seconds:.2f} s'
-
-
-def timing(tries: int, seconds: float) -> str:
-    """Return the number of tries and the time taken, for people."""
-    return f'{tries} {"try" if tries == 1 else "tries"}, {format_seconds(seconds)}'
 
 
 class CommandState(Enum):

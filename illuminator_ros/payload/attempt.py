@@ -30,11 +30,10 @@ from ..mavlink.command_sender import (
     CommandResult,
     CommandSender,
     CommandStatus,
-    format_seconds,
     request_message,
-    timing,
 )
 from ..mavlink.dialect import MAV_RESULT_COMMAND_UNSUPPORTED_MAV_FRAME, mavlink
+from ..mavlink.durations import format_seconds, timing
 from ..mavlink.messages import Address, result_name
 from ..mavlink.retries import CLOSING, Retries, RetryPolicy
 

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 
-from ..mavlink.command_sender import format_seconds
+from ..mavlink.durations import format_seconds
 
 
 class Liveness:

@@ -11,8 +11,9 @@ import math
 
 from . import messages as rededge
 from .pings import PingDone
-from ..mavlink.command_sender import CommandSender, format_seconds
+from ..mavlink.command_sender import CommandSender
 from ..mavlink.dialect import entry_names, mavlink
+from ..mavlink.durations import format_seconds
 from ..mavlink.messages import Address
 
 # s from DIGICAM_CONTROL to CAMERA_FEEDBACK.

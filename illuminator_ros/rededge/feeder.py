@@ -33,7 +33,7 @@ from .input_states import (
 from .messages import GpsRawInt
 from .orientation_feeder import OrientationFeeder
 from ..geometry.rotation import Quaternion, Vector
-from ..mavlink.command_sender import format_seconds
+from ..mavlink.durations import format_seconds
 from ..mavlink.messages import Address, Message, time_boot_ms
 from ..mavlink.schedule import Schedule
 from ..payload.messages import Attitude, GlobalPositionInt

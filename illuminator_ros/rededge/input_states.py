@@ -15,7 +15,7 @@ from typing import NamedTuple
 
 from .conversions import MountFrame
 from ..geometry.rotation import Vector
-from ..mavlink.command_sender import format_seconds
+from ..mavlink.durations import format_seconds
 
 # s for which the offset of UTC from ROS time holds.
 TIME_REFERENCE_LIFETIME = 60.0

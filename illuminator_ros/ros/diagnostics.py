@@ -19,9 +19,9 @@ from typing import NamedTuple
 from diagnostic_msgs.msg import DiagnosticStatus, KeyValue
 
 from ..mavlink import link_state
-from ..mavlink.command_sender import format_seconds
 from ..mavlink.component import Component
 from ..mavlink.device_kind import DeviceKind
+from ..mavlink.durations import format_seconds
 from ..mavlink.forwarding.duplicate_filter import OWN
 from ..mavlink.link import Link
 from ..mavlink.message_traits import name_of

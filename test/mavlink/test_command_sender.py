@@ -15,12 +15,12 @@ from illuminator_ros.mavlink.command_sender import (
     CommandResult,
     CommandSender,
     CommandStatus,
-    format_seconds,
     MAX_TARGETS,
     PROGRESS_TIMEOUT,
     request_message,
 )
 from illuminator_ros.mavlink.dialect import mavlink
+from illuminator_ros.mavlink.durations import format_seconds
 from illuminator_ros.mavlink.messages import Address, CommandInt, CommandLong, heartbeat, Message
 from illuminator_ros.mavlink.retries import CLOSING
 import pytest

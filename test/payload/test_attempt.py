@@ -8,7 +8,8 @@ from __future__ import annotations
 import math
 from typing import Any
 
-from illuminator_ros.mavlink.command_sender import CommandStatus, timing
+from illuminator_ros.mavlink.command_sender import CommandStatus
+from illuminator_ros.mavlink.durations import timing
 from illuminator_ros.payload.attempt import (
     Attempt,
     Change,

@@ -12,7 +12,7 @@ import math
 from typing import Any
 
 from illuminator_ros.geometry.rotation import Quaternion, Vector
-from illuminator_ros.mavlink.command_sender import format_seconds
+from illuminator_ros.mavlink.durations import format_seconds
 from illuminator_ros.mavlink.messages import Address, Message
 from illuminator_ros.mavlink.schedule import Schedule
 from illuminator_ros.payload.messages import Attitude, GlobalPositionInt, SystemTime

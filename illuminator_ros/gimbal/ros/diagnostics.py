@@ -13,8 +13,8 @@ from ..commands import Control
 from ..events import GimbalKey, GimbalSnapshot
 from ..gimbal_reports import STATUS_REQUEST_DELAY
 from ...geometry.mount_attitude import AXES
-from ...mavlink.command_sender import format_seconds
 from ...mavlink.dialect import entry_names, flag_names, mavlink
+from ...mavlink.durations import format_seconds
 from ...mavlink.messages import Address
 from ...ros import diagnostics
 from ...ros.command_sources import holder_values

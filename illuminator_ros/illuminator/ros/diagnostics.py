@@ -10,8 +10,8 @@ import math
 
 from ..events import LightSnapshot
 from ..model import flag_names, KNOWN_FLAGS
-from ...mavlink.command_sender import format_seconds
 from ...mavlink.dialect import mavlink
+from ...mavlink.durations import format_seconds
 from ...mavlink.messages import Address
 from ...ros import diagnostics
 from ...ros.command_sources import holder_values

@@ -12,8 +12,8 @@ from typing import NamedTuple
 from ..client import CameraSnapshot
 from ..feeder import FeederSnapshot
 from ..input_states import Input, InputSnapshot, InputState, RECENT_MESSAGES
-from ...mavlink.command_sender import format_seconds
 from ...mavlink.dialect import mavlink
+from ...mavlink.durations import format_seconds
 from ...ros.diagnostics import (
     ERROR,
     Finding,
