@@ -64,11 +64,11 @@ class DeviceNodes(Generic[K, N]):
     """
 
     def __init__(
-        self, host: BridgeContext, kind: str, first: N, make: Callable[[Node, NodeLog], N],
+        self, context: BridgeContext, kind: str, first: N, make: Callable[[Node, NodeLog], N],
         bind: Callable[[N, K, float], None],
     ) -> None:
         self.first = first
-        self._host = host
+        self._context = context
         self._kind = kind
         self._make = make
         self._bind_node = bind
@@ -76,8 +76,8 @@ class DeviceNodes(Generic[K, N]):
         self.get = self._nodes.get
         # Requests for the nodes of further devices, also before those are made.
         self._requests: dict[K, NodeRequest] = {}
-        self._absence_due = host.link.clock() + ABSENCE_DELAY
-        host.diagnostics.add(first.source)
+        self._absence_due = context.link.clock() + ABSENCE_DELAY
+        context.diagnostics.add(first.source)
 
     def __iter__(self) -> Iterator[N]:
         return iter(self._nodes.values())
@@ -98,29 +98,30 @@ class DeviceNodes(Generic[K, N]):
         request = self._requests[key] = NodeRequest(
             f'{self._kind} {key}', name,
             lambda node, log: self._serve(key, request, node, log))
-        self._host.nodes.make(request)
+        self._context.nodes.make(request)
         return True
 
     def _serve(self, key: K, request: NodeRequest, node: Node, log: NodeLog) -> None:
         served = self._make(node, log)
-        if shared := _shared_names(node, self._host.node):
-            log.warning(f'{", ".join(shared)}: {self._host.node.get_fully_qualified_name()} has '
+        first = self._context.node
+        if shared := _shared_names(node, first):
+            log.warning(f'{", ".join(shared)}: {first.get_fully_qualified_name()} has '
                         'the same, since a remapping applies to all nodes; put the name of the '
                         f'node in front, as in -r {request.name}:~/enable:=NAME', 'remapped')
-        self._host.log.info(f'{self._kind} {key} is served by {served.source.node}', 'served')
+        self._context.log.info(f'{self._kind} {key} is served by {served.source.node}', 'served')
 
         def bind(now: float) -> None:
             # The device may have been forgotten meanwhile, and found again.
             if self._requests.get(key) is request:
                 self.bind(served, key, now)
 
-        self._host.link.call(bind)
+        self._context.link.call(bind)
 
     def bind(self, node: N, key: K, now: float) -> None:
         """Have a node serve a device from now on."""
         self._nodes[key] = node
         self._bind_node(node, key, now)
-        self._host.diagnostics.add(node.source)
+        self._context.diagnostics.add(node.source)
 
     def handle(self, event: DeviceEvent[K]) -> bool:
         """Take an event of a device; return whether a node serves the device."""
@@ -137,18 +138,19 @@ class DeviceNodes(Generic[K, N]):
         if node is not None:
             node.release()
             if node is not self.first:
-                self._host.diagnostics.remove(node.source)
-                self._host.log.info(f'{self._kind} {key} was silent for long: '
-                                    f'{node.source.node} is removed', 'forgotten')
+                self._context.diagnostics.remove(node.source)
+                self._context.log.info(
+                    f'{self._kind} {key} was silent for long: {node.source.node} is removed',
+                    'forgotten')
         if request := self._requests.pop(key, None):
-            self._host.nodes.remove(request)
+            self._context.nodes.remove(request)
 
     def poll(self, now: float) -> None:
         """Log once why there is no device."""
         if now >= self._absence_due:
             self._absence_due = math.inf
             if self.first_is_free:
-                self._host.log.warning(self.first.absence(now))
+                self._context.log.warning(self.first.absence(now))
 
 
 def publish_event(

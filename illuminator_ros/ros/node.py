@@ -69,7 +69,7 @@ class RequestService:
         answered at once.
     """
 
-    endpoint: Entity
+    entity: Entity
     start: Callable[[Any, float, Answer], None]
     limit: int = MAX_PENDING
 
@@ -96,9 +96,9 @@ class CommandTopic(Generic[T]):
     :param read: returns the value of a message, in any thread; a ValueError is logged.
     """
 
-    endpoint: Entity
+    entity: Entity
     receive: Callable[[T, float], None]
-    # Untyped: of the class that the endpoint names.
+    # Untyped: of the class that the entity names.
     read: Callable[[Any], T] = finite_data
 
 
@@ -119,14 +119,14 @@ class NodeEntities:
             for one in publications}
         self._types = {one.name: one.type for one in publications}
         for service in services:
-            calls, endpoint = LinkCalls(link, log, service.limit), service.endpoint
-            DeferredService(node, endpoint.type, f'~/{endpoint.name}', _handler(service, calls),
+            calls, entity = LinkCalls(link, log, service.limit), service.entity
+            DeferredService(node, entity.type, f'~/{entity.name}', _handler(service, calls),
                             SERVICE_QOS, log)
         for command in commands:
-            endpoint = command.endpoint
+            entity = command.entity
             node.create_subscription(
-                endpoint.type, f'~/{endpoint.name}', _TopicCalls(link, log, command).offer,
-                endpoint.qos or COMMAND_QOS)
+                entity.type, f'~/{entity.name}', _TopicCalls(link, log, command).offer,
+                entity.qos or COMMAND_QOS)
 
     def publish(self, name: str, value: object) -> None:
         """See :meth:`publish_all`."""
@@ -156,7 +156,7 @@ class NodeEntities:
 
 
 def _handler(service: RequestService, calls: LinkCalls) -> Handler:
-    response = service.endpoint.type.Response
+    response = service.entity.type.Response
 
     def handle(request: Any, respond: Respond) -> None:
         def start(now: float, answer: Respond) -> None:
@@ -180,13 +180,13 @@ class _TopicCalls(Generic[T]):
         self._lock = threading.Lock()
 
     def offer(self, message: Any) -> None:
-        endpoint = self._command.endpoint
+        entity = self._command.entity
         try:
             value = self._command.read(message)
         except ValueError as error:
-            self._log.stream_failed(f'~/{endpoint.name}: ignored: {error}', endpoint.name)
+            self._log.stream_failed(f'~/{entity.name}: ignored: {error}', entity.name)
             return
-        if endpoint.qos is SWITCH_QOS:
+        if entity.qos is SWITCH_QOS:
             self._link.call(functools.partial(self._command.receive, value))
             return
         with self._lock:

@@ -27,16 +27,16 @@ RELEASE = Entity('cmd/release', Float32, 'length of line to release, m', SWITCH_
 class WinchNode(ServedPayload):
     """Serves all winches of a link with one node; at the end the winch stays as it is."""
 
-    def __init__(self, client: WinchClient, host: BridgeContext) -> None:
+    def __init__(self, client: WinchClient, context: BridgeContext) -> None:
         def release(length: float, now: float) -> None:
             for winch in client.winches.values():
                 winch.release(length, now, released)
 
         def released(result: Result, now: float) -> None:
-            host.log.info(f'~/cmd/release: {result.message}', 'release')
+            context.log.info(f'~/cmd/release: {result.message}', 'release')
 
         interface = NodeEntities(
-            host.node, host.link, host.log, publications=[LINE_LENGTH],
+            context.node, context.link, context.log, publications=[LINE_LENGTH],
             commands=[CommandTopic(RELEASE, release)])
         client.events.subscribe(
             lambda report: interface.publish('line_length', report.line_length))

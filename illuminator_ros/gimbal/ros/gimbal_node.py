@@ -103,44 +103,44 @@ class GimbalNode:
     """
 
     def __init__(
-        self, node: Node, host: BridgeContext, log: NodeLog, client: GimbalClient,
+        self, node: Node, context: BridgeContext, log: NodeLog, client: GimbalClient,
         why_none: Callable[[], str], transforms: TransformPublisher | None = None,
         changeable: ChangeableParameters | None = None,
     ) -> None:
         self.key: events.GimbalKey | None = None
-        self._host = host
+        self._context = context
         self._log = log
         self._client = client
         self._why_none = why_none
         self._transforms = transforms
         self._frame = node.get_name()
-        self._frames = conversions.Frames.of(host.values)
+        self._frames = conversions.Frames.of(context.values)
         self._clock = node.get_clock()
-        self._started = host.link.clock()
+        self._started = context.link.clock()
         self._yaw_lock: bool | None = None
         self._errors = 0
         sources = client.settings.sources
         self._interface = ros_node.NodeEntities(
-            node, host.link, log, publications=(*PUBLICATIONS, *([SOURCE] if sources else [])),
+            node, context.link, log, publications=(*PUBLICATIONS, *([SOURCE] if sources else [])),
             services=(
                 *(ros_node.RequestService(one, functools.partial(self._request, one))
                   for one in REQUESTS),
                 *release_services(sources, self._release)),
             commands=(self._fix_topic(), *(topic for way in prefixes(sources).items()
                                            for topic in self._command_topics(*way))))
-        ParameterServices(node, host.link, log, changeable=changeable)
+        ParameterServices(node, context.link, log, changeable=changeable)
         if sources:
             self._interface.publish('source', '')
         self._interface.publish('connected', False)
         self._publish_control(None, False)
         self._target = TargetPublisher(
-            node, self._interface, client, host, self._frame if transforms else '')
+            node, self._interface, client, context, self._frame if transforms else '')
         self.source = DiagnosticsSource(node.get_fully_qualified_name(), self._take_snapshot)
 
     def bind(self, key: events.GimbalKey, now: float) -> None:
         """Serve a gimbal from now on, and publish its known state."""
         self.key = key
-        self._host.frame_log.assign(key.address, self._log)
+        self._context.frame_log.assign(key.address, self._log)
         if (gimbal := self._gimbal()) is not None:
             snapshot = gimbal.snapshot(now)
             self._interface.publish('connected', not snapshot.unreachable)
@@ -153,9 +153,9 @@ class GimbalNode:
     def release(self) -> None:
         """Serve the gimbal no longer, since it was forgotten."""
         if self.key:
-            self._host.frame_log.assign(self.key.address, None)
+            self._context.frame_log.assign(self.key.address, None)
         self.key = None
-        self._target.update(None, self._host.link.clock())
+        self._target.update(None, self._context.link.clock())
 
     def poll(self, now: float) -> None:
         """Follow what changes without an event: the age of the attitude and of the position."""
@@ -163,7 +163,7 @@ class GimbalNode:
 
     def absence(self, now: float) -> str:
         """Return why there is no gimbal, for people."""
-        link = self._host.diagnostics.snapshot(now)
+        link = self._context.diagnostics.snapshot(now)
         return 'no gimbal connected: ' + why_no_gimbal(
             link, self._heard(now), self._client.managers_without_id(now), self._why_none())
 
@@ -179,7 +179,7 @@ class GimbalNode:
 
     def handle(self, event: events.GimbalEvent) -> None:
         """Publish an event of the gimbal."""
-        self.poll(self._host.link.clock())
+        self.poll(self._context.link.clock())
         name, warn = f'gimbal {event.key}', self._log.warning
         match event:
             case events.AttitudeReceived():
@@ -210,7 +210,7 @@ class GimbalNode:
             case events.AutomaticTakeFailed(message=message):
                 warn(f'auto_take_control: {message}', 'control')
         publish_event(event, 'gimbal', self._log, self._interface)
-        self._host.check_diagnostics()
+        self._context.check_diagnostics()
 
     def _publish_control(self, control: Control | None, ours: bool) -> None:
         self._interface.publish('in_control', ours)
@@ -238,7 +238,7 @@ class GimbalNode:
             self._errors = event.errors
             names = ', '.join(flag_names('GIMBAL_DEVICE_ERROR_FLAGS', event.errors)) or 'none'
             log(f'gimbal {event.key}: failure flags: {names}', 'flags')
-            self._host.check_diagnostics()
+            self._context.check_diagnostics()
 
     # Requests
 
@@ -267,7 +267,7 @@ class GimbalNode:
     # Setpoints
 
     def _command_topics(self, source: str, prefix: str) -> tuple[ros_node.AnyCommandTopic, ...]:
-        separation: float = self._host.values['geoid_separation']
+        separation: float = self._context.values['geoid_separation']
 
         def topic(
             plain: Entity, send: Callable[..., None], read: Callable[[Any], T],
@@ -303,7 +303,7 @@ class GimbalNode:
             topic(CMD_ROI, move, lambda message: conversions.read_place(message, separation)))
 
     def _fix_topic(self) -> ros_node.AnyCommandTopic:
-        separation: float = self._host.values['geoid_separation']
+        separation: float = self._context.values['geoid_separation']
 
         def receive(position: GeoPoint, now: float) -> None:
             if self.key:

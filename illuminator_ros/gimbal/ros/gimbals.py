@@ -63,17 +63,19 @@ class Gimbals(ServedPayload):
     """
 
     def __init__(
-        self, client: GimbalClient, host: BridgeContext, why_none: Callable[[], str] = lambda: '',
+        self, client: GimbalClient, context: BridgeContext,
+        why_none: Callable[[], str] = lambda: '',
     ) -> None:
         self._client = client
-        self._host = host
-        transforms = TransformPublisher.of(host.node, host.values, host.log)
+        self._context = context
+        transforms = TransformPublisher.of(context.node, context.values, context.log)
         self._nodes = DeviceNodes[GimbalKey, GimbalNode](
-            host, 'gimbal', GimbalNode(
-                host.node, host, host.log, client, why_none, transforms, ChangeableParameters(
-                    host.node, GIMBAL_PARAMETERS, host.values, check=settings,
+            context, 'gimbal', GimbalNode(
+                context.node, context, context.log, client, why_none, transforms,
+                ChangeableParameters(
+                    context.node, GIMBAL_PARAMETERS, context.values, check=settings,
                     change=self._change_parameters)),
-            lambda node, log: GimbalNode(node, host, log, client, why_none, transforms),
+            lambda node, log: GimbalNode(node, context, log, client, why_none, transforms),
             GimbalNode.bind)
         client.events.subscribe(self._handle)
 
@@ -88,11 +90,11 @@ class Gimbals(ServedPayload):
     def _serve(self, event: DeviceConnected[GimbalKey]) -> None:
         """Give a gimbal a node: the first node, or a new one."""
         key, nodes = event.key, self._nodes
-        if nodes.first_is_free and self._host.values['gimbal_device_id'] in (0, key.device_id):
-            nodes.bind(nodes.first, key, self._host.link.clock())
+        if nodes.first_is_free and self._context.values['gimbal_device_id'] in (0, key.device_id):
+            nodes.bind(nodes.first, key, self._context.link.clock())
             nodes.first.handle(event)
         else:
-            name = f'{self._host.node.get_name()}_{key.address.system}_{key.device_id}'
+            name = f'{self._context.node.get_name()}_{key.address.system}_{key.device_id}'
             if nodes.has_name(name):
                 # Another manager has a gimbal with this number.
                 name += f'_{key.address.component}'
@@ -100,7 +102,7 @@ class Gimbals(ServedPayload):
 
     def further_parameters(self, name: str) -> Set[str] | None:
         """See :meth:`ServedPayload.further_parameters`: they have none of their own."""
-        pattern = rf'{self._host.node.get_name()}(_[0-9]+){{2,3}}'
+        pattern = rf'{self._context.node.get_name()}(_[0-9]+){{2,3}}'
         return frozenset() if re.fullmatch(pattern, name) else None
 
     def poll(self, now: float) -> None:

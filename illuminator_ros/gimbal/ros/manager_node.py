@@ -134,21 +134,21 @@ class ManagerNode(ServedPayload):
     :raises ParameterError: if a parameter is wrong.
     """
 
-    def __init__(self, both: ManagerWithClient, host: BridgeContext) -> None:
+    def __init__(self, both: ManagerWithClient, context: BridgeContext) -> None:
         self._manager = manager = both.manager
-        self._host = host
-        self._log = host.log
-        self._frames = Frames.of(host.values)
-        self._clock = host.node.get_clock()
+        self._context = context
+        self._log = context.log
+        self._frames = Frames.of(context.values)
+        self._clock = context.node.get_clock()
         # Takes the results of the end of the process, None before.
         self._report: ShutdownReport | None = None
-        self._gimbals = Gimbals(both.client, host, lambda: manager.tracker.inactive_reason)
+        self._gimbals = Gimbals(both.client, context, lambda: manager.tracker.inactive_reason)
         self._interface = NodeEntities(
-            host.node, host.link, host.log,
+            context.node, context.link, context.log,
             publications=() if manager.tracker.has_mavlink else (DEVICE_SETPOINT,),
             commands=tuple(self._topics()))
-        host.diagnostics.add(DiagnosticsSource(
-            host.node.get_fully_qualified_name(), self._take_snapshot))
+        context.diagnostics.add(DiagnosticsSource(
+            context.node.get_fully_qualified_name(), self._take_snapshot))
         manager.events.subscribe(self._handle)
 
     def _topics(self) -> list[AnyCommandTopic]:
@@ -224,7 +224,7 @@ class ManagerNode(ServedPayload):
             self._log.info(f'{device} is managed', 'state')
         elif event.after is ManagerState.NO_DEVICE:
             self._log.warning(f'{device} is lost', 'state')
-        self._host.check_diagnostics()
+        self._context.check_diagnostics()
 
     # The bridge's calls
 
@@ -243,10 +243,10 @@ class ManagerNode(ServedPayload):
 
     def _take_snapshot(self, now: float) -> MakeReports:
         holder = self._manager.control.holder(Role.PRIMARY)
-        peers = self._host.link.lines.peer_count_of(holder, now) if holder else 0
+        peers = self._context.link.lines.peer_count_of(holder, now) if holder else 0
         found, values = findings(self._manager, peers), _values(self._manager, now)
         if (self._manager.setpoints.has_place and self._manager.vehicle.position.is_of_ros(now)
-                and GEOID_SEPARATION.name not in given_parameters(self._host.node)):
+                and GEOID_SEPARATION.name not in given_parameters(self._context.node)):
             found.append((WARN, 'geoid_separation is not set, so the altitude of ~/fix is above '
                                 'the ellipsoid'))
         return lambda link: [Report('manager', f'manager {values["gimbal_device_id"]}', found,

@@ -47,16 +47,16 @@ class TargetPublisher:
     """
 
     def __init__(
-        self, node: Node, entities: NodeEntities, client: GimbalClient, host: BridgeContext,
+        self, node: Node, entities: NodeEntities, client: GimbalClient, context: BridgeContext,
         frame: str,
     ) -> None:
         self.off_target = NOTHING
-        self.geoid_is_known = GEOID_SEPARATION.name in given_parameters(host.node)
+        self.geoid_is_known = GEOID_SEPARATION.name in given_parameters(context.node)
         self._clock = node.get_clock()
         self._entities = entities
         self._client = client
-        self._tolerance = math.radians(host.values[TARGET_TOLERANCE.name])
-        self._separation: float = host.values[GEOID_SEPARATION.name]
+        self._tolerance = math.radians(context.values[TARGET_TOLERANCE.name])
+        self._separation: float = context.values[GEOID_SEPARATION.name]
         self._move: Move = None
         self._asked_at = 0.0
         self._marker: Any = None

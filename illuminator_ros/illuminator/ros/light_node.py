@@ -64,7 +64,7 @@ class LightNode:
     """
 
     def __init__(
-        self, node: Node, host: BridgeContext, log: NodeLog, client: IlluminatorClient,
+        self, node: Node, context: BridgeContext, log: NodeLog, client: IlluminatorClient,
         geometry: BeamGeometry, limits: SafetyLimits, *,
         services: tuple[ros_node.RequestService, ...] = (),
         commands: tuple[ros_node.AnyCommandTopic, ...] = (),
@@ -73,17 +73,17 @@ class LightNode:
     ) -> None:
         self.name = node.get_name()
         self.address: Address | None = None
-        self._host = host
+        self._context = context
         self._log = log
         self._client = client
-        self._started = self._bound_at = host.link.clock()
+        self._started = self._bound_at = context.link.clock()
         self._mount_reported = False
         self._hardware_id = ''
         parameters = DeviceParameters(node, device_parameters(limits), log)
         self._overrides = _checked(parameters.overrides(), limits)
         sources = client.settings.sources
         interface = ros_node.NodeEntities(
-            node, host.link, log, publications=(*PUBLICATIONS, *([SOURCE] if sources else [])),
+            node, context.link, log, publications=(*PUBLICATIONS, *([SOURCE] if sources else [])),
             services=(
                 *(self._enable_service(*way) for way in prefixes(sources).items()),
                 *release_services(sources, self._release),
@@ -96,14 +96,14 @@ class LightNode:
         if sources:
             interface.publish('source', '')
         ParameterServices(
-            node, host.link, log, parameters, checked, self._check_value, self._configure,
+            node, context.link, log, parameters, checked, self._check_value, self._configure,
             changeable)
         self._publishers = EventPublisher(
             node, interface, parameters, log, limits=limits, frame_id=geometry.frame_id,
-            check_diagnostics=host.check_diagnostics,
+            check_diagnostics=context.check_diagnostics,
             sender_of=lambda light, command, first_param: (
-                host.link.lines.forwarded_commands.sender(
-                    light, command, host.link.clock(), first_param)))
+                context.link.lines.forwarded_commands.sender(
+                    light, command, context.link.clock(), first_param)))
         self._beam = (BeamPublisher(node, geometry, self._direction)
                       if geometry.beam_range else None)
         self._frame = (
@@ -114,7 +114,7 @@ class LightNode:
     def bind(self, address: Address, now: float) -> None:
         """Serve a light from now on, and publish its known state."""
         self.address, self._bound_at = address, now
-        self._host.frame_log.assign(address, self._log)
+        self._context.frame_log.assign(address, self._log)
         self.limits_changed()
         light = self._client.lights.get(address)
         if light is not None:
@@ -126,7 +126,7 @@ class LightNode:
     def release(self) -> None:
         """Serve no light: it was forgotten."""
         if self.address:
-            self._host.frame_log.assign(self.address, None)
+            self._context.frame_log.assign(self.address, None)
         self.address = None
 
     def handle(self, event: LightEvent) -> None:
@@ -150,7 +150,7 @@ class LightNode:
 
     def _direction(self, device_id: int) -> Quaternion | None:
         return self.address and self._client.mounts.direction(
-            self.address.system, device_id, self._host.link.clock())
+            self.address.system, device_id, self._context.link.clock())
 
     def _mount_absence(self, now: float) -> str:
         """Return why the beam is not shown, for people; '' if its gimbal was heard."""
@@ -163,10 +163,10 @@ class LightNode:
         """Do what is due."""
         if self._beam is not None:
             self._beam.poll()
-        light = self._light()
-        shared = shared_address(light.snapshot(self._host.link.clock())) if light else ''
+        light, now = self._light(), self._context.link.clock()
+        shared = shared_address(light.snapshot(now)) if light else ''
         self._log.write_conditions(filter(None, [shared]), 'shared address')
-        if not self._mount_reported and (absence := self._mount_absence(self._host.link.clock())):
+        if not self._mount_reported and (absence := self._mount_absence(now)):
             self._mount_reported = True
             self._log.warning(f'{absence}; set mounted_on')
 
@@ -177,7 +177,7 @@ class LightNode:
 
     def absence(self, now: float) -> str:
         """Return why there is no light, for people."""
-        why = why_no_light(self._host.diagnostics.snapshot(now), self._heard())
+        why = why_no_light(self._context.diagnostics.snapshot(now), self._heard())
         return f'no light connected: {why}'
 
     def _light(self) -> Light | None:

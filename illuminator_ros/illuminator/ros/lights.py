@@ -44,28 +44,29 @@ class Lights(ServedPayload):
     :raises ParameterError: if a parameter is wrong.
     """
 
-    def __init__(self, client: IlluminatorClient, host: BridgeContext) -> None:
+    def __init__(self, client: IlluminatorClient, context: BridgeContext) -> None:
         self._client = client
-        self._host = host
-        self._selection = parameters.Selection(host.values)
-        self._names = parameters.NodeNames(host.values, host.node.get_name())
-        geometry = parameters.BeamGeometry.of(host.values)
+        self._context = context
+        self._selection = parameters.Selection(context.values)
+        self._names = parameters.NodeNames(context.values, context.node.get_name())
+        geometry = parameters.BeamGeometry.of(context.values)
         limits = client.settings.limits
-        transforms = TransformPublisher.of(host.node, host.values, host.log)
+        transforms = TransformPublisher.of(context.node, context.values, context.log)
         self._nodes = DeviceNodes[Address, LightNode](
-            host, 'light', LightNode(
-                host.node, host, host.log, client, geometry, limits,
+            context, 'light', LightNode(
+                context.node, context, context.log, client, geometry, limits,
                 services=(RequestService(ENABLE_ALL, self._enable_all),),
                 commands=(CommandTopic(CMD_ENABLE_ALL, self._switch_all),),
                 changeable=ChangeableParameters(
-                    host.node, parameters.LIGHT_PARAMETERS, host.values,
+                    context.node, parameters.LIGHT_PARAMETERS, context.values,
                     check=self._check_parameters, change=self._change_parameters),
                 transforms=transforms),
-            lambda node, log: LightNode(node, host, log, client, geometry.declare(node), limits,
+            lambda node, log: LightNode(node, context, log, client, geometry.declare(node), limits,
                                         transforms=transforms),
             LightNode.bind)
-        if 0.0 < (limit := host.values['max_brightness']) < 1.0:
-            host.log.warning(f'max_brightness is {limit:g} %: it is a percentage, not a fraction')
+        if 0.0 < (limit := context.values['max_brightness']) < 1.0:
+            context.log.warning(
+                f'max_brightness is {limit:g} %: it is a percentage, not a fraction')
         self._second_reported = False
         self._names_due = math.inf
         client.events.subscribe(self._handle)
@@ -79,24 +80,24 @@ class Lights(ServedPayload):
     def _handle(self, event: events.LightEvent) -> None:
         if isinstance(event, events.LightRestarted):
             # Its sequence numbers have restarted, which is not a loss.
-            self._host.link.lines.reset_loss(event.key)
+            self._context.link.lines.reset_loss(event.key)
         if not self._nodes.handle(event) and isinstance(
                 event, DeviceConnected | events.StatusReceived):
             self._serve(event.key)
 
     def _serve(self, address: Address) -> None:
         """Give a light a node: the first node, or a node of its own."""
-        now = self._host.link.clock()
+        now = self._context.link.clock()
         nodes, selected = self._nodes, self._selection.is_target(address)
         if selected and nodes.first_is_free:
             if warning := self._names.unused_name(address):
-                self._host.log.warning(warning)
+                self._context.log.warning(warning)
             self._names_due = now + NAMES_DELAY
             nodes.bind(nodes.first, address, now)
         elif (nodes.serve(address, self._names.node_name(address)) and selected
                 and not self._second_reported):
             self._second_reported = True
-            self._host.log.warning(
+            self._context.log.warning(
                 f'a second light, {address}, was found; {nodes.first.source.node} serves '
                 f'{nodes.first.address}. After a restart the order may differ: set '
                 'target_system and target_component')
@@ -106,7 +107,7 @@ class Lights(ServedPayload):
     def _check_parameters(self, values: Values) -> None:
         """Check the values that parameters would have, in the executor's thread."""
         parameters.settings(values)
-        parameters.check_not_loosened(values, self._host.values)
+        parameters.check_not_loosened(values, self._context.values)
 
     def _change_parameters(self, values: Values, now: float) -> None:
         """Take parameters that were set, in the link's thread."""
@@ -123,7 +124,7 @@ class Lights(ServedPayload):
     def _switch_all(self, on: bool, now: float) -> None:
         def done(result: Result, now: float) -> None:
             if not (result.success or result.superseded):
-                self._host.log.warning(f'~/cmd/enable_all: {result.message}', 'cmd/enable_all')
+                self._context.log.warning(f'~/cmd/enable_all: {result.message}', 'cmd/enable_all')
 
         self._switch(on, now, done, is_call=False)
 
@@ -146,7 +147,7 @@ class Lights(ServedPayload):
         if now >= self._names_due:
             self._names_due = math.inf
             for warning in self._names.unused_names(self._client.lights):
-                self._host.log.warning(warning)
+                self._context.log.warning(warning)
         for node in self._nodes:
             node.poll()
 
@@ -156,7 +157,7 @@ class Lights(ServedPayload):
 
     def shut_down(self, now: float, report: ShutdownReport) -> None:
         """See :meth:`ServedPayload.shut_down`: switch all off, or name the lights that stay on."""
-        if not self._host.values['off_on_shutdown']:
+        if not self._context.values['off_on_shutdown']:
             for light in self._client.lights_by_address:
                 if light.may_be_on(now):
                     known = light.twin.status and light.twin.status.enabled

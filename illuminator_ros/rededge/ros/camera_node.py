@@ -114,44 +114,44 @@ class CameraNode(ServedPayload):
     :raises ParameterError: if a parameter is wrong.
     """
 
-    def __init__(self, client: RedEdgeClient, host: BridgeContext) -> None:
+    def __init__(self, client: RedEdgeClient, context: BridgeContext) -> None:
         self._client = client
-        self._host = host
+        self._context = context
         # Untyped: rclpy types it as a Clock, which lacks ``ros_time_is_active``.
-        self._clock: Any = host.node.get_clock()
-        self._started = host.link.clock()
+        self._clock: Any = context.node.get_clock()
+        self._started = context.link.clock()
         self._absence_due = self._started + ABSENCE_DELAY
         # The states of the inputs as they were logged.
         self._states: dict[Input, InputState] = {}
-        self._geoid_is_known = GEOID_SEPARATION.name in given_parameters(host.node)
-        self._topics = {one: host.node.resolve_topic_name(f'~/{one.value}') for one in Input}
+        self._geoid_is_known = GEOID_SEPARATION.name in given_parameters(context.node)
+        self._topics = {one: context.node.resolve_topic_name(f'~/{one.value}') for one in Input}
         self._graph: dict[Input, InputTopic] = {}
         self._count_due = -math.inf
         self._interface = NodeEntities(
-            host.node, host.link, host.log, publications=PUBLICATIONS,
+            context.node, context.link, context.log, publications=PUBLICATIONS,
             services=(
                 RequestService(PING, self._ping),
                 *(RequestService(one, self._capture(shot)) for one, shot in CAPTURES.items())),
-            commands=subscriptions(host.node, host.link, client.feeder))
+            commands=subscriptions(context.node, context.link, client.feeder))
         self._interface.publish('connected', False)
         # The first NavSatFix imports numpy, which takes too long for the link's thread.
         NavSatFix()
-        self._parameters = DeviceParameters(host.node, MOUNT_PARAMETERS, host.log)
+        self._parameters = DeviceParameters(context.node, MOUNT_PARAMETERS, context.log)
         given = self._parameters.overrides()
         angles = {spec.name: spec.check(given.get(spec.name, spec.default))
                   for spec in MOUNT_PARAMETERS}
         self._parameters.show(angles)
-        self._transforms = TransformPublisher.of(host.node, host.values, host.log)
+        self._transforms = TransformPublisher.of(context.node, context.values, context.log)
         self._frame_due = self._started + DISCOVERY_TIME
         client.feeder.orientation.set_fixed_mount(
-            _angles(angles), host.link.clock() + DISCOVERY_TIME)
+            _angles(angles), context.link.clock() + DISCOVERY_TIME)
         ParameterServices(
-            host.node, host.link, host.log, self._parameters, configure=self._set_mount,
+            context.node, context.link, context.log, self._parameters, configure=self._set_mount,
             changeable=ChangeableParameters(
-                host.node, PARAMETERS, host.values, check=lambda values: None,
+                context.node, PARAMETERS, context.values, check=lambda values: None,
                 change=self._change_parameters))
-        host.diagnostics.add(DiagnosticsSource(
-            host.node.get_fully_qualified_name(), self._take_snapshot))
+        context.diagnostics.add(DiagnosticsSource(
+            context.node.get_fully_qualified_name(), self._take_snapshot))
         client.events.subscribe(self._handle)
 
     # Requests
@@ -160,10 +160,10 @@ class CameraNode(ServedPayload):
         """Return why no camera was ever heard, for people; '' if one was."""
         if self._client.snapshot(now).address is not None:
             return ''
-        return f'no camera connected: {why_no_camera(self._host.diagnostics.snapshot(now))}'
+        return f'no camera connected: {why_no_camera(self._context.diagnostics.snapshot(now))}'
 
     def _ping(self, request: Trigger.Request, now: float, answer: Answer) -> None:
-        if failure := self._host.diagnostics.snapshot(now).failure:
+        if failure := self._context.diagnostics.snapshot(now).failure:
             answer(False, failure)
         else:
             self._client.ping(now, answer)
@@ -174,7 +174,7 @@ class CameraNode(ServedPayload):
 
             def done(success: bool, message: str) -> None:
                 # The camera may have taken the image at any time between.
-                lacking = dict.fromkeys((*before, *self._lacking(self._host.link.clock())))
+                lacking = dict.fromkeys((*before, *self._lacking(self._context.link.clock())))
                 if success and lacking:
                     message += f', without {", ".join(lacking)}'
                 answer(success, message)
@@ -217,26 +217,26 @@ class CameraNode(ServedPayload):
         if now >= self._absence_due:
             self._absence_due = math.inf
             if absence := self._absence(now):
-                self._host.log.warning(absence)
+                self._context.log.warning(absence)
         self._log_inputs(now)
         if now >= self._count_due:
             self._count_due = now + COUNT_INTERVAL
-            self._graph = {one: InputTopic(name, self._host.node.count_publishers(name))
+            self._graph = {one: InputTopic(name, self._context.node.count_publishers(name))
                            for one, name in self._topics.items()}
-            self._host.log.write_conditions(shared_topics(self._graph), 'shared input')
+            self._context.log.write_conditions(shared_topics(self._graph), 'shared input')
             # Publishers and their first messages take some time.
             if self._absence_due == math.inf:
-                self._host.log.write_conditions(
+                self._context.log.write_conditions(
                     missing(self._client.feeder.snapshot(now), self._graph), 'missing input')
         orientation = self._client.feeder.orientation
-        if orientation.mount_is_fixed and self._host.node.count_publishers(
+        if orientation.mount_is_fixed and self._context.node.count_publishers(
                 self._topics[Input.MOUNT]):
             orientation.expect_mount()
-            self._host.log.info('~/mount has a publisher: the mount is not fixed')
+            self._context.log.info('~/mount has a publisher: the mount is not fixed')
         if self._transforms and orientation.fixed_mount and now >= self._frame_due:
             self._frame_due = math.inf
             self._transforms.fix(
-                MountParent.VEHICLE.value, self._host.values['frame_id'],
+                MountParent.VEHICLE.value, self._context.values['frame_id'],
                 fixed_mount(orientation.fixed_mount, self._client.settings.mount_frame))
 
     def _log_inputs(self, now: float) -> None:
@@ -245,7 +245,7 @@ class CameraNode(ServedPayload):
             if one.state is not self._states.get(name, InputState.MISSING):
                 self._states[name] = one.state
                 used = one.state is InputState.OK
-                self._host.log.write(
+                self._context.log.write(
                     logging.INFO if used else logging.WARNING,
                     f'~/{name.value}: received' if used else why_unused(name, one),
                     f'input {name.value}')
@@ -256,8 +256,8 @@ class CameraNode(ServedPayload):
         if isinstance(event, ImageTaken):
             self._publish(event.feedback)
         else:
-            publish_event(event, 'camera', self._host.log, self._interface)
-        self._host.check_diagnostics()
+            publish_event(event, 'camera', self._context.log, self._interface)
+        self._context.check_diagnostics()
 
     def _publish(self, feedback: CameraFeedback) -> None:
         """Publish the metadata of an image, stamped with its own time."""
@@ -267,7 +267,7 @@ class CameraNode(ServedPayload):
             self._client.feeder.ros_time(feedback.time_usec * 1000, present), 1_000_000_000)
         stamp = Time(sec=seconds, nanosec=nanoseconds)
         position = image_position(feedback, settings.geoid_separation)
-        fix = NavSatFix(header=Header(stamp=stamp, frame_id=self._host.values['frame_id']),
+        fix = NavSatFix(header=Header(stamp=stamp, frame_id=self._context.values['frame_id']),
                         status=NavSatStatus(status=NavSatStatus.STATUS_NO_FIX))
         if position is not None:
             fix.status.status = position.status
