@@ -15,10 +15,12 @@ settings.register_profile(
     'steady', deadline=None, derandomize=True, max_examples=40,
     suppress_health_check=[HealthCheck.too_slow])
 settings.load_profile('steady')
+# Collection makes thousands of objects that stay.
+gc.disable()
 # Files that take longer than 10 s, the longest first; they begin before all others.
 LONG = [f'test_{name}.py' for name in (
     'app', 'examples', 'findings', 'gimbal_node', 'rededge', 'conformance', 'monitor',
-    'monitor_web', 'flight', 'soak', 'mavsdk', 'packaging', 'manager_node', 'demo',
+    'monitor_web', 'soak', 'mavsdk', 'packaging', 'manager_node', 'demo',
     'command_line')]
 
 
@@ -31,5 +33,5 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
 
 def pytest_collection_finish() -> None:
     """Keep the garbage collector from looking through thousands of tests again and again."""
-    gc.collect()
     gc.freeze()
+    gc.enable()
