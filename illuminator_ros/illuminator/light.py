@@ -33,12 +33,13 @@ other values replaces it at once, but a setpoint or a rule waits for a configura
 way. The attempt sends the command with a request for the status, and ends each request that it
 serves as soon as a status that came after an acknowledgement, or after the last try, shows the
 values of that request. After a restart it sends the command again and counts no status for 1.5 s.
-A parameter set, which ends 0.85 s after it was made, is then confirmed by a status that shows its
-values though the first one did not; if it fails, the configuration that was agreed is restored.
-Without ``restore_configuration`` a new command carries the other fields as the light has them. A
-request that was made after the attempt began waits for the next attempt: nothing that was sent
-before proves it. An OFF that a rule insists on may never end, so an OFF call beside it fails after
-4 s. Replies are called when the step has ended, so a reply may make the next request.
+A parameter set, which ends 0.85 s after it was made, is then confirmed by an acknowledgement and a
+status that shows its values though the first one did not; if it fails, the configuration that was
+agreed is restored. Without ``restore_configuration`` a new command carries the other fields as the
+light has them. A request that was made after the attempt began waits for the next attempt: nothing
+that was sent before proves it. An OFF that a rule insists on may never end, so an OFF call beside
+it fails after 4 s. Replies are called when the step has ended, so a reply may make the next
+request.
 
 **Not solved well.** COMMAND_ACK does not name the try that it answers. After a command that ended
 unconfirmed, and after a restart, older frames may still come for 1.5 s, the fence, in which

@@ -171,7 +171,8 @@ class Proof(Enum):
 
     NOTHING = 'nothing'
     STATUS = 'a status that shows it: none of these frames can have caused that'
-    ACKNOWLEDGED = 'the same after an acknowledgement: all these frames set equal values'
+    ACKNOWLEDGED = ('such a status after an acknowledgement: all these frames set equal values, '
+                    'or the status may be from before a restart')
 
 
 class Fence(NamedTuple):
@@ -332,7 +333,7 @@ class Attempt(Generic[S]):
         if self._sending is not Sending.ONCE:
             fence, is_hurried = self._fence, self.goal.deadline <= now + FENCE
             may_be_others = now < fence.ends_at and fence.proof is Proof.NOTHING
-            self._fence = Fence(now + FENCE, proof=Proof.STATUS if (
+            self._fence = Fence(now + FENCE, proof=Proof.ACKNOWLEDGED if (
                 is_hurried and not may_be_others and self.change.shown_by(status) is False
             ) else Proof.NOTHING)
             self._outcome = self._instead = None

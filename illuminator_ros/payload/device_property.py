@@ -57,6 +57,8 @@ class Property(Generic[S]):
         # When a command that has ended was sent last, s.
         self._sent_at = -math.inf
         self._unconfirmed: Change[S] | None = None
+        # Until then statuses and frames from before a restart may come, s.
+        self._restart_ends_at = -math.inf
         # The values whose frames may be under way, and until when, s.
         self._under_way: dict[CommandedValue, float] = {}
 
@@ -115,7 +117,7 @@ class Property(Generic[S]):
                 change.value in under_way or len(under_way) == MAX_VALUES):
             return Proof.NOTHING
         if newest is not None and change.shown_by(newest) is False:
-            return Proof.STATUS
+            return Proof.STATUS if now >= self._restart_ends_at else Proof.ACKNOWLEDGED
         return Proof.NOTHING if has_others else Proof.ACKNOWLEDGED
 
     def withdraw(self, text: str, now: float) -> list[Served[S]]:
@@ -160,6 +162,7 @@ class Property(Generic[S]):
 
     def restarted(self, status: S, now: float) -> None:
         """Receive the first status since a restart."""
+        self._restart_ends_at = now + FENCE
         if self.attempt is not None:
             self.attempt.restarted(status, now)
 

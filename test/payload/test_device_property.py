@@ -218,17 +218,26 @@ def test_within_the_fence_of_an_equal_value_a_status_without_an_acknowledgement_
     assert bench.ended(0, limit=0.9) == (False, 0.9)
 
 
-@pytest.mark.parametrize(('before', 'is_proved'), [([], True), ([3, 4], False)])
-def test_after_a_restart_a_status_proves_a_set_that_alone_can_have_caused_it(
-    before: list[int], is_proved: bool,
+# The values before that were withdrawn, whether the command had begun before the restart, and
+# whether it is acknowledged after it -> whether the next status proves it.
+@pytest.mark.parametrize(('before', 'is_under_way', 'is_acknowledged', 'is_proved'), [
+    ([], True, True, True), ([], True, False, False), ([3, 4], True, True, False),
+    ([4], False, True, True), ([4], False, False, False), ([3, 4], False, True, False)])
+def test_after_a_restart_a_status_and_an_acknowledgement_prove_a_set_that_no_other_can_have_caused(
+    before: list[int], is_under_way: bool, is_acknowledged: bool, is_proved: bool,
 ) -> None:
     bench = PropertyBench(0, None, sends_status=False).report(0)
     for value in before:
         bench.want(value)
         bench.withdraw()
-    answer = bench.want(3, limit=0.9)
+    answer = bench.want(3, limit=0.9) if is_under_way else []
     bench.property.restarted(0, bench.now)
+    if not is_under_way:
+        answer = bench.want(3, limit=0.9)
+    if is_acknowledged:
+        bench.acknowledge(ACCEPTED)
 
+    # It may be from before the restart.
     bench.report(3)
 
     assert [one.success for one in answer] == [True] * is_proved
