@@ -6,11 +6,12 @@
 Sends commands to simulated lights over faulty lines, and compares each outcome with the light.
 
 Each run of 400 commands draws the faults of the line in each direction (latency to 0.5 s, jitter
-and reordering within half of it, loss, repetition, corruption), the behaviour of the lights, and
-whether users wait for answers. Time is simulated, so 500 outcomes take a second. An outcome is
-untrue if the light was not as a success says at any time between the question and the answer, if a
-failure gives a wrong reason, or if a command does not have exactly one outcome. The state shown at
-the end must be the state of the light.
+and reordering within half of it, loss, repetition, corruption), the behaviour of the lights, such
+as a restart each 7 s, whether users wait for answers, and how often their requests are equal. Time
+is simulated, so 500 outcomes take a second. An outcome is untrue if the light was not as a success
+says at any time between the question and the answer, if a failure gives a wrong reason, or if a
+command does not have exactly one outcome. The state shown at the end must be the state of the
+light.
 
     python3 test/soak/loss.py --outcomes 1000000
     python3 test/soak/loss.py --outcomes 100000 --delays    and half of the frames up to 1 s later
@@ -39,7 +40,8 @@ from support.wire import Faults  # noqa: E402
 KINDS = ('drop', 'duplicate', 'delay', 'corrupt')
 BEHAVIOURS: tuple[dict[str, Any], ...] = (
     {}, {}, {'apply_after': 0.005}, {'apply_after': 0.2}, {'slow': 0.1}, {'progress': 0.5},
-    {'status_on_change': False}, {'acks_target': False}, {'answers_command_int': False})
+    {'status_on_change': False}, {'acks_target': False}, {'answers_command_int': False},
+    {'reboot_interval': 7.0})
 
 
 def line(draw: random.Random, *, delays: bool) -> Faults:
@@ -56,6 +58,7 @@ def play(seed: int, *, delays: bool) -> Run:
     draw = random.Random(seed)
     there, back = line(draw, delays=delays), line(draw, delays=delays)
     return Run(there, back, str(seed), impatience=draw.choice((0.0, 0.2)),
+               levels=draw.choice((101, 3)),
                behaviour=replace(FAULTLESS, **draw.choice(BEHAVIOURS)))
 
 

@@ -30,6 +30,8 @@ ON_OFF, CONFIGURE = mavlink.MAV_CMD_ILLUMINATOR_ON_OFF, mavlink.MAV_CMD_DO_ILLUM
 COMMANDS = 400
 # s; more than the longest delay of a line, plus the period of statuses.
 QUIET = 6.0
+# s; the longest wait until a restored configuration is sent again, and some more.
+RESTORED = 70.0
 # s by which a sending time that follows from an uptime may be wrong here.
 UPTIME_ERROR = 0.05
 CONFIRMED = 'confirmed'
@@ -42,6 +44,7 @@ OUTCOMES = {
     'rare status': 'its next status is due within',
     'superseded': 'superseded by ',
     'fenced': 'an earlier command may still be under way',
+    'restarted': 'not confirmed; the light restarted meanwhile',
     'refused': 'refused: MAV_RESULT_',
     'unfinished': 'not finished in time',
     'progress stopped': 'no final acknowledgement',
@@ -56,8 +59,9 @@ class Witness:
 
     def __init__(self, light: SimulatedComponent[SimulatedIlluminator], now: float) -> None:
         self._lamp = light.device
-        self._apply = light.apply
+        self._apply, self._restart = light.apply, light.restart
         light.apply = self._watched_apply  # type: ignore[method-assign]
+        light.restart = self._watched_restart  # type: ignore[method-assign]
         self._states: list[tuple[float, Fields]] = [(now, self._fields())]
 
     def _fields(self) -> Fields:
@@ -65,6 +69,13 @@ class Witness:
 
     def _watched_apply(self, effect: Effect, now: float) -> None:
         self._apply(effect, now)
+        self._note(now)
+
+    def _watched_restart(self, now: float) -> None:
+        self._restart(now)
+        self._note(now)
+
+    def _note(self, now: float) -> None:
         if (fields := self._fields()) != self._states[-1][1]:
             self._states.append((now, fields))
 
@@ -117,11 +128,13 @@ class User:
 
     def __init__(
         self, pair: Pair, light: Light, kind: int, draw: random.Random, impatience: float,
+        levels: int,
     ) -> None:
         self.pair, self.light, self.kind, self.draw = pair, light, kind, draw
         self.due = pair.now + draw.uniform(0, 1)
         self.requests: list[Request] = []
         self._impatience = impatience
+        self._levels = levels
         self._waits = True
 
     @property
@@ -135,9 +148,9 @@ class User:
             values: dict[str, Any] = {'enabled': self.draw.random() < 0.5}
             answer = self.pair.ask_enable(values['enabled'], self.light)
         else:
-            values = {'brightness': float(self.draw.randrange(101)),
+            values = {'brightness': float(self.draw.randrange(self._levels)),
                       'strobe_period': self.draw.choice((0.0, 0.5, 1.0, 2.0)),
-                      'strobe_duty_cycle': float(self.draw.randrange(101))}
+                      'strobe_duty_cycle': float(self.draw.randrange(self._levels))}
             values = {name: values[name] for name in self.draw.sample(sorted(values), 2)}
             answer = self.pair.ask_configure(self.light, **values)
         self.requests.append(Request(self.light, self.kind, values, answer))
@@ -151,11 +164,12 @@ class Run:
 
     :param there: the faults of the line towards the lights; ``back`` towards the bridge.
     :param impatience: the share of requests after which the user does not wait for the answer.
+    :param levels: of brightness and duty cycle; with few of them requests are often equal.
     """
 
     def __init__(
         self, there: Faults, back: Faults, seed: str, *, commands: int = COMMANDS,
-        behaviour: IlluminatorBehaviour = FAULTLESS, impatience: float = 0.0,
+        behaviour: IlluminatorBehaviour = FAULTLESS, impatience: float = 0.0, levels: int = 101,
     ) -> None:
         # Disable heating, so that lights keep the commanded brightness.
         self.pair = pair = Pair(
@@ -167,7 +181,7 @@ class Run:
         pair.run_until(lambda: len(lights) == len(pair.devices) and all(
             light.snapshot(0.0).configuration for light in lights.values()), within=600.0)
         draw = random.Random(seed)
-        users = [User(pair, light, kind, draw, impatience)
+        users = [User(pair, light, kind, draw, impatience, levels)
                  for kind in (ON_OFF, CONFIGURE) for light in lights.values()]
         while sum(len(user.requests) for user in users) < commands:
             for user in users:
@@ -188,7 +202,11 @@ class Run:
             if wrong := self._untruth(request):
                 yield f'{wrong}: {request.light.address} {request.answer}'
         self.pair.mend()
-        self.pair.run(QUIET)
+        restarts = any(light.snapshot(self.pair.now).restarts
+                       for light in self.pair.controller.lights.values())
+        for device in self.pair.devices:
+            device.behave(FAULTLESS, self.pair.now)
+        self.pair.run(RESTORED if restarts else QUIET)
         for address, witness in self._witnesses.items():
             light = self.pair.controller.lights[address]
             if not witness.is_as(light, self.pair.now):
