@@ -235,6 +235,7 @@ class LightControl:
         ours = OwnCommands(self.configuration.is_busy, unconfirmed, sent_at + IMPLIED_TIME)
         before, was_off_by_heat = twin.enabled, twin.is_off_by_heat
         twin.update(status)
+        # Before the properties receive the status, which ends what was unconfirmed.
         origin = (events.LATE_EFFECT if self._is_late(now) else
                   events.A_REQUEST if self._may_light_up(now) else events.OTHER_SENDER)
         is_idle = not switch.is_busy and not twin.changing.are_changing
