@@ -17,7 +17,7 @@ import sys
 import termios
 import threading
 
-from support.fork_server import prepare_child
+from support.fork_server import fork, prepare_child
 from support.processes import environment, ROOT
 from support.waiting import PATIENCE
 
@@ -28,20 +28,23 @@ class Terminal:
     """
     A pseudo-terminal with ``python -m MODULE ARGUMENTS`` on it.
 
-    :param shell: script of a shell with job control, which runs the program as ``"$@"``.
+    :param shell: script of a shell with job control, which runs the program as ``"$@"``; '' for
+        none.
     """
 
     def __init__(self, *module: str, size: tuple[int, int] = (24, 100),
-                 env: Mapping[str, str] | None = None, shell: str = 'exec "$@"') -> None:
+                 env: Mapping[str, str] | None = None, shell: str = '') -> None:
         self._master, self._slave = pty.openpty()
         self.resize(*size)
         self.before = termios.tcgetattr(self._slave)
         given = {'TERM': 'xterm-256color', 'LANG': 'C.UTF-8', 'COLUMNS': '', 'LINES': '',
                  **(env or {})}
-        self._process = subprocess.Popen(
-            ['sh', '-mc', shell, 'sh', sys.executable, '-m', *module], cwd=ROOT,
-            env=environment(given), stdin=self._slave, stdout=self._slave, stderr=self._slave,
-            start_new_session=True, preexec_fn=_own_terminal)
+        streams = (self._slave,) * 3
+        self._process = fork(module, environment(given), ROOT, streams) if not shell else (
+            subprocess.Popen(
+                ['sh', '-mc', shell, 'sh', sys.executable, '-m', *module], cwd=ROOT,
+                env=environment(given), stdin=self._slave, stdout=self._slave,
+                stderr=self._slave, start_new_session=True, preexec_fn=_own_terminal))
         self._grown = threading.Condition()
         self._raw = b''
         self._gone = False
