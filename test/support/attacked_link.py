@@ -20,7 +20,7 @@ from illuminator_ros.payload.requests import Result
 from illuminator_ros.simulation.simulated import SimulatedComponent, SimulatedComponents
 from support.attacker import Attacker
 from support.client import Client
-from support.entries import entries
+from support.entries import stores
 from support.frames import Codec
 from support.simulated_link import SimulatedLink
 
@@ -30,8 +30,8 @@ GENUINE_PEER = ('127.0.0.1', 20_000)
 # s after which every request has been answered.
 ANSWERED_WITHIN = 120.0
 KEY = bytes(range(32))
-# Entries in all tables of a link and its endpoint; each light takes about 100.
-MAX_ENTRIES = 20_000
+# Entries in the tables of a link and its endpoint, of which time stamps are 4,096.
+MAX_ENTRIES = 8_000
 
 
 class AttackedLink:
@@ -71,8 +71,8 @@ class AttackedLink:
         raise NotImplementedError
 
     def entries(self) -> int:
-        """Return the number of entries in all tables of the link and its endpoint."""
-        return entries(self.link, self)
+        """Return the number of entries in the tables of the link and its endpoint."""
+        return sum(stores(self.link, self).values())
 
     def check_state(self) -> None:
         """Check that nothing waits to be sent."""

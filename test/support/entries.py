@@ -8,22 +8,6 @@ import gc
 from types import FunctionType, ModuleType
 
 
-def entries(root: object, *others: object) -> int:
-    """
-    Return the number of entries in all containers that an object holds, at any depth.
-
-    :param others: objects that are left out, with everything that only they hold.
-    """
-    seen, todo, count = set(map(id, others)), [root], 0
-    while todo:
-        one = todo.pop()
-        if id(one) not in seen and not isinstance(one, type | ModuleType | FunctionType):
-            seen.add(id(one))
-            count += len(one) if isinstance(one, dict | list | set | deque) else 0
-            todo += gc.get_referents(one)
-    return count
-
-
 def stores(root: object, *others: object) -> dict[str, int]:
     """
     Return the sizes of all containers that an object holds, by the class and attribute with them.
