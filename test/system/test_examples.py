@@ -189,10 +189,10 @@ def test_place_is_lit_once_the_gimbal_is_on_target_until_the_program_ends(
 def test_place_is_not_lit_where_the_position_of_the_vehicle_is_unknown(
         own_ros: Ros, tmp_path: Path) -> None:
     light, gimbal = light_and_gimbal()
-    with pointing(own_ros, tmp_path, light, gimbal, TIMEOUT='1.0') as program:
+    with pointing(own_ros, tmp_path, light, gimbal, TIMEOUT='3.0') as program:
         assert program.wait() == 1
         assert program.log == (
-            'not on target within 1 s: the position of the vehicle is unknown\n')
+            'not on target within 3 s: the position of the vehicle is unknown\n')
         assert not light.enabled
 
 
