@@ -141,7 +141,6 @@ SEEDED: dict[str, dict[str, set[str]]] = {
         **GIMBAL,
         'refuse': CHANGED,
         'progress': set(),
-        'busy': set(),
         'busy=1000': {'not-busy', *CHANGED},
         'disobey': {'no-control-command', 'no-control-roi'},
         'lie': {'take', 'secondary', 'one-player', 'roi', 'neutral', 'retract',
