@@ -12,7 +12,7 @@ from illuminator_ros.illuminator.settings import LightSettings
 from illuminator_ros.mavlink import messages as mav
 from illuminator_ros.mavlink.dialect import mavlink
 from illuminator_ros.payload.device_events import DeviceConnected, DeviceForgotten, DeviceFound
-from illuminator_ros.payload.discovery import CANDIDATE_TIME, MAX_CANDIDATES, MAX_DEVICES
+from illuminator_ros.payload.discovery import MAX_CANDIDATES, MAX_DEVICES
 import pytest
 from support.back_to_back import BRIDGE, Pair
 from support.client import Client
@@ -97,30 +97,6 @@ def test_candidates_are_bounded_cost_few_commands_and_give_way_to_a_status(clien
     assert len(targets) <= MAX_CANDIDATES
     client.receive(LIGHT, status_message(), 0.0)
     assert list(client.lights) == [LIGHT]
-
-
-def test_a_candidate_that_gave_way_gets_no_more_commands_and_is_found_by_its_status(
-    client: Heard,
-) -> None:
-    for source in FORGED[:MAX_CANDIDATES]:
-        client.receive(source, ILLUMINATOR, 0.0)
-    client.receive(LIGHT, ILLUMINATOR, CANDIDATE_TIME)
-    client.outgoing.clear()
-    client.run(CANDIDATE_TIME + 10.0)
-    targets = {message.target_component for _, message in client.outgoing
-               if isinstance(message, mav.CommandLong) and message.target_system == 2}
-    assert targets == {source.component for source in FORGED[1:MAX_CANDIDATES]}
-    client.receive(FORGED[0], status_message(), CANDIDATE_TIME + 10.0)
-    assert list(client.lights) == [FORGED[0]]
-
-
-def test_further_lights_are_ignored_when_there_are_too_many(client: Heard) -> None:
-    for source in FORGED[:MAX_DEVICES]:
-        client.receive(source, status_message(), 0.0)
-    assert not client.discovery.limit_reached
-    client.receive(LIGHT, status_message(), 0.0)
-    assert client.discovery.limit_reached
-    assert list(client.lights) == FORGED[:MAX_DEVICES]
 
 
 def test_silent_lights_that_were_never_commanded_give_their_places_to_others(

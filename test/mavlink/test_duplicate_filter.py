@@ -7,7 +7,6 @@ from __future__ import annotations
 
 from illuminator_ros.mavlink.forwarding.duplicate_filter import (
     DuplicateFilter,
-    MAX_FRAMES,
     MEMORY,
     Path,
 )
@@ -42,18 +41,3 @@ def test_a_frame_is_a_copy_if_it_came_over_another_path_less_than_5_s_before(
     filter_ = DuplicateFilter()
     assert not filter_.is_copy(b'other', SECOND, arrivals[-1][0])
     assert copies(filter_, *arrivals) == expected
-
-
-def test_copies_are_counted_by_the_lines_of_the_original_and_of_the_copy() -> None:
-    filter_ = DuplicateFilter()
-    copies(filter_, (0.0, FIRST), (1.0, SECOND), (2.0, SECOND))
-    assert filter_.copies == {(0, 1): (2, 2.0)}
-
-
-def test_of_too_many_frames_the_newest_are_remembered() -> None:
-    filter_ = DuplicateFilter()
-    frames = [number.to_bytes(4, 'little') for number in range(MAX_FRAMES + 1)]
-    for frame in frames:
-        filter_.add(frame, FIRST, 0.0)
-    assert [filter_.is_copy(frame, SECOND, 0.0) for frame in (*frames[:2], frames[-1])] == [
-        False, True, True]

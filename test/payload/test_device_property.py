@@ -13,7 +13,7 @@ from typing import Any
 from hypothesis import given, strategies
 from illuminator_ros.payload.attempt import Change, FENCE, Served
 from illuminator_ros.payload.device_property import LATE_TIME, MAX_VALUES, Property
-from illuminator_ros.payload.requests import Goal, MAX_CALLS, Request, Requests, Result, Why
+from illuminator_ros.payload.requests import Goal, Request, Requests, Result, Why
 import pytest
 from support.level_device import ACCEPTED, DENIED, level_change, LevelBench
 
@@ -124,23 +124,6 @@ def test_requests_for_an_equal_value_wait_for_a_command_sent_after_they_were_mad
     assert [one.status for one in bench.ends] == [3 if result == ACCEPTED else None] * 3
     assert [one[0].success for one in (first, *later)] == [result == ACCEPTED] * 3
     assert bench.tries[:2] == [0.0, ROUND_TRIP]
-
-
-def test_calls_are_bounded() -> None:
-    bench = PropertyBench().report()
-    answers = [bench.want(3) for _ in range(MAX_CALLS + 2)]
-    assert [bool(answer) for answer in answers] == [*[False] * MAX_CALLS, True, True]
-    assert answers[-1][0].message == '32 requests are waiting for device 1/7 already'
-    bench.run_until(1.0)
-    assert {len(answer) for answer in answers} == {1}
-
-
-def test_of_a_topic_the_newest_message_counts() -> None:
-    bench = PropertyBench().report()
-    stream = [bench.want(level, is_stream=True) for level in (3, 4, 5)]
-    bench.run_until(2 * FENCE)
-    assert messages(*stream[:2]) == ['superseded by level 4', 'superseded by level 5']
-    assert stream[-1][0].success
 
 
 def test_requests_of_one_time_share_a_command_and_are_answered_in_their_order() -> None:
