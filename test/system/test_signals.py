@@ -207,8 +207,9 @@ sys.exit(main())
 """
 
 
-@pytest.mark.parametrize('name', ['conformance', 'discover'])
-@pytest.mark.parametrize('number', [signal.SIGINT, signal.SIGQUIT])
+@pytest.mark.parametrize(('name', 'number'), [
+    ('conformance', signal.SIGINT),
+    *(('discover', one) for one in (*SIGNALS, signal.SIGQUIT))])
 def test_signal_before_the_run_ends_with_status_1_and_without_a_traceback(
     name: str, number: int,
 ) -> None:
