@@ -99,7 +99,7 @@ def test_a_signal_restores_the_light_and_ends_with_status_1(
     simulator = simulate()
     program = start(CONFORMANCE, f'udpout://{url}', *LONG)
     simulator.wait_for('ON     100 %')
-    program.send(signal.SIGTERM)
+    program.send(signal.SIGQUIT)
     program.wait_for('restoring the light')
     # A closing terminal sends SIGHUP twice.
     program.send(signal.SIGHUP)
