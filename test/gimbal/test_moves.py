@@ -314,6 +314,9 @@ ROWS: dict[str, Row] = {
         **SHARED),
     'with the silence of its source': row(
         'safety rate, mark, 3', 'zero', timeout=1.0, lasts=30.0, **SHARED),
+    'but not with a call or a message of a lower source': row(
+        'safety rate, mark, autonomy neutral, autonomy rate, 0.2', '', 'safety, turns',
+        'held by safety', 'held by safety', lasts=30.0, **SHARED),
     'with the call of a higher source': row(
         'autonomy rate, manager mute, mark, safety clear, 0.1', 'zero clear', 'autonomy',
         lasts=30.0, **SHARED),
@@ -547,3 +550,12 @@ def test_a_gimbal_stands_after_any_script(seed: int) -> None:
     stage.play(SANE)
 
     assert stage.manager.rates == STILL
+
+
+def test_a_release_tells_which_source_holds_the_gimbal_then() -> None:
+    stage = Stage()
+    stage.play('autonomy rate, safety rate')
+    gimbal, now = stage.rig.gimbal, stage.rig.now
+
+    assert gimbal.release('safety', now) == 'autonomy'
+    assert gimbal.release('autonomy', now) == ''
