@@ -6,7 +6,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-import contextlib
 import math
 import re
 
@@ -28,7 +27,7 @@ from illuminator_ros.mavlink import messages as mav
 from illuminator_ros.mavlink.dialect import mavlink, short_names
 from illuminator_ros.payload.device_events import DeviceDisconnected
 from illuminator_ros.payload.messages import GeoPoint
-from illuminator_ros.payload.requests import Done, Result
+from illuminator_ros.payload.requests import Done
 import pytest
 from support.gimbals import (
     ALL,
@@ -164,22 +163,6 @@ def test_gm_16_control_that_an_earlier_status_showed_is_asked_of_the_manager_aga
         rig.managers[0].reports = False
 
     assert asked(rig, Gimbal.take_control, 5.0)[0] is not is_restarted
-
-
-@pytest.mark.parametrize(('primary', 'asks', 'wish', 'last'), [
-    (NONE, (Gimbal.take_control, Gimbal.release_control), 'release control', 'control released'),
-    (OURS, (Gimbal.release_control, Gimbal.take_control), 'take control', 'control taken')])
-def test_gm_16_of_requests_for_control_that_overlap_the_last_one_decides(
-        primary: mav.Address, asks: tuple[Ask, Ask], wish: str, last: str) -> None:
-    rig = Rig(FakeManager(primary=primary)).run(3.0)
-    for ask in asks:
-        ask(rig.gimbal, rig.now, rig.done)
-    rig.run(3.0)
-
-    assert [one.success for one in rig.results] == [False, True]
-    assert rig.results[0].message == f'superseded by {wish}'
-    assert rig.results[1].message.startswith(f'{last}, confirmed')
-    assert rig.gimbal.reports.in_control is (asks[1] is Gimbal.take_control)
 
 
 def test_gm_18_a_request_ends_with_the_manager_that_got_it_and_the_next_goes_to_the_other_one(
@@ -441,34 +424,6 @@ def test_gm_3_the_yaw_lock_is_set_by_a_rate_of_zero_with_its_flag_until_it_is_sh
     assert [one.success for one in rig.results] == [True]
     rig.run(3.0)
     assert len(manager.received) - before <= lost + 6
-
-
-def test_a_status_from_before_an_equal_request_for_the_yaw_lock_does_not_confirm_it() -> None:
-    rig = in_control()
-    manager = rig.managers[0]
-    manager.applies, manager.streams, manager.device_reports = False, False, False
-    for _ in range(2):
-        set_yaw_lock(rig.gimbal, True, rig.now, rig.done)
-        rig.run(0.3)
-    set_yaw_lock(rig.gimbal, True, rig.now, rig.done)
-
-    manager.flags |= mavlink.GIMBAL_DEVICE_FLAGS_YAW_LOCK
-    rig.receive(DEVICE, manager.attitude())
-
-    assert [one.success for one in rig.results] == [True, True]
-
-
-def test_a_caller_that_raises_leaves_the_answer_to_the_others_of_the_yaw_lock() -> None:
-    def fail(result: Result, now: float) -> None:
-        raise RuntimeError
-
-    rig = in_control()
-    for done in (fail, rig.done):
-        set_yaw_lock(rig.gimbal, True, rig.now, done)
-    with contextlib.suppress(RuntimeError):
-        rig.run(1.0)
-
-    assert [one.success for one in rig.results] == [True]
 
 
 @pytest.mark.parametrize('ask', [ask for ask, *_ in FLAG_REQUESTS])

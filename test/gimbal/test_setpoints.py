@@ -96,23 +96,6 @@ def hold_button(rig: Rig, press: Callable[[], object], seconds: float = 5.0) -> 
     return len(manager.received) + sum(one.command == places for one in manager.commands)
 
 
-@pytest.mark.parametrize('angles', [(0.0, 0.0, 0.0), (NAN, 0.0, NAN)])
-def test_equal_angles_are_not_sent_again_while_a_standing_gimbal_shows_them(
-        angles: Vector) -> None:
-    rig = in_control()
-    rig.managers[0].rates = STANDING
-
-    def press() -> None:
-        assert rig.send_angles(angles, VEHICLE) == ''
-
-    hold_button(rig, press)
-
-    assert hold_button(rig, press) == 0
-    rig.send_angles((0.0, 0.1, 0.0), VEHICLE)
-    rig.run(3.0)
-    assert hold_button(rig, press) > 0
-
-
 @pytest.mark.parametrize(('rates', 'least', 'most'), [(STANDING, 5, 25), (TURNING, 250, 300)])
 def test_equal_angles_that_a_gimbal_does_not_show_are_sent_once_a_second_or_while_it_moves(
         rates: Vector, least: int, most: int) -> None:
@@ -165,14 +148,6 @@ def test_a_rate_that_lasts_ends_after_a_shorter_timeout_and_never_later_than_it_
     rig.run(10.0)
 
     assert [at - start for at, _ in setpoints(rig)[:2]] == approx([0.0, zero_at], abs=0.03)
-
-
-def test_gm_14_setpoint_that_comes_before_the_poll_after_a_pause_is_not_sent() -> None:
-    rig = in_control()
-    rig.now += 60.0
-
-    assert 'not connected' in rig.send(Attitude(Quaternion(), VEHICLE))
-    assert not rig.component.outgoing
 
 
 def turn(rig: Rig) -> None:
