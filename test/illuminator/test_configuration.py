@@ -515,17 +515,6 @@ def test_after_a_restart_a_light_that_is_dimmed_by_heat_is_sent_its_configuratio
     assert sent(agreed, since=at) == [(1, 30, 2, 40)]
 
 
-def test_a_light_that_refuses_the_restored_configuration_is_followed(
-    fake: FakeLight, agreed: Pair,
-) -> None:
-    fake.results[CONFIGURE] = DENIED
-    fake.restart(agreed.now)
-    agreed.run(10.0)
-    assert successes(agreed)[-1] is False
-    assert agreed.snapshot.discrepancy
-    assert confirmed(agreed).brightness == 100.0
-
-
 def test_values_within_the_limits_that_a_restart_makes_obsolete_leave_no_discrepancy(
     fake: FakeLight,
 ) -> None:

@@ -68,9 +68,3 @@ def eventually(
         assert time.monotonic() < until, f'not within {within} s: {what}'
         pause.wait(0.005)
     return value
-
-
-def stopwatch() -> Callable[[], float]:
-    """Return a function that returns the time since this call by the machine's clock, s."""
-    begun = time.monotonic()
-    return lambda: time.monotonic() - begun

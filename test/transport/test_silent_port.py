@@ -23,7 +23,6 @@ from support.waiting import eventually, Log
 
 URL = SerialUrl('/dev/ttyUSB0', 57600)
 BEAT = Codec().frame(Address(1, 243), heartbeat(mavlink.MAV_TYPE_ILLUMINATOR))
-GARBAGE = bytes(byte >> 1 | 0x80 for byte in BEAT)
 NMEA = b'$GPGLL,4916.45,N,12311.12,W,225444,A*31\r\n'
 
 
