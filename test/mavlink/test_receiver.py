@@ -13,9 +13,9 @@ from illuminator_ros.mavlink.frame import Frame
 from illuminator_ros.mavlink.frame_writer import FrameWriter
 from illuminator_ros.mavlink.messages import Address
 from illuminator_ros.mavlink.receiver import MAX_DECODERS, Receiver, STALL
-from illuminator_ros.mavlink.signing import Signing, SigningMode
+from illuminator_ros.mavlink.signing import Signing
 import pytest
-from support.frames import frame_of, heartbeat_frame, LIGHT, raw_v1
+from support.frames import heartbeat_frame, LIGHT, raw_v1
 
 UNIX = 1.7e9
 FRAME = heartbeat_frame()
@@ -64,13 +64,6 @@ def test_frame_that_began_behind_a_false_start_is_still_awaited(receiver: Receiv
     assert sources(receiver.feed('a', FRAME[9:], STALL + 0.1)) == [LIGHT]
 
 
-def test_signed_frames_pass_and_are_counted_where_signing_is_off() -> None:
-    frame = Signing(SigningMode.SIGN, bytes(32)).sign(frame_of(signed=True), UNIX)
-    signing = Signing()
-    frames = make(signing).feed('a', FRAME + frame, 0.0)
-    assert (sources(frames), signing.counters.unchecked) == ([LIGHT] * 2, 1)
-
-
 def test_wait_begins_anew_with_the_next_frame(receiver: Receiver) -> None:
     receiver.feed('a', FRAME[:9], 0.0)
     receiver.feed('a', FRAME[9:] + FRAME[:9], 0.4)
@@ -92,12 +85,6 @@ def test_garbage_of_many_peers_costs_a_good_peer_nothing(receiver: Receiver) -> 
         receiver.feed(number, FALSE_STARTS[0], 0.0)
     assert sources(receiver.feed('good', FRAME[9:], 0.1)) == [LIGHT]
     assert sources(receiver.feed(0, FRAME, 0.1)) == [LIGHT]
-    assert receiver.give_up(STALL) == []
-
-
-def test_unsigned_frames_do_not_pass_where_signing_is_required() -> None:
-    receiver = make(Signing(SigningMode.REQUIRE, bytes(32)))
-    assert receiver.feed('a', FRAME + FALSE_STARTS[0] + FRAME, 0.0) is None
     assert receiver.give_up(STALL) == []
 
 
