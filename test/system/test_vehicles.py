@@ -80,7 +80,9 @@ def test_ground_station_and_ros_take_turns_at_the_gimbal_of_the_companion_comput
         autopilot = EndpointLink(f'pty://{tmp_path}/ttyACM0', Autopilot())
         stack.callback(autopilot.stop)
         manager = stack.enter_context(node(own_ros, 'gimbal_manager', arguments))
+        # The manager manages the gimbal before the client in its process has heard the device.
         manager.wait_for('gimbal 1/154 is managed')
+        manager.wait_for('connected, manager')
         gimbals = stack.enter_context(ground_station(port))
         assert call(own_ros, 'gimbal_manager', 'take_control').success
 
