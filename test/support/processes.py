@@ -228,6 +228,6 @@ def ended(program: Program) -> Iterator[Program]:
         yield program
         if program.running:
             status = program.end()
-            assert (status, 'Traceback' in program.log) == (0, False), program.log
+            assert (status, 'Traceback' in program.log) == (0, False), f'{status}: {program.log}'
     finally:
         program.kill()
