@@ -289,6 +289,18 @@ def test_a_set_that_is_proved_within_the_fence_does_not_lengthen_it() -> None:
     assert took == pytest.approx(FENCE - 0.5)
 
 
+def test_an_equal_set_that_an_earlier_frame_may_have_caused_lengthens_the_fence() -> None:
+    bench = PropertyBench(0).report(0)
+    bench.want(0)
+    bench.withdraw()
+    bench.run_until(1.0)
+    assert bench.ended(0, limit=0.9) == (True, ROUND_TRIP)
+
+    success, took = bench.ended(5)
+    assert success
+    assert took == pytest.approx(FENCE)
+
+
 def test_values_from_before_the_fence_are_forgotten_after_it() -> None:
     bench = PropertyBench().report()
     bench.want(3)
