@@ -265,7 +265,7 @@ class LightControl:
     def restarted(self, status: Status, now: float) -> None:
         """Take the first status after a restart, which confirms nothing."""
         if not self._rules.settings.restore_configuration:
-            # Its command would bring back the fields that nobody asks for.
+            # Its command would bring back the fields that no request asks for.
             self._withdrawn(self.configuration.withdraw('the light restarted', now), now)
         attempt, wanted = self.configuration.attempt, self._twin.agreed
         self._rules.restore({} if wanted is None else {

@@ -237,8 +237,8 @@ class Transmission:
     follow_up: Command | None
     state: CommandState = CommandState.SENT
     tries: int = 0
-    # Tries that are no resends of an unacknowledged one: those of a command before it, and those
-    # that were answered with a result that is not final.
+    # The tries that use up no retry: the tries of a command before it, and tries with an answer
+    # that is not final.
     rejected: int = 0
     first_sent: float = -math.inf
     last_sent: float = -math.inf

@@ -167,7 +167,7 @@ class Served(NamedTuple, Generic[S]):
 
 
 class Proof(Enum):
-    """What proves a command while frames of other commands may be under way."""
+    """The evidence that proves a command while frames of other commands may be under way."""
 
     NOTHING = 'nothing'
     STATUS = 'a status that shows it: none of these frames can have caused that'
@@ -181,6 +181,7 @@ class Fence(NamedTuple):
 
     :param ends_at: s.
     :param frames: of the command before that were not acknowledged.
+    :param proof: the evidence that counts before the end all the same.
     """
 
     ends_at: float = -math.inf

@@ -348,7 +348,8 @@ class Requests:
     def end(self, one: Request, result: Result, now: float) -> None:
         """End a request. A call that has succeeded claims the device."""
         is_known, one.is_open, one.is_served = one in self.standing, False, False
-        later = self.standing[self.standing.index(one):] if is_known else []
+        # A message may have come in the turn of a call, after it.
+        later = self.standing[self.standing.index(one):] if is_known and one.is_call else []
         if is_known and not (one.is_wish and self.claims.is_claimed_by(one.source)):
             self.standing.remove(one)
         if result.success and one.why is Why.REQUEST:

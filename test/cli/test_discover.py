@@ -426,6 +426,6 @@ def test_without_a_device_the_status_is_1_and_json_has_each_port(tmp_path: Path)
     assert outcome.returncode == 1
     assert [(one['port'], one['trouble']) for one in json.loads(outcome.stdout)] == [
         (f'{tmp_path}/tty', f'cannot open {tmp_path}/tty: there is no such port: '
-                            '/dev/serial/by-id has the names of those that are plugged in, and '
-                            'serial://auto finds the port by itself'),
+                            '/dev/serial/by-id lists the present USB ports, and serial://auto '
+                            'finds the port by itself'),
         ('tcp://127.0.0.1:9', 'cannot connect to 127.0.0.1:9: Connection refused')]

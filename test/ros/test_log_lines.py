@@ -169,4 +169,4 @@ def test_a_fraction_as_limit_and_an_unusual_baud_rate_are_warned_of(
             'max_brightness is 0.5 %: it is a percentage, not a fraction'),
             forward_urls=['serial:///dev/ttyNONE:56700']) as bridge:
         bridge.wait_for('56700 baud is unusual: is the rate of /dev/ttyNONE 57600?')
-        bridge.wait_for('cannot open /dev/ttyNONE: there is no such port: /dev/serial/by-id has')
+        bridge.wait_for('cannot open /dev/ttyNONE: there is no such port: /dev/serial/by-id lists')

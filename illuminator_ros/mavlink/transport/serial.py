@@ -27,8 +27,8 @@ from ..url import MAVROS_BAUD, PtyUrl, SerialUrl
 BITS_PER_BYTE = 10
 # Why a port cannot be opened, where the system's own text is wrong or has no remedy.
 REASONS = {
-    errno.ENOENT: 'there is no such port: /dev/serial/by-id has the names of those that are '
-                  'plugged in, and serial://auto finds the port by itself',
+    errno.ENOENT: 'there is no such port: /dev/serial/by-id lists the present USB ports, and '
+                  'serial://auto finds the port by itself',
     errno.ENOTTY: 'it is not a serial port',
     errno.EACCES: 'no permission; join its group, as in "sudo usermod -a -G dialout $USER", and '
                   'log in again',
